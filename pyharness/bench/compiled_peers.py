@@ -23,7 +23,11 @@ RK4 = [[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6], [0
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Return a `Maker` of runs with a fixed step: RK4, or the formula of order 8 from DOP853."""
+    """Return a `Maker` of fixed-step Runge-Kutta runs on a scene, compiled by numba.
+
+    `method` is "rk4" for the classical method, or "dop8" for the formula of order 8 from DOP853.
+    The setting of a run is its number of steps.
+    """
     import numba
 
     formula: Formula = RK4
@@ -50,7 +54,10 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
 
 
 def numbalsoda(name: str, scene: Scene) -> Maker:
-    """Return a `Maker` of runs by `dop853` or `lsoda` of numbalsoda, right-hand side compiled."""
+    """Return a `Maker` of runs on a scene by numbalsoda, with a compiled right-hand side.
+
+    `name` is the solver, "dop853" or "lsoda". The setting of a run is its relative tolerance.
+    """
     import numba
     import numbalsoda as package
 
@@ -85,7 +92,7 @@ def numbalsoda(name: str, scene: Scene) -> Maker:
 
 
 def compiled_function(source: str) -> Any:
-    """Return the function that `source` defines, as plain Python that is not compiled yet."""
+    """Return the function named `function` that `source` defines, before numba compiles it."""
     names: dict[str, Any] = {}
     exec(compile(source, "<bench>", "exec"), {"sin": np.sin, "cos": np.cos}, names)
     return names["function"]
@@ -94,10 +101,11 @@ def compiled_function(source: str) -> Any:
 def rates(
     scene: Scene, time: str, state: Sequence[str], coefficients: Sequence[float] = ()
 ) -> list[str]:
-    """Return the right-hand sides as source text, one expression for each unknown.
+    """Return the right-hand sides of a scene as Python source, one expression for each unknown.
 
-    If `state` has three names, they are omega's. If it has seven, the last four are the attitude's,
-    with q' = q (0, omega)/2. `coefficients` are A, B and C, by default the scene's.
+    `time` is the source text of the time. `state` has the names of the unknowns in the source: the
+    first three are omega's, and the last four of seven are the attitude's, with
+    q' = q (0, omega)/2. `coefficients` are A, B and C, by default the scene's.
     """
     x, y, z, *attitude = state
     moments = scene.moments or (1.0, 1.0, 1.0)
@@ -130,21 +138,27 @@ def rates(
 
 
 def state_names(scene: Scene) -> str:
-    """Return a letter for each unknown: three for omega, four more for the attitude, if any."""
+    """Return a letter for each unknown of a scene: three for omega, four for an attitude if any."""
     return "xyz" if scene.attitude is None else "xyzabcd"
 
 
 def end_of(state: Array, evaluations: int | None = None) -> End:
-    """Return the result of a call from its unknowns at time T."""
+    """Return the `End` of a call from `state`, its unknowns at time T.
+
+    They are three components of omega and, if it was propagated, the attitude. `evaluations` is the
+    number of right-hand sides in the call, if it was counted.
+    """
     found = plain(state)
     attitude = found[3:] if len(found) > 3 else None
     return End(found[:3], evaluations=evaluations, attitude=attitude)
 
 
 def steps_source(scene: Scene, formula: Formula) -> str:
-    """Return the source of a function that takes equal Runge-Kutta steps.
+    """Return the Python source of a function that takes equal Runge-Kutta steps on a scene.
 
-    The function has no loop over stages or components.
+    `formula` has the stage coefficients, the weights and the nodes of the Runge-Kutta method. The
+    function is called with the initial omega, the end time (s), the number of steps, and an array
+    that receives omega at the end. It has no loop over stages or components.
     """
     stages, weights, nodes = formula
     lines = [
@@ -172,7 +186,10 @@ def _increment(factors: Sequence[float], name: str) -> str:
 
 
 def _callback_source(scene: Scene, counted: bool) -> str:
-    """Return the source of a right-hand side for numbalsoda; if `counted`, `p` counts the calls."""
+    """Return the Python source of a scene's right-hand side for numbalsoda.
+
+    If `counted`, the function adds 1 to its parameter `p` in each call.
+    """
     names = state_names(scene)
     lines = ["def function(t, u, du, p):"]
     lines += [f"    {name} = u[{i}]" for i, name in enumerate(names)]

@@ -27,7 +27,10 @@ Maker = Callable[[float, float], Ready]
 
 @dataclass(frozen=True)
 class Contender:
-    """A solver in a benchmark, ours or third-party; its setting trades time for accuracy."""
+    """A solver that takes part in a benchmark, either one of our own or a third-party solver.
+
+    Its setting trades time for accuracy: a tolerance or a number of steps. A closed form has none.
+    """
 
     name: str
     setting: str  # quantity that is varied: "tolerance", "steps" or "none"
@@ -52,7 +55,7 @@ class SceneContender(Contender):
 
 
 def own() -> list[SceneContender]:
-    """Return our methods and the three programs, each program original and corrected."""
+    """Return our methods and the three programs of the thesis, both original and corrected."""
     both = partial(SceneContender, attitude=True)
     found = [
         both("auto", "tolerance", partial(_prepared, "auto"), TOLERANCES),
@@ -75,7 +78,8 @@ def own() -> list[SceneContender]:
 def refuse_rounding(solver: str, setting: float) -> None:
     """Raise InputError if a tolerance is below 100 eps, the smallest that SciPy and LSODA accept.
 
-    SciPy would replace a smaller tolerance by 100 eps with a warning. LSODA calls it illegal.
+    `setting` is the relative tolerance, and `solver` is the name that the message mentions. SciPy
+    would replace a smaller tolerance by 100 eps with a warning. LSODA calls it illegal.
     """
     limit = 100 * 2.0**-52
     if setting < limit:

@@ -14,7 +14,10 @@ LANES = 64  # bodies in a block
 
 
 def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int) -> None:
-    """Call `solve` for blocks of bodies, one after another or distributed over threads."""
+    """Call `solve` for blocks of bodies, one after another or distributed over threads.
+
+    `solve` takes a slice of the indices of `n` bodies. `block` is the number of bodies in a block.
+    """
     pieces = [slice(first, min(n, first + block)) for first in range(0, n, block)]
     if threads == 1:
         for piece in pieces:
@@ -29,7 +32,8 @@ def numba_rk4(
 ) -> Callable[[], Array]:
     """Return a function that runs RK4 compiled by numba, for blocks of bodies or body by body.
 
-    In a block, each step is a loop over the bodies of the block.
+    If `in_blocks`, each step is a loop over the bodies of a block. `setting` is the number of
+    steps. The function returns omega of the bodies of `load` at the horizon, shape (n, 3).
     """
     blocks, bodies = _numba_kernels()
     kernel = blocks if in_blocks else bodies
@@ -117,7 +121,11 @@ def _numba_kernels() -> tuple[Any, Any]:
 
 
 def jax_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that runs RK4 compiled by JAX, on an array of all bodies per unknown."""
+    """Return a function that runs RK4 compiled by JAX, with one array of all bodies per unknown.
+
+    `setting` is the number of steps. JAX chooses its threads itself, so that `threads` has no
+    effect. The function returns omega of the bodies of `load` at the horizon, shape (n, 3).
+    """
     compiled, jnp = _jax_steps()
     steps = round(setting)
     given = [tuple(jnp.array(each) for each in rows.T) for rows in (load.omega0, load.acceleration)]
@@ -151,7 +159,11 @@ def _jax_steps() -> tuple[Any, Any]:
 
 
 def diffrax_vmap(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that runs diffrax's Dopri8, with steps chosen separately for each body."""
+    """Return a function that runs diffrax's Dopri8, with steps chosen separately for each body.
+
+    `setting` is the tolerance. JAX chooses its threads itself, so that `threads` has no effect. The
+    function returns omega of the bodies of `load` at the horizon, shape (n, 3).
+    """
     compiled, jnp = _diffrax_solve()
     given = jnp.array(load.omega0), jnp.array(load.acceleration), setting
     return lambda: np.asarray(compiled(*given))
@@ -179,7 +191,7 @@ def _diffrax_solve() -> tuple[Any, Any]:
 
 
 def _jax() -> tuple[Any, Any]:
-    """Return JAX, set to compute in binary64, and its module of arrays."""
+    """Return the module JAX, set to compute in binary64, and its array module `jax.numpy`."""
     import jax
     import jax.numpy as jnp
 

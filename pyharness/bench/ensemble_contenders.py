@@ -20,13 +20,13 @@ _HARDEST = 1.0  # rad/s2, about each axis
 
 
 def coefficients() -> list[float]:
-    """Return the Euler coefficients A, B and C of the body."""
+    """Return the Euler coefficients A, B and C of a body with the moments `MOMENTS`."""
     return [float(each) for each in exact_coefficients(Scene("", (0.0, 0.0, 0.0), MOMENTS))]
 
 
 @dataclass(frozen=True, eq=False)
 class EnsembleLoad:
-    """Bodies with the same moments, each with its own initial omega and its own torque."""
+    """An ensemble of bodies with the same moments, each with its own initial omega and torque."""
 
     name: str
     omega0: Array  # (n, 3), rad/s
@@ -51,12 +51,15 @@ class EnsembleLoad:
         return found
 
     def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
-        """Return a load of the bodies with these indices."""
+        """Return a load of the bodies whose indices are in `rows`."""
         torque = None if self.torque is None else np.ascontiguousarray(self.torque[rows])
         return replace(self, omega0=np.ascontiguousarray(self.omega0[rows]), torque=torque)
 
     def ends(self) -> Array:
-        """Return omega of each body at the horizon, solved one by one at tolerance 1e-15."""
+        """Return omega of each body at `HORIZON` (rad/s, shape (n, 3)), to compare results with.
+
+        The bodies are solved one by one with tolerance 1e-15.
+        """
         found = np.empty_like(self.omega0)
         for i, start in enumerate(self.omega0.tolist()):
             law = TorqueLaw() if self.torque is None else TorqueLaw(self.torque[i].tolist())
@@ -65,14 +68,14 @@ class EnsembleLoad:
         return found
 
 
-# A function from the bodies, the setting and the number of threads to a call. The call returns
-# omega at the horizon, shape (n, 3).
+# A function from the bodies, the setting (a tolerance or a number of steps) and the number of
+# threads to a call. The call returns omega at the horizon, shape (n, 3).
 EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 
 
 @dataclass(frozen=True)
 class EnsembleContender(Contender):
-    """A contender that computes omega of many bodies at the horizon."""
+    """A contender of `bench --ensemble`, which computes omega of many bodies at `HORIZON`."""
 
     prepare: EnsembleMaker  # compilation may be left to the first call
     # Numbers of threads to measure with; 0 means as many as the package uses.
@@ -81,7 +84,10 @@ class EnsembleContender(Contender):
 
 
 def draw(seed: str, n: int) -> list[EnsembleLoad]:
-    """Return a load of n bodies without torque, and a load of the same bodies with torques."""
+    """Return a load of n random bodies without torque, and a load of the same bodies with torques.
+
+    The text `seed` determines the random numbers.
+    """
     source = np.random.default_rng([ord(letter) for letter in f"ensemble/{seed}"])
     omega0 = source.uniform(-_FASTEST, _FASTEST, (n, 3))
     torque = source.uniform(-_HARDEST, _HARDEST, (n, 3)) * np.array(MOMENTS)
@@ -92,7 +98,7 @@ def draw(seed: str, n: int) -> list[EnsembleLoad]:
 
 
 def own_ensembles() -> list[EnsembleContender]:
-    """Return our own contenders."""
+    """Return our own contenders: the closed form, the Taylor method and RK4."""
     return [
         EnsembleContender("closed-form", "none", _own("closed-form"), torque_free=True),
         EnsembleContender("taylor", "tolerance", _own("taylor")),

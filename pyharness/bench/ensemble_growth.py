@@ -25,7 +25,7 @@ _BATCH, _ROUNDS = 0.02, 5
 
 @dataclass(frozen=True)
 class Size:
-    """Time per body of a call with this number of bodies on one core, by method."""
+    """The time per body that each method needs on one core in a call with `bodies` bodies."""
 
     bodies: int
     seconds: dict[str, float]  # s per body, by method
@@ -33,23 +33,24 @@ class Size:
 
 @dataclass(frozen=True)
 class Memory:
-    """Memory that a process needed for a call, beyond what it had before (bytes)."""
+    """The memory (bytes) that a process needed for one call, beyond what it had before the call."""
 
     method: str
     bodies: int
-    arrays: int  # initial omegas, torques, results
-    peak: int | None  # including the arrays; None where the system does not report it
+    arrays: int  # bytes of the initial omegas, torques and results
+    peak: int | None  # bytes, including the arrays; None where the system does not report it
 
     @property
     def ratio(self) -> float | None:
-        """Return the ratio of the peak to the arrays."""
+        """Return the ratio of the peak memory to the memory of the arrays, or None if unknown."""
         return None if self.peak is None else self.peak / self.arrays
 
 
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
-    """Measure calls with 1, 10, ... up to `most` bodies.
+    """Measure the time per body in calls with 1, 10, ... up to `most` bodies, for each method.
 
-    The closed form is measured without torque, the other methods with torque.
+    `seed` determines the random bodies. The closed form is measured without torque, the other
+    methods with torque.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []
@@ -68,13 +69,13 @@ def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
 
 
 def _prepared(load: EnsembleLoad) -> Callable[[], object]:
-    """Return a function that calls a prepared solver, which uses the closed form only."""
+    """Return a function that solves all bodies of a load with a prepared closed-form solver."""
     solver, out = prepare(load.scene, "closed-form"), np.empty_like(load.omega0)
     return lambda: solver.many(load.omega0, HORIZON, out=out)
 
 
 def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> list[Memory]:
-    """Measure the memory of a call for each method.
+    """Measure the memory of a call with `bodies` bodies for each method, by default our own.
 
     Each method runs in a separate process, because the peak memory of a process never decreases.
     """
@@ -93,7 +94,11 @@ def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> l
 
 
 def needed(method: str, bodies: int) -> None:
-    """Print the bytes of the arrays in and out, and the growth of this process to its peak."""
+    """Print two numbers of bytes for a call of `method` with `bodies` bodies in this process.
+
+    They are the size of the arrays that the call takes and returns, and the growth of the process
+    to its peak.
+    """
     own = next(each for each in own_ensembles() if each.name == method)
     load = draw("memory", 512)[0 if own.torque_free else 1]
     own.prepare(load, SETTINGS[method], 1)()
@@ -110,7 +115,10 @@ def needed(method: str, bodies: int) -> None:
 
 
 def _resident(name: str) -> int:
-    """Return an entry of Linux's status of this process (bytes); 0 on other systems."""
+    """Return the memory (bytes) that Linux reports for this process under `name`, as ``VmHWM``.
+
+    It is 0 on other systems.
+    """
     try:
         with open("/proc/self/status", encoding="ascii") as file:
             for line in file:

@@ -27,8 +27,8 @@ from pyharness.model.trajectory import Array
 TARGETS = (1e-6, 1e-12)
 STEPS = 300  # of RK4, where the rate is in steps per second
 ROUNDS = 9
-# Durations of a call (s). A call shorter than the first gets more bodies. A call shorter than the
-# second also does, as long as its rate has grown by more than half.
+# Durations of a call (s). A call shorter than the first duration gets more bodies. A call shorter
+# than the second one also does, as long as its bodies per second have grown by more than half.
 _CALL, _LONG_CALL = 0.03, 0.5
 SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
 _BATCH = 0.02  # s; duration of the calls in a round
@@ -38,7 +38,10 @@ Say = Callable[[str], None]  # receives the current part of a task
 
 @dataclass(frozen=True)
 class Rate:
-    """The measured rate of one contender on one task."""
+    """The measured speed of one contender with one number of threads on one task.
+
+    The task is to solve the bodies of a load to a target error, or in a prescribed number of steps.
+    """
 
     load: str
     target: float | None  # requested error; None where the steps were prescribed
@@ -56,13 +59,13 @@ class Rate:
 
     @property
     def rate(self) -> float:
-        """Return bodies per second, or body-steps per second if the steps were prescribed."""
+        """Return the speed in bodies per second, or body-steps per second for prescribed steps."""
         return self.bodies_a_second * (1 if self.target is not None else STEPS)
 
 
 @dataclass(frozen=True)
 class Rates:
-    """All rates that a run measured, and the contenders that were refused."""
+    """All speeds that a run of the benchmark measured, and the contenders that were refused."""
 
     seed: str
     bodies: int
@@ -72,10 +75,10 @@ class Rates:
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """Bodies to be solved to a target error, or in `STEPS` steps of RK4 where there is no target.
+    """A task for contenders: to solve the bodies of a load to a target error.
 
-    The error is measured on a sample. The sample consists of the first bodies, which are as random
-    as the others.
+    Without a target error, the bodies are solved in `STEPS` steps of RK4. The error is measured on
+    a sample. The sample consists of the first bodies, which are as random as the others.
     """
 
     load: EnsembleLoad
@@ -85,16 +88,22 @@ class _Task:
 
     @property
     def place(self) -> str:
-        """Return a description of the task."""
+        """Return a description of the task for messages: the load and the target error."""
         return f"{self.load.name}, {f'{self.target:g}' if self.target else f'{STEPS} steps of RK4'}"
 
     def takes(self, each: EnsembleContender) -> bool:
-        """Return whether a contender can do the task."""
+        """Return whether a contender can do the task.
+
+        It must take the torques of the bodies and, without a target error, a number of steps.
+        """
         torque = self.load.torque is not None and each.torque_free
         return not torque and (self.target is not None or each.setting == "steps")
 
     def error(self, omega: Array) -> float:
-        """Return the largest error, each relative to the body's largest omega at start and end."""
+        """Return the largest error in the computed `omega` of the sample; infinite if not finite.
+
+        The error of a body is relative to its largest component of omega at the start and the end.
+        """
         n = min(len(omega), len(self.ends))
         ends, starts = self.ends[:n], self.sample.omega0[:n]
         sizes = np.maximum(np.abs(ends).max(axis=1), np.abs(starts).max(axis=1))
@@ -102,7 +111,10 @@ class _Task:
         return float(np.where(np.isfinite(errors), errors, np.inf).max())
 
     def setting(self, each: EnsembleContender) -> float | None:
-        """Return the coarsest setting that reaches the target error, or None if no setting does."""
+        """Return the coarsest setting with which a contender reaches the target error.
+
+        Return None if no setting does. Without a target error, return the prescribed `STEPS`.
+        """
         if self.target is None:
             return float(STEPS)
         for setting in _ladder(each, self.target):
@@ -121,9 +133,10 @@ def measure_ensembles(
     seed: str,
     progress: Progress = no_progress,
 ) -> Rates:
-    """Measure all contenders on all loads, at all target errors.
+    """Measure the speed of all contenders on all loads, at all target errors.
 
-    On the last load, RK4 is also measured in `STEPS` steps.
+    On the last load, the contenders that run RK4 are also measured in `STEPS` steps. `seed` is only
+    recorded in the result.
     """
     found = Rates(seed, loads[0].n)
     n_tasks, done = len(loads) * len(TARGETS) + 1, 0
@@ -185,9 +198,11 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
 def _enough(
     prepare: EnsembleMaker, load: EnsembleLoad, setting: float, threads: int
 ) -> tuple[EnsembleLoad, Callable[[], Array]]:
-    """Return as many bodies as make a call long enough to be timed, and the call.
+    """Return the first bodies of `load`, and a function that solves them.
 
-    All bodies are returned if they are too few for that.
+    There are so many bodies that a call of the function takes long enough to be timed. If `load`
+    has too few bodies for this, all of them are returned. `prepare` makes the function for a
+    setting and a number of threads.
     """
     n, before = min(load.n, 64), 0.0
     while True:

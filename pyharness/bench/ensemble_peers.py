@@ -20,7 +20,7 @@ _BLOCK = 4096  # bodies whose arrays fit into the cache
 
 
 def ensemble_peers() -> list[EnsembleContender]:
-    """Return all third-party contenders, installed or not."""
+    """Return all third-party contenders of `bench --ensemble`, installed or not."""
     one = EnsembleContender
     blocks, alone = partial(compiled.numba_rk4, True), partial(compiled.numba_rk4, False)
     return [
@@ -36,7 +36,11 @@ def ensemble_peers() -> list[EnsembleContender]:
 
 
 def _heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that runs one heyoka integrator, with state and torque set per batch."""
+    """Return a function that runs one heyoka integrator on all batches of bodies in turn.
+
+    It sets the state and the torque of the integrator for each batch, and returns omega at the
+    horizon, shape (n, 3). `setting` is the tolerance. `threads` has no effect.
+    """
     import heyoka
 
     size = heyoka.recommended_simd_size()
@@ -98,7 +102,7 @@ def _integrator(with_torque: bool, tolerance: float, size: int) -> Any:
 
 
 def _batches(rows: Array, size: int) -> Array:
-    """Return the rows as batches, shape (batches, 3, size).
+    """Return the rows of bodies as batches of `size` bodies, shape (batches, 3, size).
 
     The last batch is padded with copies of the last body.
     """
@@ -108,7 +112,11 @@ def _batches(rows: Array, size: int) -> Array:
 
 
 def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that runs RK4 in NumPy, on an array of a block of bodies per unknown."""
+    """Return a function that runs RK4 in NumPy, with one array of a block of bodies per unknown.
+
+    `setting` is the number of steps. The function returns omega of the bodies of `load` at the
+    horizon, shape (n, 3).
+    """
     a, b, c = coefficients()
     starts, torques = load.omega0.T.copy(), load.acceleration.T.copy()
     found = np.empty_like(load.omega0)
@@ -148,7 +156,11 @@ def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[],
 
 
 def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that runs `solve_ivp` for one body after another, on floats, not arrays."""
+    """Return a function that runs SciPy's `solve_ivp` for one body after another.
+
+    Its right-hand side computes with floats, not with arrays. `setting` is the relative tolerance.
+    `threads` has no effect. The function returns omega at the horizon, shape (n, 3).
+    """
     from scipy.integrate import solve_ivp
 
     refuse_rounding("solve_ivp", setting)

@@ -35,7 +35,10 @@ class Ensembles:
 
 
 def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> Report:
-    """Return the report: a table for each load and target error, then cost per body and memory."""
+    """Return the report: a table for each load and target error, then cost per body and memory.
+
+    `packages` are the packages whose versions are listed. `command` produces the page again.
+    """
     return measured_report(
         "## Ensembles",
         _DRIFT,
@@ -50,9 +53,10 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
-    """Return our best rate on the same task and number of threads, divided by the rate of `row`.
+    """Return our best rate divided by the rate in `row`, or None if we have none to compare.
 
-    A contender that takes all cores is compared with our rate on the most threads.
+    `rows` has the rates of all contenders on the same task. Both rates are for the same number of
+    threads. A contender that takes all cores is compared with our rate on the most threads.
     """
     ours = [each for each in rows if each.method in _STYLES]
     threads = row.threads or max((each.threads for each in ours), default=0)
@@ -152,7 +156,7 @@ def _record(found: Ensembles) -> dict[str, Any]:
 
 
 def size_picture(sizes: Sequence[Size]) -> Picture:
-    """Draw the time per body against the number of bodies."""
+    """Draw the time per body (ns) of each method against the number of bodies in a call."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.5, 4.5), dpi=110, layout="constrained")

@@ -21,9 +21,12 @@ _STARTS = 8
 
 @dataclass(frozen=True)
 class Growth:
-    """The error of the Taylor method at one time (s), and the conditioning there."""
+    """The error of the Taylor method at one time, and the effect there of a rounding of the time.
 
-    time: float
+    The effect is independent of the method, and therefore a yardstick for the error.
+    """
+
+    time: float  # s
     # Both are relative to the largest angular velocity. `error` is the largest difference between
     # the Taylor method and the closed form, over `_STARTS` initial states of the same motion.
     # `conditioning` is the change caused by one rounding of the time.
@@ -35,9 +38,10 @@ class Growth:
 def growth(
     scene: Scene, horizons: Sequence[float] = HORIZONS, tolerance: float = 1e-15
 ) -> list[Growth]:
-    """Measure the error of the Taylor method at several times (s) of a torque-free motion.
+    """Measure the error of the Taylor method at `horizons`, times (s) of a torque-free motion.
 
-    Raise InputError if the scene has no closed form.
+    The error is the difference from the closed form. `tolerance` is the tolerance of the Taylor
+    method. Raise InputError if the scene has no closed form.
     """
     if closed_form(scene) is None:
         raise InputError("growth: the scene has no closed form to compare with")

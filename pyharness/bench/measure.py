@@ -42,7 +42,7 @@ _BATCH = 1e-3  # s; calls faster than this are batched
 
 @dataclass(frozen=True)
 class Workload:
-    """A scene and the time up to which it is integrated."""
+    """A task of the benchmark: a scene, and the time up to which it is integrated."""
 
     label: str  # `5`: Case 5 to T = 3; `3L`: Case 3 to T = 100; the number of a random scene
     scene: Scene
@@ -56,12 +56,16 @@ class Workload:
 
     @property
     def place(self) -> str:
-        """Return the name of the workload in a sentence."""
+        """Return the name of the workload in messages, as ``case 5`` or ``scene 12``."""
         return f"{'scene' if self.kinds else 'case'} {self.label}"
 
     @property
     def group(self) -> str:
-        """Return the name of the group in which the ratios of the workload are averaged."""
+        """Return the name of the group of workloads over which ratios of times are averaged.
+
+        All workloads of a group have the same horizon. At the default horizon, and always with
+        attitude, scenes with a torque and scenes without one are in separate groups.
+        """
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"
         return f"{'torque-free' if self.scene.torque.is_zero else 'torque'}, T = {self.horizon:g}"
@@ -69,7 +73,7 @@ class Workload:
 
 @dataclass(frozen=True)
 class Row:
-    """The result of a contender with one setting."""
+    """The time and error of one contender with one setting on one workload."""
 
     workload: Workload
     method: str  # name of the contender
@@ -85,7 +89,10 @@ class Row:
 
 @dataclass(frozen=True)
 class Refusal:
-    """A setting that was not run, or a contender (setting None) that was not, and the reason."""
+    """The reason why a contender was not run on a workload, with one setting or at all.
+
+    `setting` is None if the contender was not run at all, or if it has no setting.
+    """
 
     workload: Workload
     method: str
@@ -105,17 +112,17 @@ class Finding:
 
     @property
     def attitude(self) -> bool:
-        """Return whether the attitude was requested."""
+        """Return whether the attitude was requested in addition to omega."""
         return any(load.scene.attitude is not None for load in self.workloads)
 
 
 def workloads(
     case: int | None = None, horizon: float | None = None, attitude: bool = False
 ) -> list[Workload]:
-    """Return the workloads: by default Cases 2 to 7, with Cases 3 and 4 also for a long time.
+    """Return the workloads, by default Cases 2 to 7 to T = 3 s and Cases 3 and 4 to T = 100 s.
 
-    With `attitude` they are all cases, starting from the axes of space, and all but Case 6 for a
-    long time. `case` and `horizon` (s) select other workloads.
+    With `attitude` they are Cases 1 to 7, whose attitude starts from the axes of space, and all but
+    Case 6 also to T = 100 s. `case` selects a single case, and `horizon` (s) a single time T.
     """
     usual, long = (_TURNING_CASES, _LONG_TURNING_CASES) if attitude else (_CASES, _LONG_CASES)
     cases = usual if case is None else (case,)
@@ -135,7 +142,7 @@ def measure(
     contenders: Sequence[SceneContender],
     progress: Progress = no_progress,
 ) -> Finding:
-    """Run the benchmark."""
+    """Run every contender on every workload in `loads`, and return the times and the errors."""
     found = Finding(list(loads), [], [], {}, {})
     makers: dict[tuple[int | str, str], Maker] = {}
     for number, load in enumerate(loads, 1):
@@ -177,10 +184,11 @@ def measure(
 
 
 def error_of(end: End, truth: Reference) -> float | None:
-    """Return the relative error of omega, or the error of the attitude (rad) if that is larger.
+    """Return the error of a run's result `end` against the reference solution `truth`.
 
-    If `truth` has an attitude, both errors count. Return None if the result is not finite, or if
-    the attitude is missing.
+    It is the relative error of omega. If `truth` has an attitude, it is the larger one of this and
+    the error of the attitude (rad). Return None if the result is not finite, or if its attitude is
+    missing.
     """
     error = relative_error(end.omega, truth)
     if error is None or truth.attitude is None:
@@ -195,7 +203,11 @@ def error_of(end: End, truth: Reference) -> float | None:
 
 
 def relative_error(omega: Array, truth: Reference) -> float | None:
-    """Return the largest error of omega, relative to its largest component; None if not finite."""
+    """Return the largest error of a computed omega, relative to the largest component of `truth`.
+
+    `omega` has the shape (3,), in rad/s. `truth` is the reference solution at the same time. Return
+    None if the error is not finite, or if the reference does not reach the time.
+    """
     if len(truth.omega) == 0:
         return None
     # Near the true solution this subtraction is exact. The digits of the reference beyond binary64
@@ -209,9 +221,11 @@ def relative_error(omega: Array, truth: Reference) -> float | None:
 
 
 def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[float]:
-    """Yield settings from coarse to fine; numbers of steps grow by factors of 3/2 and 4/3.
+    """Yield the settings of a contender for one scene from coarse to fine.
 
-    For methods of order 2 or less, numbers of steps grow by factors of 2.
+    They are its tolerances or, for a fixed step, numbers of steps up to time `horizon` (s). Numbers
+    of steps grow by factors of 3/2 and 4/3. For methods of order 2 or less they grow by factors
+    of 2.
     """
     if contender.settings:
         yield from contender.settings
@@ -231,7 +245,12 @@ def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[
 def _first_calls(
     load: Workload, contender: SceneContender, make: Maker, truth: Reference, refused: list[Refusal]
 ) -> tuple[list[tuple[Ready, Row]], float]:
-    """Return the calls to be timed, and the time (s) that preparing them took beyond the calls."""
+    """Prepare the calls of one contender for one workload, and run each of them for the first time.
+
+    Return the calls that are to be timed, each with its result, and the time (s) that preparing
+    them took beyond the calls. `make` makes a call from a horizon (s) and a setting, and `truth` is
+    the reference solution. Settings that cannot be run are appended to `refused`.
+    """
     entries: list[tuple[Ready, Row]] = []
     errors: list[float | None] = []
     spent = preparing = last = before = 0.0
@@ -282,6 +301,9 @@ def _first_calls(
 
 
 def _at_rounding(errors: Sequence[float | None]) -> bool:
-    """Return whether smaller steps no longer help: the last three errors brought no improvement."""
+    """Return whether rounding limits the errors of a contender, listed from coarse to fine steps.
+
+    This is so if the last three errors bring no improvement and the smallest error is below 1e-10.
+    """
     known = [error for error in errors if error is not None]
     return len(known) > 3 and min(known[-3:]) >= min(known[:-3]) and min(known) < 1e-10

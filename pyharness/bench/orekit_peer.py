@@ -17,7 +17,11 @@ WARMING = 2.0
 
 
 def orekit(scene: Scene) -> Maker:
-    """Return a `Maker` of calls; each sets up the motion anew, with its elliptic integrals."""
+    """Return a `Maker` of calls of Orekit's `TorqueFree` for a scene.
+
+    Each call sets up the motion anew, with its elliptic integrals. The setting has no effect. Raise
+    InputError if the scene has a torque or no moments, or if Java or Orekit fails.
+    """
     if not scene.torque.is_zero or scene.moments is None:
         raise InputError("TorqueFree does not take this scene; allowed: moments, and no torque")
     jpype = _machine()
@@ -65,7 +69,10 @@ def _end(found: Any) -> End:
 
 
 def _machine() -> Any:
-    """Return JPype with a running Java machine, which can be started once in a process."""
+    """Return the module JPype after starting the Java machine of this process, if necessary.
+
+    A process can start it only once. Raise InputError if Java or Orekit fails.
+    """
     try:
         # JPype's type hints declare only some of its names.
         jpype, package = map(import_module, ("jpype", "orekit_jpype"))

@@ -22,8 +22,10 @@ def measured_report(
     """Return the report of a measurement, made of titled tables and notes.
 
     `title` is the heading of the page, with its Markdown marks. `worth` says how far the numbers
-    can be compared. `packages` are the packages whose versions are listed. `command` produces the
-    page again.
+    can be compared. `parts` are the titles and tables, and `notes` are lines of text below them.
+    `record` makes the JSON record, `data` is the table with full precision, and `pictures` makes
+    the pictures by name. `packages` are the packages whose versions are listed. `command` produces
+    the page again.
     """
     here, built = machine(packages), build()
     versions = [
@@ -57,10 +59,11 @@ def measured_report(
 
 
 def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) -> list[str]:
-    """Return a line for each reason why contenders have no result.
+    """Return a line of text for each reason why contenders have no result.
 
-    `reasons` are tuples (contender, reason, place). At most the first `most` places of a contender
-    are named. Contenders with the same reason and the same places share a line.
+    `reasons` are tuples (contender, reason, place), where the place is a task, with or without a
+    setting. At most the first `most` places of a contender are named. Contenders with the same
+    reason and the same places share a line.
     """
     places: dict[tuple[str, str], list[str]] = {}
     for who, why, where in reasons:

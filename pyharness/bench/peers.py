@@ -19,7 +19,7 @@ _SOLVE_IVP = ("DOP853", "RK45", "LSODA", "Radau")
 
 
 def peers() -> list[SceneContender]:
-    """Return all third-party contenders, installed or not."""
+    """Return all third-party contenders of `bench` for single scenes, installed or not."""
     # 2**-52 is heyoka's default.
     finest = (*TOLERANCES, 2.0**-52)
 
@@ -53,7 +53,7 @@ def peers() -> list[SceneContender]:
 
 
 def _heyoka(scene: Scene) -> Maker:
-    """Return a `Maker` of heyoka runs, which keeps one integrator for each tolerance.
+    """Return a `Maker` of heyoka runs on a scene, which keeps one integrator for each tolerance.
 
     A call resets the time and the state of its integrator.
     """
@@ -98,19 +98,25 @@ def _heyoka_equations(scene: Scene) -> list[tuple[Any, Any]]:
 
 
 def _right_hand_side(scene: Scene) -> RightHandSide:
-    """Return the right-hand side of omega, or of omega and attitude, in floats."""
+    """Return a scene's right-hand side, for omega or for omega and attitude, on Python floats."""
     slopes = scene.right_hand_side()
     return slopes if scene.attitude is None else turning(slopes)
 
 
 def _absolute(scene: Scene) -> Any:
-    """Return the magnitudes of the unknowns, the ratio of absolute to relative tolerance."""
+    """Return the magnitudes of a scene's unknowns, a number for all or an array of seven.
+
+    The absolute tolerance is the relative tolerance times the magnitude.
+    """
     largest = max(map(abs, scene.omega)) or 1.0
     return largest if scene.attitude is None else np.array([largest] * 3 + [1.0] * 4)
 
 
 def _solve_ivp(name: str, scene: Scene) -> Maker:
-    """Return a `Maker` of `solve_ivp` runs: no dense output, floats in the right-hand side."""
+    """Return a `Maker` of runs on a scene by SciPy's `solve_ivp` with its method `name`.
+
+    The runs have no dense output, and their right-hand side computes with Python floats.
+    """
     from scipy.integrate import solve_ivp
 
     slope, start, size = _right_hand_side(scene), state_of(scene), _absolute(scene)

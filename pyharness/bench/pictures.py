@@ -1,4 +1,4 @@
-"""The figures of `bench`: error against time and against right-hand sides, and error growth."""
+"""The pictures of `bench`: error against run time and right-hand sides, and growth of errors."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -28,7 +28,10 @@ _SLOPES = (2, 4, 8)
 
 
 def bench_picture(finding: Finding, data: Table) -> Picture:
-    """Draw a row of plots for each workload; `data` is the table that goes with the figure."""
+    """Draw the error of each contender against time and right-hand sides, for each workload.
+
+    Each workload has a row of two plots. `data` is the table that goes with the figure.
+    """
     from matplotlib.figure import Figure
 
     count = len(finding.workloads)
@@ -105,9 +108,9 @@ def _frame(axes: "Axes", load: Workload, label: str) -> None:
 
 
 def draw_slopes(axes: "Axes") -> None:
-    """Draw reference slopes: the error of methods of some orders against right-hand sides.
+    """Draw reference slopes: the error of methods of order 2, 4 and 8 against right-hand sides.
 
-    They form a fan in the upper right corner, where no method has its results.
+    The slopes form a fan in the upper right corner of the plot, where no method has its results.
     """
     low, high = axes.get_xlim()
     begin = high * (low / high) ** 0.3
@@ -125,7 +128,10 @@ def draw_slopes(axes: "Axes") -> None:
 
 
 def growth_picture(found: "Mapping[int, Sequence[Growth]]") -> Picture:
-    """Draw the error against time, beside the change caused by one rounding of the time."""
+    """Draw the Taylor method's error and the effect of one rounding of the time, against time.
+
+    `found` has the measured errors by case. Each case has a plot.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.5 * len(found), 4.0), dpi=110, layout="constrained")

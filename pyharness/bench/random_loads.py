@@ -1,7 +1,7 @@
 """Random scenes for `bench`, by kind; no method was tuned on them.
 
-A seed and a number determine a scene. The second reference, which computes its motion, decides
-whether a draw is accepted.
+A seed and a number determine a scene. The second reference, a Taylor series in integer arithmetic,
+computes its motion. The motion decides whether the scene is accepted or drawn again.
 """
 
 import math
@@ -27,11 +27,12 @@ def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     """Return the random workload that a seed and a number (from 1) determine.
 
     Successive numbers take the kinds of torque in turn. Moments are in kg m2, omega in rad/s,
-    torque in N m, the horizon in s. `truth` comes from the second reference, and `kinds` are
-    members of `KINDS`. A scene is drawn again if its error amplification is `MOST_GROWTH` or more.
-    It is also drawn again if the body turns less than once or more than 300 times. With `attitude`
-    the scene is the same, starting from the axes of space. It then has no `truth`, because the
-    second reference does not propagate the attitude.
+    torque in N m, the horizon in s. The solution `truth` of the workload comes from the second
+    reference, and its `kinds` are members of `KINDS`. A scene is drawn again if its error
+    amplification is `MOST_GROWTH` or more. It is also drawn again if the body turns less than once
+    or more than 300 times. If `attitude`, the scene is the same, with an attitude that starts from
+    the axes of space. The workload then has no `truth`, because the second reference does not
+    propagate the attitude.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1

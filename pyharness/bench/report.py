@@ -1,4 +1,4 @@
-"""The reports of `bench`: run time against error, savings of the plan, growth of errors."""
+"""The reports of `bench`: run time against error, time saved by the plan, growth of errors."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -31,8 +31,9 @@ _DRIFT = (
 
 
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
-    """Return the report of a benchmark: a table for each workload, then the mean ratios.
+    """Return the report of a benchmark: a table for each workload, then the mean ratios of times.
 
+    A ratio is the baseline contender's time divided by another contender's, at the same error.
     For random scenes the report shows the distribution of the ratios instead. The page also
     describes the machine. `packages` are the packages whose versions are listed. `command` produces
     the page again.
@@ -66,7 +67,10 @@ def _spread_data(finding: Finding) -> Table:
 
 
 def _spread_parts(finding: Finding) -> list[tuple[str, Table]]:
-    """Return a title and a table for every contender at every target error."""
+    """Return a title and a table for every contender at every target error, for random scenes.
+
+    A table has the distribution of the ratios of times for each kind of scene.
+    """
     heads = ("mean", "smallest", "25 %", "median", "75 %")
     columns = [
         Column("kind", left=True),
@@ -96,7 +100,7 @@ def _data(finding: Finding) -> Table:
 
 
 def savings_report(found: Sequence[Saving]) -> Report:
-    """Return the report of the time saved by each part of the work that the plan skips."""
+    """Return the report of the time saved where the plan of a computation leaves out a part."""
     time = digits(".3g", 1e6)
     columns = (
         *words("skipped where"), Column("us with it", time, unit="s", full=time),
@@ -109,7 +113,10 @@ def savings_report(found: Sequence[Saving]) -> Report:
 
 
 def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
-    """Return the report of the errors of the Taylor method against time, by case."""
+    """Return the report of the errors of the Taylor method against time.
+
+    `found` has the measured errors by number of the case.
+    """
     time, error = digits(".3g"), digits(".2g")
     columns = (
         *words("case"), Column("time", time, unit="s", full=time),
@@ -166,7 +173,7 @@ def _asked(each: Row | Refusal) -> dict[str, Any]:
 
 
 def microseconds(seconds: float | None) -> str:
-    """Return a time in microseconds, as in 0.63, 12.3 or 1234; "-" if None."""
+    """Return a time `seconds` (s) as text in microseconds, as 0.63, 12.3 or 1234; "-" if None."""
     if seconds is None:
         return "-"
     value = seconds * 1e6
@@ -174,7 +181,7 @@ def microseconds(seconds: float | None) -> str:
 
 
 def ratio(value: float | None) -> str:
-    """Return a ratio as in 0.0123, 12.3 or 1234; "-" if None."""
+    """Return a ratio as text, as 0.0123, 12.3 or 1234; "-" if None."""
     if value is None:
         return "-"
     if value >= 99.95:
@@ -184,7 +191,11 @@ def ratio(value: float | None) -> str:
 
 
 def _parts(finding: Finding) -> list[tuple[str, Table]]:
-    """Return a title and a table for every workload, and for every group of mean ratios."""
+    """Return a title and a table for every workload, and for every group of workloads.
+
+    The table of a workload has times to reach the target errors. The table of a group has the
+    geometric means of the ratios of times.
+    """
     targets = list(map(_power, TARGETS))
     columns = [Column("us per solve to", left=True)]
     for name in targets:
@@ -241,7 +252,10 @@ def _notes(finding: Finding) -> list[str]:
 
 
 def not_measured(finding: Finding) -> list[str]:
-    """Return a line for each reason why a contender has no result, with the first places."""
+    """Return a line of text for each reason why contenders have no result.
+
+    A line also names the first workloads and settings without a result for this reason.
+    """
     # Expected times and the steps at which runs ended differ from case to case. They are cut off,
     # so that equal reasons share a line.
     came: list[tuple[Row | Refusal, str]] = [

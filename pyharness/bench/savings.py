@@ -1,4 +1,7 @@
-"""Time saved by each part that the plan skips, measured with and without the part in one run."""
+"""Time saved by leaving out the parts of a computation that a plan finds unnecessary.
+
+A computation is timed with and without such a part in the same run.
+"""
 
 import subprocess
 import sys
@@ -21,12 +24,12 @@ _SECONDS = 2e-3  # duration of a batch
 
 @dataclass(frozen=True)
 class Saving:
-    """The times of one computation with and without a part that the plan skips."""
+    """The times of one computation with and without a part that a plan can leave out."""
 
-    part: str  # the part that is skipped, as the plan names it
+    part: str  # the part that is left out, as the plan names it
     where: str  # the scene or program on which it is measured
     with_it: float  # s with the part computed, median of interleaved batches
-    without: float
+    without: float  # s without the part, likewise
 
     @property
     def ratio(self) -> float:
@@ -35,7 +38,12 @@ class Saving:
 
 
 def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
-    """Measure the saving of every skip; `t_end` in s, `tolerance` relative."""
+    """Measure the time saved by each part of a computation that a plan can leave out.
+
+    The parts are the integration, the torque as a function of time, dense output, the translational
+    velocity, and imports of SciPy and of the reference. Solutions are computed to `t_end` (s) with
+    the relative tolerance `tolerance`.
+    """
     constant = case_scene(5)
     times = [t_end * k / 100.0 for k in range(1, 101)]
     rows = prepare(constant, "taylor", tolerance)
@@ -81,5 +89,8 @@ def _python(code: str) -> None:
 def measured_saving(
     part: str, where: str, with_it: Callable[[], object], without: Callable[[], object]
 ) -> Saving:
-    """Return the times of a call with a part and without it."""
+    """Return the times of two calls, `with_it` and `without`, as the saving of leaving out `part`.
+
+    `where` names the scene or program on which they are measured.
+    """
     return Saving(part, where, *seconds([with_it, without], _SECONDS, _BATCHES))

@@ -1,4 +1,4 @@
-"""Scores of a benchmark: time to reach an error, ratios of times, geometric means."""
+"""Scores of a benchmark: time to reach an error, ratios to a baseline's time, geometric means."""
 
 import math
 from collections.abc import Sequence
@@ -14,21 +14,27 @@ YARDSTICKS = ("heyoka", "solve_ivp-dop853")
 
 @dataclass(frozen=True)
 class Score:
-    """The score of a contender on one workload."""
+    """The times in which one contender reaches the target errors on one workload."""
 
     method: str
-    seconds: tuple[float | None, ...]  # of the fastest setting that reaches each of `TARGETS`
+    # s, for each error in `TARGETS` the time of the fastest setting that reaches it; None if no
+    # setting does
+    seconds: tuple[float | None, ...]
     best: float | None  # the smallest error of any setting
     ratios: tuple[float | None, ...]  # time of the baseline over the contender's; above 1 is faster
 
 
 @dataclass(frozen=True)
 class Spread:
-    """The distribution of a contender's ratios over the random scenes of one kind, at one error."""
+    """The distribution of a contender's ratios over the random scenes of one kind.
+
+    A ratio is the baseline contender's time to reach the target error, divided by the time of this
+    contender.
+    """
 
     method: str
     kind: str
-    target: float  # error of omega at T, relative to the largest component there
+    target: float  # error to be reached, measured like `Row.error`
     scenes: int  # number of scenes of this kind
     reached: int  # number of scenes in which it and the baseline reach the error
     mean: float | None  # geometric mean over these scenes
@@ -37,13 +43,19 @@ class Spread:
 
 
 def yardstick(finding: Finding) -> str | None:
-    """Return the name of the baseline contender, or None if nothing was measured."""
+    """Return the name of the contender whose times are the baseline of all ratios.
+
+    Return None if nothing was measured.
+    """
     names = list(dict.fromkeys(row.method for row in finding.rows))
     return next((name for name in (*YARDSTICKS, *names) if name in names), None)
 
 
 def scores(finding: Finding, load: Workload) -> list[Score]:
-    """Return the scores on a workload, the baseline first, the others as measured."""
+    """Return the scores of all contenders on a workload.
+
+    The baseline contender comes first, the others in the order of measurement.
+    """
     rows: dict[str, list[Row]] = {}
     for row in finding.rows:
         if row.workload == load:
@@ -61,7 +73,10 @@ def scores(finding: Finding, load: Workload) -> list[Score]:
 
 
 def groups(finding: Finding) -> dict[str, list[Workload]]:
-    """Return the workloads whose ratios are averaged together, by the name of the group."""
+    """Return the workloads whose ratios are averaged together, by the name of their group.
+
+    Groups are ordered by horizon and name.
+    """
     found: dict[str, list[Workload]] = {}
     for load in finding.workloads:
         found.setdefault(load.group, []).append(load)
@@ -69,7 +84,11 @@ def groups(finding: Finding) -> dict[str, list[Workload]]:
 
 
 def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float | None]]:
-    """Return geometric means over `loads`; None where an error was not reached in all of them."""
+    """Return each contender's geometric means of its ratios over the workloads `loads`.
+
+    A contender has a mean for each target error. It is None if the contender or the baseline does
+    not reach the error on all workloads.
+    """
     tables = [{each.method: each.ratios for each in scores(finding, load)} for load in loads]
     names = dict.fromkeys(name for table in tables for name in table)
     nowhere = (None,) * len(TARGETS)
@@ -82,7 +101,11 @@ def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float |
 
 
 def spreads(finding: Finding, kinds: Sequence[str]) -> list[Spread]:
-    """Return all spreads without the baseline, ordered by contender, error and kind."""
+    """Return the spread of each contender's ratios at each target error, for each kind of scene.
+
+    They are ordered by contender, error and kind. The baseline contender has no spread, because its
+    ratios are all 1.
+    """
     tables = {
         load.label: {each.method: each.ratios for each in scores(finding, load)}
         for load in finding.workloads

@@ -20,13 +20,16 @@ from pyharness.original.cells import all_cells, cell_name, listing_name
 from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.scenes.random_scenes import draw
 
-# Right-hand sides per step: at the start and at each point of collocation, or at four stages. The
+# Right-hand sides per step: at the start and at each collocation point, or at four stages. The
 # step in which a run overflows is counted as well.
 _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
 def cells(chosen: Selection) -> Iterator[Attempt]:
-    """Compare Fortran with the twin in every program, case, subset of defects and reading."""
+    """Yield deferred checks that Fortran and the Python twin agree bit for bit in every cell.
+
+    A cell is a program with a case, a subset of its defects, and a choice of its readings.
+    """
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
     for listing, case in all_cells():
@@ -38,12 +41,15 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
-    """Return the name of the check of a cell."""
+    """Return the name of a suite's check of one cell, a listing of a program with a case."""
     return Name(suite, listing.program, f"case-{case}", listing_name(listing))
 
 
 def random_programs(chosen: Selection) -> Iterator[Attempt]:
-    """Compare Fortran with the twin in scenes, listings and steps drawn from the seed."""
+    """Yield deferred checks that Fortran and the twin agree in scenes drawn from the seed.
+
+    The listings and parameters of the programs are also drawn.
+    """
     for number in range(chosen.draws):
         yield Attempt(chosen.drawn(number, "program"), partial(_of_draw, chosen.seed, number))
 
@@ -58,9 +64,11 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 
 
 def _agreement(name: Name, listing: Listing, scene: Scene, is_listed: bool, *options: Any) -> Check:
-    """Return the check that both implementations of a program agree to the last bit.
+    """Return the check that Fortran and the twin agree in a scene to the last bit.
 
-    A listed divergence that no longer occurs fails the check, as an unexpected divergence does.
+    If `is_listed`, a difference in this cell is known and listed in `divergences`. The check then
+    fails if the difference no longer occurs. `options` are the constant of the stop test (1/s) and
+    whether the test may stop the run.
     """
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))

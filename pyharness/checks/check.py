@@ -44,27 +44,30 @@ class Name:
 
     @property
     def id(self) -> str:
-        """Return the non-empty parts joined by slashes; ids are unique within a run."""
+        """Return the non-empty parts of the name joined by slashes; ids are unique within a run."""
         who = self.subject, self.circumstance
         who = who[::-1] if self.suite in _CIRCUMSTANCE_FIRST else who
         return "/".join(filter(None, (self.suite, *who, self.setting, self.quantity)))
 
     @property
     def place(self) -> str:
-        """Return the parts after the subject."""
+        """Return the circumstance, setting and quantity, joined by slashes."""
         return "/".join(filter(None, (self.circumstance, self.setting, self.quantity)))
 
     @property
     def replay(self) -> str:
-        """Return the command that makes this check alone."""
+        """Return the shell command that repeats this check alone."""
         return f"python -m pyharness {self.command} --only {self.id}{self.options}"
 
     def of(self, quantity: str) -> "Name":
-        """Return the name of the check of another quantity."""
+        """Return the name of the check of another `quantity`, with all other parts as here."""
         return replace(self, quantity=quantity)
 
     def bounded(self, value: float, limit: float, note: str = "") -> "Check":
-        """Return the check that `value` does not exceed `limit`; NaN fails."""
+        """Return the check that `value` does not exceed `limit`; a value of NaN fails.
+
+        `note` describes the fault or the observation in a few words.
+        """
         # Values of NumPy's types occur here and can't be written as JSON.
         found, allowed = float(value), float(limit)
         return Check(self, not math.isnan(found) and found <= allowed, found, allowed, note)
@@ -72,17 +75,20 @@ class Name:
     def judged(
         self, passed: bool, note: str, value: float | None = None, limit: float | None = None
     ) -> "Check":
-        """Return a check whose result is decided already; `note` gives the reason."""
+        """Return a check whose result `passed` the caller has decided; `note` gives the reason.
+
+        `value` and `limit` are only shown in reports.
+        """
         return Check(self, bool(passed), value, limit, note)
 
     def described(self, value: float | None, note: str = "") -> "Check":
-        """Return a check without a limit: it describes a value and can't fail."""
+        """Return a check without a limit: it only reports `value`, and can't fail."""
         return Check(self, True, None if value is None else float(value), None, note)
 
 
 @dataclass(frozen=True)
 class Check:
-    """The result of one comparison."""
+    """The result of one check: a value, its limit, and whether the check passed."""
 
     name: Name
     passed: bool
@@ -93,21 +99,21 @@ class Check:
 
     @property
     def id(self) -> str:
-        """Return the id of the check's name."""
+        """Return the id of the check, as in ``cells/two-term/case-3/original``."""
         return self.name.id
 
     @property
     def suite(self) -> str:
-        """Return the suite of the check."""
+        """Return the suite that made the check: a kind of `verify` or a trial of `stress`."""
         return self.name.suite
 
     @property
     def replay(self) -> str:
-        """Return the command that makes this check alone."""
+        """Return the shell command that repeats this check alone."""
         return self.again or self.name.replay
 
     def record(self) -> dict[str, Any]:
-        """Return the check as a record for JSON."""
+        """Return the check as a dictionary for JSON, with the fields that a subclass adds."""
         head = {"id": self.id, "passed": self.passed, "value": self.value, "limit": self.limit}
         more = {each.name: getattr(self, each.name) for each in fields(self)[_OF_ANY:]}
         return {**head, "replay": self.replay, "note": self.note, **more}
@@ -118,7 +124,10 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a scene drawn at random, with the quantities that determine its limit."""
+    """A check in a scene drawn at random, with the quantities that determine its limit.
+
+    They are the entry point, the tolerance and the error amplification.
+    """
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
     tolerance: float = math.nan  # requested tolerance
@@ -127,9 +136,10 @@ class Sample(Check):
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """The computation of the checks whose ids begin with `name`, done on request by `make`.
+    """A deferred computation of the checks whose ids begin with the id of `name`.
 
-    `make` takes the name, and returns checks or further attempts.
+    If such a check is requested, `make` is called with `name`. It returns checks or further
+    attempts.
     """
 
     name: Name
@@ -140,7 +150,11 @@ Attempts = Iterable[Check | Attempt]
 
 
 def made(attempts: Attempts, only: Sequence[str]) -> Iterator[Check]:
-    """Compute the checks that `only` requests; yield finished checks unchanged."""
+    """Yield the checks of `attempts` that `only`, the leading parts of ids, requests.
+
+    An attempt is computed only if one of its checks is requested. Checks in `attempts` that are
+    finished already are yielded unchanged.
+    """
     for each in attempts:
         if isinstance(each, Check):
             yield each
@@ -156,10 +170,12 @@ def run_suites(
     command: str,
     of_the_user: Sequence[str] = (),
 ) -> Iterator[Check]:
-    """Make the requested checks, suite after suite.
+    """Yield the requested checks of all suites, which are computed one after another.
 
-    If an InputError ends a suite, that is a failed check. In the suites `of_the_user` the
-    InputError is raised again, because it is a mistake in the user's input.
+    `suites` has, by name, functions that return attempts. `only` are the leading parts of the
+    requested ids, and `command` is the verb that makes the checks. An InputError that ends a suite
+    becomes a failed check. In the suites `of_the_user` the InputError is raised again, because it
+    is a mistake in the user's input.
     """
     for suite, attempts in suites.items():
         if not may_hold(suite, only):
@@ -175,12 +191,15 @@ def run_suites(
 
 
 def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
-    """Return the names of the suites that may contain a requested check, in order."""
+    """Return, in order, the names of the suites that may contain a check requested by `only`."""
     return [suite for suite in suites if may_hold(suite, only)]
 
 
 def severity(check: Check) -> tuple[bool, float]:
-    """Return a sort key for checks: failed ones last, then by the ratio of value to limit."""
+    """Return a sort key for checks: failed ones last, then by the ratio of value to limit.
+
+    The ratio counts as 0 for a check without a value or a limit, and as infinite for NaN.
+    """
     if check.value is None or check.limit is None or check.value == check.limit == 0.0:
         return not check.passed, 0.0
     ratio = abs(check.value) / check.limit if check.limit else math.inf
@@ -189,14 +208,17 @@ def severity(check: Check) -> tuple[bool, float]:
 
 
 def selected(id: str, only: Sequence[str]) -> bool:
-    """Return whether a check is requested; an empty `only` requests all checks.
+    """Return whether `only` requests the check with this id; an empty `only` requests all checks.
 
-    Names match by whole leading parts: ``cells/two-term`` selects ``cells/two-term/case-3``, but
-    not ``cells/two-terms``.
+    `only` has ids or leading parts of ids, which match by whole parts. ``cells/two-term`` selects
+    ``cells/two-term/case-3``, but not ``cells/two-terms``.
     """
     return not only or any(id == each or id.startswith(each + "/") for each in only)
 
 
 def may_hold(id: str, only: Sequence[str]) -> bool:
-    """Return whether checks below or above `id` are requested; only these are computed."""
+    """Return whether `only` may request a check whose id is `id` or begins with it.
+
+    Attempts and suites are computed only if this is true of their names.
+    """
     return selected(id, only) or any(each.startswith(id + "/") for each in only)

@@ -1,8 +1,8 @@
-"""Checks of the port against the decks, which are compiled from the author's own cards.
+"""Checks of the Fortran port against the decks, which are compiled from the author's own cards.
 
-The decks are a third, independent path from the cards to the numbers. TAPE5 is compared bit for bit
-and the page as text, in every case. An overflow ends a run of the port. The deck continues after
-it, and its numbers must not be finite.
+The decks are a third, independent path from the cards to the numbers, besides the Fortran port and
+the Python twins. TAPE5 is compared bit for bit and the page as text, in every case. An overflow
+ends a run of the port. The deck continues after an overflow, and its numbers must not be finite.
 """
 
 from collections.abc import Iterator
@@ -28,9 +28,9 @@ _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/
 
 
 def listings(program: str) -> list[Listing]:
-    """Return the listings to check: original, corrected, and those with one difference from either.
+    """Return the listings of a program to check: original, corrected, and with one change of these.
 
-    They are each defect alone kept, each defect alone corrected, and each reading in both.
+    The changes are each defect alone kept, each defect alone corrected, and each reading in both.
     """
     names = frozenset(switches(program))
     found = [original(program), corrected(program)]
@@ -42,9 +42,9 @@ def listings(program: str) -> list[Listing]:
 
 
 def decks(chosen: Selection) -> Iterator[Check]:
-    """Compare every deck with the port; yield nothing if there is no compiler.
+    """Yield checks that every deck gives the same TAPE5 and page as the Fortran port.
 
-    `verify` then reports that the decks were not run.
+    Yield nothing if there is no compiler. `verify` then reports that the decks were not run.
     """
     asked = [
         (of_cell("decks", listing, case), listing, case)
@@ -86,7 +86,11 @@ def _held(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
 
 
 def _after(deck: Run, steps: int, overflowed: bool) -> list[str]:
-    """Return the faults of the deck's records after the port's last row."""
+    """Return the faults of the deck's records after the last row of the port, number `steps`.
+
+    If the port overflowed, there must be such records, without finite omegas. Otherwise there must
+    be no further records.
+    """
     rest = deck.tape5[steps:]
     if not overflowed:
         return [f"{len(rest)} records more"] if len(rest) else []

@@ -1,7 +1,7 @@
 """Propagation of small perturbations by a step of each program, measured by running it.
 
-The results are compared with `pyharness.theory.amplification`, which uses the schemes but not the
-programs.
+The measurements are compared with `pyharness.theory.amplification`, which derives the same
+quantities from the schemes, without the programs.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,15 +30,18 @@ _LONGEST = 40.0
 # Largest distance of the neighbours from which a derivative is computed, as a fraction of omega.
 _REACH = 2.0**-2
 _GROWTH_STEPS = 64
-# Sums of the absolute weights of the points, as bounds for any position of the points. They are
-# largest where points far beyond the step are extrapolated to its beginning, with the weights 2, -1
-# or 4, -6, 4, -1.
+# Sums of the absolute weights of the collocation points, as bounds for any position of the points.
+# They are largest where rates at points far beyond the step are extrapolated to its beginning, with
+# the weights 2, -1 or 4, -6, 4, -1.
 _WEIGHTS = {"two-term": 3.0, "four-term": 15.0}
 
 
 @dataclass(frozen=True)
 class Probe:
-    """A measured and a derived array, with a bound on their difference by rounding."""
+    """One quantity, measured on a program and derived, with a bound on the difference.
+
+    The difference may be due to rounding alone. The quantity is a vector or a matrix.
+    """
 
     found: Array
     derived: Array
@@ -51,9 +54,10 @@ class Probe:
 
 
 def held_steady(coefficients: Triple, omega: Triple, step: float) -> Scene:
-    """Return the scene in which a constant torque holds a body at a steady omega.
+    """Return a scene of one `step` (s) in which a constant torque keeps `omega` (rad/s) steady.
 
-    If all numbers have few binary digits, the balance is exact and no rounding disturbs it.
+    `coefficients` are A, B and C of Euler's equations. If all numbers have few binary digits, the
+    balance is exact and no rounding disturbs it.
     """
     a, b, c = coefficients
     x, y, z = omega
@@ -64,22 +68,23 @@ def held_steady(coefficients: Triple, omega: Triple, step: float) -> Scene:
 
 
 def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
-    """Return the exact Jacobian of equations 13-15, times the step size."""
+    """Return the exact Jacobian of equations 13-15 at `omega`, times the scene's step size."""
     a, b, c = (Fraction(each) * Fraction(scene.step_size) for each in scene.euler_coefficients)
     x, y, z = map(Fraction, omega)
     return [[Fraction(0), a * z, a * y], [b * z, Fraction(0), b * x], [c * y, c * x, Fraction(0)]]
 
 
 def eigenvalues(scene: Scene) -> Array:
-    """Return z of a steady rotation: the eigenvalues of the Jacobian times the step size."""
+    """Return z, the eigenvalues of the Jacobian times the step size, at the scene's omega."""
     return np.asarray(np.linalg.eigvals(np.array(jacobian(scene, scene.omega), dtype=float)))
 
 
 def first_step(scene: Scene, listing: Listing) -> Probe:
-    """Differentiate the first step of a program at a steady rotation.
+    """Return the derivative of a program's first step at a steady rotation, measured and derived.
 
-    The step is a polynomial of known degree. Differences with enough neighbours therefore have no
-    error except rounding.
+    It is the derivative of omega after the step with respect to omega before it. It is measured by
+    differences. The step is a polynomial of known degree, so that differences with enough
+    neighbours have no error except rounding. It is derived from the amplification matrix.
     """
 
     def stepped(omega: Array) -> Array:
@@ -94,10 +99,11 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 
 
 def later_steps(scene: Scene, listing: Listing) -> Probe:
-    """Follow a perturbation of a spinning top through the steps of a scene.
+    """Return a spinning top's perturbation after all steps of a scene, measured and derived.
 
     C and the torque are zero. omega3 is the spin, and omega1 and omega2 are the perturbation. The
-    equations are then linear, so that the perturbation may be of any size.
+    equations are then linear, so that the perturbation may be of any size. The derived perturbation
+    is the initial one, multiplied by the amplification matrix in every step.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
@@ -118,7 +124,10 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 
 
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
-    """Run the twin's step on x' = z x, as step number `step` of a run with steps of 1 s."""
+    """Return the growth factor of a collocation step on x' = z x, measured and derived.
+
+    The factor is measured with the Python twin, in step number `step` of a run with steps of 1 s.
+    """
     program = listing.program
     moved = _moved(listing, step)
 
@@ -136,10 +145,12 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
 
 
 def observed_boundary(listing: Listing, direction: complex) -> Probe:
-    """Find by bisection where the perturbation of a spinning top begins to grow.
+    """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
 
-    If the program keeps a second vector, growth is measured by the change from step to step. The
-    constant part of the result would hide it otherwise.
+    z is the step size times an eigenvalue of a spinning top, in the direction -1 or 1j. The
+    distance is measured by bisection over runs of the program. If the program keeps a second vector
+    from step to step, growth is measured by the change from step to step. Otherwise the constant
+    part of omega would hide the growth.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -170,15 +181,20 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
 
 
 def _moved(listing: Listing, step: int) -> float:
-    """Return the factor by which `dt-accumulates` has moved the points of a step."""
+    """Return the factor by which `dt-accumulates` has moved the collocation points of a step.
+
+    `step` is the number of the step. The factor is 1 for a listing without this defect.
+    """
     return float(step) if listing.has("dt-accumulates") else 1.0
 
 
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
-    """Differentiate a step of a collocation twin at a state that is no steady rotation.
+    """Return the derivative of a collocation step at a moving state, measured and derived.
 
-    The step gives omega + h F + h**2/2 J F + w h**3 Q(F), where Q is the quadratic part of F. Only
-    w depends on the positions of the points.
+    It is measured with the Python twin, in step number `step` of a run, at the scene's omega, which
+    is no steady rotation. With the step size h, the step gives omega + h F + h**2/2 J F + w h**3
+    Q(F). F is the right-hand side, J is its Jacobian, and Q is its quadratic part. Only the weight
+    w depends on the positions of the collocation points.
     """
     program, h = listing.program, scene.step_size
     moved = _moved(listing, step)
@@ -211,7 +227,9 @@ def _differentiated(
 ) -> tuple[Array, float, float]:
     """Return the derivative of a step, the distance of its neighbours, and a rounding factor.
 
-    The factor tells how far the differences amplify the rounding of a step.
+    `stepped` maps omega before the step to omega after it, and the derivative is taken at `omega`.
+    There are `count` pairs of neighbours along each axis, up to the returned distance (rad/s). The
+    factor tells how far the differences amplify the rounding error of a step.
     """
     base = np.array(omega)
     reach = _REACH * float(np.abs(base).max())
@@ -230,7 +248,9 @@ def _differentiated(
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
     """Return a bound on the rounding error of each omega in a step, in units of 2**-53.
 
-    Every rounding belongs to a term that is no larger than the same term with all signs positive.
+    `sizes` are bounds of abs(omega) before the step. `moved` is the factor by which the collocation
+    points have moved. Every rounding belongs to a term of the step that is no larger than the same
+    term with all signs positive.
     """
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":

@@ -18,12 +18,12 @@ _SAMPLES = 20_000
 
 @dataclass(frozen=True)
 class Divergence:
-    """The smallest steps that diverge (s): found by running, and predicted by linear stability.
+    """The smallest step size (s) for which runs diverge, as found by running and as predicted.
 
-    `found` is the smallest step with which some omega exceeds twice its bound on the solution, or
-    overflows. It is 0 if this already happens with the smallest step that is tried. `predicted` is
-    the smallest step with which the wobble about axis 3 doubles. `limit` is the largest allowed
-    difference of the two, relative to `predicted`.
+    `found` is the smallest step with which a component of omega exceeds twice its bound on the
+    solution, or overflows. It is 0 if this already happens with the smallest step that is tried.
+    `predicted` is the smallest step with which, by linear stability, the wobble about axis 3
+    doubles. `limit` is the largest allowed difference of the two, relative to `predicted`.
     """
 
     found: float
@@ -34,11 +34,11 @@ class Divergence:
 def divergence(
     scene: Scene, time: float, matrix: Amplification, runner: Runner, smallest: float
 ) -> Divergence:
-    """Compare the step at which runs of a spinning body diverge with the prediction.
+    """Compare the step size at which runs of a spinning body diverge with the prediction.
 
-    The scene has no torque, and spins about a stable axis 3 for `time` (s). `runner` runs a scene
-    by a method, and `matrix` is the amplification matrix of its step. `smallest` (s) is the
-    smallest step tried.
+    The scene has no torque, and the body spins about a stable axis 3 for `time` (s). `runner` runs
+    a scene by a method, and `matrix` is the amplification matrix of the method's step. `smallest`
+    (s) is the smallest step that is tried.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -61,10 +61,11 @@ def divergence(
 
 
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
-    """Return the smallest step (s) with which omega exceeds twice the solution's bound.
+    """Return the smallest step (s) with which omega exceeds twice its bound on the solution.
 
-    The number of steps is found by bisection. Return 0 if `smallest` exceeds the bound too, and
-    infinity if no step does.
+    `runner` runs the scene until `time` (s). The number of steps is found by bisection. Return 0 if
+    omega exceeds twice the bound even with the step `smallest` (s). Return infinity if it does not
+    do so with any step.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 
@@ -86,7 +87,12 @@ def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: floa
 def _doubling(
     matrix: Amplification, rate: float, time: float, smallest: float, missed: float = 0.0
 ) -> float:
-    """Return the smallest step (s) with which a wobble at `rate` (1/s) grows by 2 exp(`missed`)."""
+    """Return the smallest step (s) with which a wobble grows by the factor 2 exp(`missed`).
+
+    `matrix` is the amplification matrix of a step, `rate` the angular frequency of the wobble
+    (1/s), and `time` (s) the duration of the growth. The step is found by bisection from `smallest`
+    (s) on.
+    """
     wanted = math.log(2.0) + missed
 
     def grown(step: float) -> float:
@@ -101,7 +107,7 @@ def _doubling(
 
 
 def _bounds(scene: Scene, time: float) -> Sequence[float]:
-    """Return the largest magnitude of each component of omega along the solution."""
+    """Return the largest magnitude of each component of omega (rad/s) from 0 to `time` (s)."""
     times = np.linspace(0.0, time, _SAMPLES + 1)[1:].tolist()
     omega: Array = solve(scene, times, "taylor", 1e-12).omega
     largest: list[float] = np.abs(np.vstack([scene.omega, omega])).max(axis=0).tolist()

@@ -1,8 +1,8 @@
-"""Checks of every method against published figures that were not computed here.
+"""Checks of every method against published results that were not computed here.
 
-A check passes if the difference from the figure is at most the sum of three terms. They are the
-accuracy of the printed figure, the error that the method may have, and the effect of rounding the
-numbers of the problem to binary64.
+A check passes if the difference from the published number is at most the sum of three terms. They
+are the accuracy of the published number, the error that the method may have, and the effect of
+rounding the numbers of the problem to binary64.
 """
 
 import math
@@ -53,10 +53,10 @@ _Result = tuple[Array, float]
 
 
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
-    """Judge every method that can take a problem by its published figures.
+    """Yield checks of every method that can take a problem against its published results.
 
     The ids of the checks are ``external/<problem>/<time>/<method>``. Value and limit are in the
-    problem's unit, for the component that is worst against its limit.
+    problem's unit, for the component of omega with the largest ratio of value to limit.
     """
     for problem in problems:
         # Times of one sign are solved together, so that a replay of one check gives the same bits.
@@ -74,7 +74,12 @@ def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> It
 def _names(
     problem: Problem, values: Sequence[Value], method: str, only: Sequence[str], quantity: str = ""
 ) -> list[tuple[int, Name]]:
-    """Return row and name of each requested check; empty if the method can't take the problem."""
+    """Return the index in `values`, and the name, of each requested check of a method.
+
+    `values` are the published results by time, and `only` the leading parts of requested ids.
+    `quantity` is the last part of the ids, if it is not empty. Return an empty list if the method
+    can't take the problem.
+    """
     given = "" if problem.path is None else f" --external {shlex.quote(problem.path)}"
     places = [f"{problem.name}/{value.time}" for value in values]
     names = [
@@ -87,10 +92,10 @@ def _names(
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
-    """Return the check of a method that has no result at a time.
+    """Return the check of a method that has no result at the time of `value`.
 
-    A refusal passes for a problem from a user's file, because its times may take the method too
-    long.
+    `refusal` is the message of the method, or empty if its run ended before that time. A refusal
+    passes for a problem from a user's file, because its times may take the method too long.
     """
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
@@ -99,7 +104,11 @@ def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
 
 
 def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
-    """Compare the attitudes of every method that propagates them with the printed ones (rad)."""
+    """Yield checks of every method that propagates attitudes against the published attitudes.
+
+    Their values are angles (rad). The limit is the sum of the published accuracy, the tolerance,
+    and the effect of rounding the numbers of the problem.
+    """
     scene, times = problem.scene, [float(value.time) for value in values]
     for method in (name for name in _SOLVED if REGISTRY[name].attitude and values):
         asked = _names(problem, values, method, only, "attitude")
@@ -126,10 +135,10 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
-    """Return the rotation that rounding the numbers of a scene causes at each time (rad).
+    """Return the change of attitude that rounding the numbers of a scene causes at each time (rad).
 
-    It is computed like the changes in `_moves`. Where the scene can't be solved, only the rounding
-    of the quaternions is counted.
+    It is computed like the changes of omega in `_moves`. Where the scene can't be solved, only the
+    rounding of the quaternions is counted.
     """
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows
@@ -169,10 +178,11 @@ def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Ite
 def _as_far_as_solved(
     solve: Callable[[Sequence[Value]], list[_Row]], values: Sequence[Value]
 ) -> tuple[list[_Row], str]:
-    """Return a row for each value, and the reason why there are no more.
+    """Return the results of `solve` for as many values as possible, and a refusal.
 
-    All values are solved together. If that is refused, they are solved one by one up to the first
-    refusal, because an earlier time may be within the work limit.
+    All published values are solved together. If that is refused, they are solved one by one up to
+    the first refusal, because an earlier time may be within the work limit. The refusal is its
+    message, or empty if there was none.
     """
     try:
         return solve(values), ""
@@ -192,14 +202,20 @@ def _as_far_as_solved(
 
 
 def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
-    """Return the results of a method at the times of the values."""
+    """Return omega and its error bound (rad/s) by a method at the time of each published value.
+
+    An element is None if no step is long enough for the linear equations of a program.
+    """
     if method in PROGRAMS:
         return [_program(problem, value, method) for value in values]
     return [*_solved(problem.scene, [float(value.time) for value in values], method)]
 
 
 def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
-    """Return whether a method takes the problem at all; programs run only forward."""
+    """Return whether a method can take a scene at these times (s) at all.
+
+    Programs run only forward, and `closed-form` and `quick` take only some scenes.
+    """
     if method == "closed-form":
         return closed_form(scene) is not None
     if method == "quick":
@@ -224,11 +240,12 @@ def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Resu
 
 
 def _program(problem: Problem, value: Value, program: str) -> _Result | None:
-    """Run a corrected program, halving its steps down to the accuracy of the print or to rounding.
+    """Return omega by a corrected program at the time of `value`, and a bound on its error.
 
-    The error is estimated from the last halving, and doubled for safety. Rounding may add half a
-    unit in the last place per step. Return None if no step is long enough for the program's linear
-    equations.
+    The step is halved until the error is below a tenth of the published accuracy, or is rounding
+    error. The error is estimated from the last halving, and doubled for safety. Rounding may add
+    half a unit in the last place per step. Return None if no step is long enough for the program's
+    linear equations.
     """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
@@ -279,15 +296,18 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
 
 
 def _scale(scene: Scene, omega: Array) -> float:
-    """Return the largest abs(omega) at start and end (rad/s), no more than that in between."""
+    """Return the largest abs(omega) at the start and at the end of a motion (rad/s).
+
+    Larger values in between are not counted, so that the limits of checks become no wider.
+    """
     return max(*map(abs, scene.omega), float(np.abs(omega).max()))
 
 
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
     """Return the change of omega caused by rounding the numbers of a scene (rad/s), by time.
 
-    It is zero where that can't be solved, so that such a time has no allowance. The method's own
-    check reports the reason.
+    The times are those of the published values, as printed. The change is zero at a time that no
+    solution reaches, so that this time has no allowance. The method's own check reports the reason.
     """
 
     def solve(values: Sequence[Value]) -> list[Array]:
@@ -306,8 +326,8 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
 def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
     """Return the change of omega caused by rounding the numbers of a scene and its times (rad/s).
 
-    The changes caused by each number alone are computed to first order and added. Rows after the
-    end of the motion are zero.
+    The solutions are by `method`. The changes caused by each number alone are computed to first
+    order and added. Rows after the end of the motion are zero.
     """
     moved = np.zeros((len(times), 3))
     run = method_candidate(method, METHODS[method].finest).rows

@@ -1,7 +1,7 @@
-"""Published figures that were not computed here, and the files that describe them.
+"""Published results that were not computed here, and the files that describe them.
 
-A file holds a scene in the terms of the scene file, the source of the figures, and their printed
-digits. The accuracy of a figure is read from its digits.
+A file contains a scene in the format of a scene file, the source of the published numbers, and
+their printed digits. The accuracy of a number is read from its digits.
 """
 
 import math
@@ -48,7 +48,7 @@ class Pointing:
 
 @dataclass(frozen=True)
 class Value:
-    """The figures published for one time."""
+    """The omega and the attitude that are published for one time."""
 
     time: str  # time as printed (s); taken as exact
     # angular velocity in the unit of the problem, None where nothing is printed
@@ -58,25 +58,26 @@ class Value:
 
 @dataclass(frozen=True)
 class Problem:
-    """A published problem with its figures."""
+    """A published problem: a scene, its source, and the results published for several times."""
 
     name: str  # the name of its file
-    # the problem in words, its publication, the page there, the conditions of its figures
+    # the problem as a sentence, its publication, the page there, the conditions of its results
     title: str
     source: str
     where: str
     conditions: str
     unit: str  # unit of the printed omega, one of `UNITS`
     scene: Scene  # its equations and initial state; the step size is not used
-    values: tuple[Value, ...]  # the figures, by time
+    values: tuple[Value, ...]  # the published results, one element for each time
     path: str | None = None  # the user's file; None for a problem of the package
 
 
 def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
-    """Return a printed number with its accuracy; `good_to` is the error that the source admits.
+    """Return the published number with the digits `text`, and its accuracy.
 
-    Raise InputError, naming `where`, if `text` is not the text of a number, or is too large for
-    binary64.
+    The accuracy is half a unit of the last digit, or `good_to`, the error that the source states,
+    if that is larger. Raise InputError, with `where` in front of its message, if `text` is not the
+    text of a number, or is too large for binary64.
     """
     if not isinstance(text, str):
         raise InputError(f"{where}: {kind_of(text)}; allowed: the digits as text, '0.606'")
@@ -93,17 +94,17 @@ def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
 
 
 def read_problem(path: str | Path) -> Problem:
-    """Return the problem of a user's file, in the format of docs/how-to/external.md.
+    """Return the published problem that a user's file describes.
 
-    Raise InputError if the file can't be read, or if something in it is missing, unknown or no
-    number.
+    The format is documented in docs/how-to/external.md. Raise InputError if the file can't be read,
+    or if a field of it is missing, unknown or no number.
     """
     return _read(path, str(path))
 
 
 @cache
 def problems() -> tuple[Problem, ...]:
-    """Return the problems of the package, ordered by name."""
+    """Return the published problems that belong to the package, ordered by name."""
     return tuple(_read(path, None) for path in sorted(_FOLDER.glob("*.toml")))
 
 
@@ -186,7 +187,11 @@ def _value(entry: object, sequence: object) -> Value:
 def _pointing(
     where: str, entry: dict[str, Any], sequence: object, good_to: float
 ) -> Pointing | None:
-    """Return the attitude of an entry, a quaternion or angles in the file's sequence."""
+    """Return the attitude published in one `[[value]]` entry of a file; None if there is none.
+
+    The entry has a quaternion, or Euler angles in the file's `sequence`. `good_to` is the error
+    that the source states. Messages of errors begin with `where`.
+    """
     given = [key for key in ("attitude", "angles_deg") if key in entry]
     if not given:
         return None

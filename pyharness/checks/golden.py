@@ -1,8 +1,8 @@
 """The golden record: the trajectories that this version computes, as exact text.
 
 There is one file for each program or method, with one entry for each trajectory. An entry has the
-command that computes the trajectory, its ending, a digest of all rows, and three rows. These are
-the first, the tenth and the last, as hexadecimal floats.
+command that computes the trajectory, how the run ended, a digest of all rows, and three rows. These
+are the first, the tenth and the last row, as hexadecimal floats.
 """
 
 import hashlib
@@ -43,16 +43,16 @@ _KEYS = ("command", "ended", "steps", "evaluations", "stop", "digest")
 
 @dataclass(frozen=True)
 class Recorded:
-    """A trajectory of the golden record."""
+    """A trajectory of the golden record, with the command and the scene that produce it."""
 
-    source: str  # the program or method, which names its file
-    name: str  # the rest of the name of its check, as in ``case-3/original``
+    source: str  # the program or method, which is the name of its file
+    name: str  # the last parts of the id of its check, as in ``case-3/original``
     command: str  # the command that prints it
     scene: Scene  # the scene that is solved
-    tolerance: float | None  # of a method that states its error; None if every bit is compared
+    tolerance: float | None  # requested of the method; None if every bit is compared
 
     def run(self) -> Trajectory:
-        """Compute the trajectory."""
+        """Run the program or method on the scene, and return the trajectory."""
         if self.source in PROGRAMS:
             listing = (original if self.name.endswith("original") else corrected)(self.source)
             return program_candidate(listing).rows(self.scene)
@@ -60,7 +60,7 @@ class Recorded:
 
 
 def recorded() -> Iterator[Recorded]:
-    """Yield the trajectories that the record must contain."""
+    """Yield the trajectories that the golden record must contain: all cases, by several methods."""
     for case in case_numbers():
         scene = case_scene(case)
         command = f"python -m pyharness run --case {case}"
@@ -77,12 +77,12 @@ def recorded() -> Iterator[Recorded]:
 
 
 def golden(chosen: Selection) -> Iterator[Attempt]:
-    """Compare the trajectories that are computed now with the record.
+    """Yield deferred checks that compare the trajectories computed now with the golden record.
 
-    Programs and methods with a fixed step must agree to the last bit. Methods that state an error
-    must agree within it, because processors and compilers may round their operations differently.
-    With another mathematical library than the record's, results under a torque with waves may
-    differ by rounding.
+    Programs and methods with a fixed step must agree with the record to the last bit. Methods that
+    state an error must agree within twice this error, because processors and compilers may round
+    their operations differently. If sine and cosine come from another mathematical library than for
+    the record, results under a torque with waves may differ by rounding.
     """
     if not chosen.record.is_dir():
         return
@@ -131,7 +131,10 @@ def _held(each: Recorded, entry: dict[str, Any] | None, same_library: bool, name
 
 
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return the files of a record by name; raise InputError if one is no record."""
+    """Return the files of the golden record in `folder`, by program or method.
+
+    Raise InputError if a file is not a valid record.
+    """
     found = {}
     for path in sorted(folder.glob("*.toml")):
         try:
@@ -153,9 +156,10 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
-    """Return the files of a new record, and its differences from the one in `folder`.
+    """Return the files of a new golden record, by name, and its differences from the old record.
 
-    A file of the old record is omitted if none of its trajectories is computed any more.
+    The old record is in `folder`. Each difference is a line of text. A file of the old record is
+    omitted if none of its trajectories is computed any more.
     """
     try:
         known = read_record(folder) if folder.is_dir() else {}
@@ -178,7 +182,10 @@ def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
 
 
 def mathematics() -> str:
-    """Return the name of the library whose sine and cosine the record contains."""
+    """Return the name of this system's mathematical library, which computes sine and cosine.
+
+    The golden record contains the name of the library with which it was made.
+    """
     return " ".join([*platform.libc_ver(), platform.system(), platform.machine()]).strip()
 
 
@@ -200,7 +207,10 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
 
 
 def _digest(rows: Array, run: Trajectory) -> str:
-    """Return a digest of every bit of the rows, with one bit pattern for all NaN."""
+    """Return a digest of every bit of the rows, and of IER if the run has it.
+
+    All NaNs count as one bit pattern.
+    """
     digest = hashlib.sha256(np.where(np.isnan(rows), np.nan, rows).astype("<f8").tobytes())
     if run.ier is not None:
         digest.update(run.ier.astype("<i4").tobytes())
@@ -208,12 +218,15 @@ def _digest(rows: Array, run: Trajectory) -> str:
 
 
 def _rows(entry: dict[str, Any]) -> Array:
-    """Return the rows of an entry, with the number of the step in the first column."""
+    """Return the rows of an entry of the golden record, with the step number in column 0."""
     return np.array([[float(row[0]), *map(float.fromhex, row[1:])] for row in entry["rows"]])
 
 
 def _moved(old: dict[str, Any], new: dict[str, Any]) -> str:
-    """Describe the differences of two entries, with numbers in units in the last place."""
+    """Describe how two entries of a trajectory differ, `old` and `new`.
+
+    Differences of numbers are in units in the last place.
+    """
     parts = [
         f"{key} {old[key] or 'none'} -> {new[key] or 'none'}"
         for key in ("ended", "steps", "evaluations", "stop")

@@ -1,6 +1,6 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
-The programs of the thesis are described on the same scenes, without a bound.
+The errors of the programs of the thesis on the same scenes are reported without a bound.
 """
 
 import math
@@ -53,7 +53,12 @@ FORMS = ("closed-form", "auto")
 
 
 def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Truth:
-    """Return the true solution at `time` (s); `flow` is its conditioning, if known."""
+    """Return the true omega of a scene at `time` (s), with its error bound and conditioning.
+
+    `flow` is the conditioning of the scene up to `time`; it is computed if it is not given. For a
+    body with known moments and no torque, the solution consists of elliptic functions. Otherwise
+    the reference computes it.
+    """
     flow = flow or conditioning(scene, time)
     if not _is_free(scene):
         return reference_truth(scene, [time], flow=flow)
@@ -79,7 +84,12 @@ def hold_all(
     held: Callable[[Name, float], Iterable[Attempt]] | None = None,
     has_programs: Callable[[Circumstance], bool] = lambda each: True,
 ) -> Iterator[Attempt]:
-    """Judge all methods in a suite's extreme scenes by the true solution; describe the programs."""
+    """Yield deferred checks of all methods in the extreme scenes of the suite.
+
+    The function `held` yields the checks for a name and a time (s); by default it is `hold`. In the
+    scenes for which `has_programs` is true, the errors of the programs are reported, without a
+    limit.
+    """
     for each in EXTREMES[suite]():
         name = named(suite, "", each.name, scene=each.scene)
         yield from (held or hold)(name, each.time)
@@ -95,13 +105,17 @@ def hold(
     tolerances: Callable[[str, Scene, float], Sequence[float | None]] | None = None,
     judged: Judged | None = None,
 ) -> Iterator[Attempt]:
-    """Judge each method by the true solution at `time`, at several tolerances.
+    """Yield deferred checks of the error of each method at `time` (s) in the scene of `name`.
 
-    By default the tolerances are a fine and a coarse one. The limit is the sum of three terms. They
-    are the errors that the method promises to make and rounding, both multiplied by the error
-    amplification, and the error of the true solution. If fewer than two digits are left, no limit
-    is set. Energy and momentum without torque are always judged, because their errors are not
-    amplified. A method fails if it refuses a scene that it must take.
+    `truth` computes the true solution. `tolerances` returns the tolerances at which a method is
+    tried, by default those of `affordable`. `judged` makes the checks of one method at one
+    tolerance.
+
+    By default, the limit of the error is the sum of three terms. They are the errors that the
+    method promises to make and rounding, both multiplied by the error amplification, and the error
+    of the true solution. If fewer than two digits are left, no limit is set. The errors of energy
+    and momentum without torque always have a limit, because the flow does not amplify them. A
+    method fails if it refuses a scene that it must take.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -118,7 +132,12 @@ def hold(
 
 
 def run_method(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
-    """Run a method, in the scene's steps if the tolerance is None; raise InputError on refusal."""
+    """Return omega at `time` (s) by the method `name`, with how the run ended.
+
+    If the tolerance is None, the method uses the scene's own steps. It then runs as a prepared
+    solver, as `auto` and `quick` always do. A prepared solver may report a refusal in the result.
+    Any other refusal raises InputError.
+    """
     if name in ("auto", "quick") or tolerance is None:
         return prepared_candidate(name, tolerance or 1.0).end(scene, time)
     return method_candidate(name, tolerance).end(scene, time)
@@ -129,11 +148,12 @@ def _steps(scene: Scene, time: float) -> int:
 
 
 def refusable(tried: Tried, truth: Truth, why: str) -> bool:
-    """Return whether a method may refuse a scene; every other refusal is a fault.
+    """Return whether a method may refuse the scene of `tried`; every other refusal is a fault.
 
-    `closed-form` may refuse where there is no closed form. `quick` may refuse every scene: it needs
-    three products, and leaves scenes with too many steps to the series. The series may refuse waves
-    with so many radians that it would take too long.
+    `why` is the message of the refusal and does not matter here. `closed-form` may refuse where
+    there is no closed form. `quick` may refuse every scene, because it needs A, B and C other than
+    0, and leaves scenes with too many steps to the Taylor series. The series may refuse torques
+    whose waves run through so many radians that it would take too long.
     """
     method, scene = tried.method, tried.scene
     if method == "closed-form":
@@ -144,7 +164,11 @@ def refusable(tried: Tried, truth: Truth, why: str) -> bool:
 
 
 def _derived(truth: Truth, tried: Tried) -> float | None:
-    """Return the limit that follows from the errors that a method promises."""
+    """Return the limit of a method's error: promised errors and rounding, amplified by the flow.
+
+    The limit is relative to the largest omega. It is None if the method promises no error, and
+    infinite if fewer than two digits are left. The limit of a closed form is not amplified.
+    """
     made = made_on_the_way(tried, truth)
     if truth.exact and tried.method in FORMS:
         # A closed form accumulates no errors of steps. To its own error only the rounding of A, B
@@ -159,11 +183,11 @@ def _derived(truth: Truth, tried: Tried) -> float | None:
 
 
 DERIVED = Policy(_derived, refusable)
-"""Policy whose limit is the sum of the errors that a method promises, amplified by the flow."""
+"""Policy that grants the errors that a method promises and rounding, amplified by the flow."""
 
 
 def _roundings(tried: Tried, truth: Truth) -> float:
-    """Return the number of times that a method rounds omega without compensating for it."""
+    """Return the number of times that the run of `tried` rounds omega without compensation."""
     method, answer = tried.method, tried.answer
     if tried.tolerance is None:
         return 0.0 if method in GAUSS else float(_steps(tried.scene, truth.end))
@@ -193,15 +217,16 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
 
 
 def scene_of(name: Name) -> Scene:
-    """Return the scene of a check that has a scene."""
+    """Return the scene in the name of a check, which must have one."""
     assert name.scene is not None
     return name.scene
 
 
 def made_on_the_way(tried: Tried, truth: Truth) -> float | None:
-    """Return the sum of the errors that a method promises to make, over the largest omega.
+    """Return the sum of the errors that a method promises to make in its steps.
 
-    Return None if it promises none.
+    The sum is relative to the largest omega. It follows from the order for a method with a fixed
+    step and no torque. Otherwise it is the tolerance, or None if the method has no tolerance.
     """
     if tried.method in FIXED_STEP and truth.exact:
         radians = speed(tried.scene, truth.flow.largest) * abs(truth.end)
@@ -211,10 +236,12 @@ def made_on_the_way(tried: Tried, truth: Truth) -> float | None:
 
 
 def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
-    """Return the smallest error of omega, over `largest`, that explains the conservation errors.
+    """Return the smallest relative error of `omega` that explains its change of energy or momentum.
 
-    An error e of every omega changes the sum of q w**2 by at most 2 e times the sum of q abs(w). An
-    error of at least e is therefore needed to cause the change that was found.
+    The error is relative to `largest`, the largest abs(omega) of the motion (rad/s). Energy and
+    squared momentum are sums of q w**2, where w are the components of omega, and q are the moments
+    or their squares. An error e of every component changes such a sum by at most 2 e times the sum
+    of q abs(w). An error of at least e is therefore needed to cause the change that was found.
     """
     assert scene.moments is not None
     if not np.isfinite(omega).all():
@@ -234,7 +261,11 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 
 
 def describe_programs(name: Name) -> Iterator[Attempt]:
-    """Describe the error of the programs, original and corrected, over the steps of the scene."""
+    """Yield deferred checks that report, without a limit, the largest error of each program.
+
+    The programs, original and corrected, run over the steps of the scene in `name`. The error of
+    omega is relative to the largest omega, and is taken at some ten of these steps.
+    """
     scene = scene_of(name)
     every = max(1, scene.steps // _ROWS)
     rows = slice(every - 1, None, every)

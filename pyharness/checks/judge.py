@@ -1,4 +1,4 @@
-"""The judgement of a method's answer by the true solution, within the limit of a named policy."""
+"""The judgement of a method's answer by the true solution, within the limit of a policy."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -25,7 +25,7 @@ MOST = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The answer of a method: rows for the last of the times, or the reason why there are none."""
+    """The answer of a method: results for the last of the times, or the reason of its refusal."""
 
     omega: Array = field(default_factory=lambda: np.empty((0, 3)))  # shape (n, 3), rad/s
     attitude: Array | None = None  # shape (n, 4), where it was requested
@@ -33,11 +33,14 @@ class Answer:
     steps: int = 0
     evaluations: int | None = None
     refusal: str = ""  # why the method refused the scene
-    is_whole: bool = True  # whether every row is there
+    is_whole: bool = True  # whether the method reached the last time, with every row
 
 
 def of_end(method: str, end: End) -> Answer:
-    """Return the answer of a call to one time; a prepared solver refuses by its status."""
+    """Return the answer that a call of `method` for one time gave; `end` is the call's result.
+
+    If the status of a prepared solver says that it refused, the answer is a refusal.
+    """
     if end.is_refused:
         return Answer(refusal=f"{method}: {end.ended}")
     attitude = None if end.attitude is None else end.attitude[None, :]
@@ -46,7 +49,10 @@ def of_end(method: str, end: End) -> Answer:
 
 
 def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answer:
-    """Return the answer at all times, with attitudes if the scene has one."""
+    """Run a candidate at all times (s) and return its answer.
+
+    The answer has attitudes if the scene has one. It is not whole if rows are missing.
+    """
     run = candidate.rows(scene, list(times))
     has_rows = run.has_all_rows and run.time.tolist() == list(times)
     if has_rows and (run.attitude is None) == (scene.attitude is None):
@@ -56,7 +62,10 @@ def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answe
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A method to be run on a scene; `tolerance` is None for the scene's own steps."""
+    """A run of a method on a scene, which `ask` makes when the answer is first needed.
+
+    `tolerance` is None if the method uses the scene's own steps.
+    """
 
     method: str
     tolerance: float | None
@@ -73,13 +82,16 @@ class Tried:
 
 
 def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> Tried:
-    """Return a `Tried` that runs a method of the registry at all times."""
+    """Return a run of a method of the registry by `solve` at all times (s), made when judged."""
     ask = method_candidate(method, tolerance)
     return Tried(method, tolerance, scene, lambda: of_rows(ask, scene, times))
 
 
 def by_end(method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float) -> Tried:
-    """Return a `Tried` that runs a candidate at one time (s)."""
+    """Return a run of a candidate at one time (s), made when judged.
+
+    `method` is the name of the method in the policy and in messages of refusal.
+    """
     return Tried(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
 
@@ -117,18 +129,19 @@ class Truth:
 
     @property
     def end(self) -> float:
-        """Return the last time (s)."""
+        """Return the last time of the true solution (s)."""
         return float(self.time[-1])
 
     @property
     def relative_error(self) -> float:
-        """Return the error of any omega, over the largest omega."""
+        """Return the bound on the error of the true omega, over the largest omega."""
         return self.error / (self.flow.largest or 1.0)
 
     def error_of(self, answer: Answer) -> float:
-        """Return the largest error of an answer: an angle (rad), or omega relative to the largest.
+        """Return the largest error of an answer: of its attitudes, if they are judged, or of omega.
 
-        Return NaN if a row has one.
+        The error of an attitude is an angle (rad). The error of omega is relative to the largest
+        omega. Return NaN if a row of the answer contains NaN.
         """
         if self.attitude is None:
             difference = float(np.abs(answer.omega - self.omega[-len(answer.omega) :]).max())
@@ -143,7 +156,10 @@ class Truth:
 
 
 def unknown_flow(largest: float) -> Conditioning:
-    """Return a conditioning without useful bounds, for closed forms, which need none."""
+    """Return a conditioning without useful bounds, for closed forms, which need no bounds.
+
+    `largest` is the largest abs(omega) (rad/s).
+    """
     return Conditioning(math.inf, MOST, MOST, MOST, largest)
 
 
@@ -153,7 +169,12 @@ def reference_truth(
     effort: float | None = None,
     flow: Conditioning | None = None,
 ) -> Truth:
-    """Return the reference as a true solution; raise InputError if it does not reach all times."""
+    """Return the reference's solution as the true solution at all times (s).
+
+    `effort` is a factor on the work limit of the reference. `flow` is the conditioning up to the
+    last time, which is computed if it is not given. Raise InputError if the solution does not reach
+    all times.
+    """
     flow = flow or conditioning(scene, times[-1])
     # The reference's steps are accurate to 1e-22. The precise series is requested where the flow
     # amplifies errors by more than 1e3.
@@ -165,27 +186,18 @@ def reference_truth(
 
 @dataclass(frozen=True)
 class Policy:
-    """A limit policy: the errors of an answer that pass, and the refusals that pass.
-
-    Attributes
-    ----------
-    limit : callable
-        The largest error of an answer, relative to the largest omega, or as an angle (rad). It is
-        None where the method promises no error, and infinite where the flow leaves no digits. The
-        error is then described and not judged.
-    may_refuse : callable
-        Whether a refusal passes, depending on its reason.
-    """
+    """A rule for judging answers: the largest error that passes, and the refusals that pass."""
 
     limit: Callable[[Truth, Tried], float | None]
     may_refuse: Callable[[Tried, Truth, str], bool] = lambda *_: False
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
-    """Return the error that a policy allows, including rounding and the true solution's error.
+    """Return the largest error that passes: the method's own, rounding and the true solution's.
 
-    `made` is the sum of the errors that a method makes in its steps, and `growth` the factor
-    granted to it. `steps` is the number of times that omega is rounded.
+    `made` is the sum of the errors that a method makes in its steps, relative or as an angle (rad).
+    `growth` is the error amplification granted to `made`. `steps` is the number of times that the
+    method rounds omega.
     """
     if truth.attitude is not None:
         return truth.flow.angle_limit(made * growth, truth.end) + truth.angle_error
@@ -193,25 +205,32 @@ def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> flo
 
 
 def lively(growth: float) -> float:
-    """Return the factor granted to a tolerance: `growth` if it exceeds `LIVELY`, else 1."""
+    """Return the factor granted to a tolerance: `growth` if it exceeds `LIVELY`, else 1.
+
+    `growth` is the error amplification of the flow.
+    """
     return growth if growth > LIVELY else 1.0
 
 
 def linear(limit: float) -> float:
-    """Return `limit`, or infinity where the linearised flow leaves fewer than two digits."""
+    """Return an error limit unchanged, or infinity if it exceeds `LINEAR`.
+
+    In this case the linearised flow leaves fewer than two digits.
+    """
     return limit if limit <= LINEAR else math.inf
 
 
 def tolerance_of(tried: Tried) -> float:
-    """Return the tolerance of a method that has one."""
+    """Return the tolerance of a run, which must have one."""
     assert tried.tolerance is not None
     return tried.tolerance
 
 
 def has_no_form(tried: Tried, truth: Truth, why: str) -> bool:
-    """Return whether a refusal passes: of `closed-form` without a closed form, or of `quick`.
+    """Return whether the refusal of a scene passes; `why` is its message.
 
-    `quick` may refuse if one of the coefficients A, B and C is 0.
+    `closed-form` may refuse a scene that has no closed form. `quick` may refuse a scene if one of
+    the coefficients A, B and C is 0.
     """
     if tried.method == "quick":
         # The unknowns of `quick` need all three products.
@@ -220,24 +239,31 @@ def has_no_form(tried: Tried, truth: Truth, why: str) -> bool:
 
 
 def _granting(factor: Callable[[float], float]) -> Callable[[Truth, Tried], float]:
-    """Return a limit that multiplies a tolerance by a factor of the error amplification."""
+    """Return a limit for a policy: the tolerance times ``factor(K)``, plus rounding.
+
+    K is the error amplification of the flow. The error of the true solution is added too.
+    """
     return lambda truth, tried: allowed(
         truth, tolerance_of(tried), factor(truth.flow.amplification)
     )
 
 
 AS_STATED = Policy(_granting(lambda growth: 1.0), has_no_form)
-"""Policy that grants the tolerance itself, and rounding amplified by the flow."""
+"""Policy that grants the tolerance itself, plus rounding amplified by the flow."""
 IF_CALM = Policy(_granting(lively))
-"""Policy that grants rounding and the tolerance, amplified if perturbations grow a thousandfold."""
+"""Policy that grants the tolerance, plus rounding amplified by the flow.
+
+The tolerance is amplified too if perturbations grow a thousandfold.
+"""
 AMPLIFIED = Policy(_granting(lambda growth: growth))
-"""Policy that grants the tolerance and rounding, both amplified by the flow."""
+"""Policy that grants the tolerance plus rounding, both amplified by the flow."""
 
 
 def judge(name: Name, tried: Tried, truth: Truth, policy: Policy) -> Check:
-    """Return the check that a method's answer is as near to the true solution as a policy requires.
+    """Return the check that the error of a method's answer is within the limit of the policy.
 
-    A closed form fails if it solves a scene that has none.
+    If the method refused, the check passes if the policy permits the refusal. If the policy sets no
+    limit, the error is only reported. A closed form fails if it solves a scene that has none.
     """
     answer = tried.answer
     if answer.refusal:

@@ -1,7 +1,7 @@
-"""The kinds of checks of `verify`; the first part of a check's name is its kind.
+"""The kinds of checks of `verify`; the first part of a check's id is its kind.
 
-They compare the bits of two languages, results with the true solution, and results with recorded
-ones.
+Some kinds compare the results of Fortran and Python bit for bit. Others compare results with the
+true solution, or with recorded results.
 """
 
 from collections.abc import Callable, Iterator
@@ -35,12 +35,13 @@ _THIN_EXTERNAL = [
 ]
 
 KINDS: dict[str, Callable[[Selection], Attempts]] = {
-    # Fortran against twin for every program, case, listing and reading: the bits of the whole
-    # trajectory, the counters and the stop.
+    # Fortran against the Python twin for every program, case, listing and reading: the bits of the
+    # whole trajectory, the counters, and where the stop test ended the run.
     "cells": cells,
-    # Binary64 in our own arithmetic against the processor's, and the vectors of the CDC.
+    # Binary64 in our own arithmetic against the processor's, and test vectors of the CDC.
     "words": words,
-    # The decks, compiled from the author's own cards, against the port: TAPE5 and the page.
+    # The decks, compiled from the author's own cards, against the Fortran port: TAPE5 and the
+    # page.
     "decks": decks,
     # Every step of the corrected programs against its scheme, within rounding.
     "schemes": schemes,
@@ -59,7 +60,7 @@ KINDS: dict[str, Callable[[Selection], Attempts]] = {
     "random": lambda chosen: chain(
         random_programs(chosen), random_methods(chosen), random_attitudes(chosen)
     ),
-    # Published figures that were not computed here.
+    # Methods and programs against published results that were not computed here.
     "external": _external,
     # Trajectories as they were recorded.
     "golden": golden,
@@ -69,6 +70,6 @@ _OF_THE_USER = ("external", "golden")
 
 
 def verify(chosen: Selection) -> Iterator[Check]:
-    """Make the requested checks, one after another."""
+    """Yield the checks that `chosen` requests, which are computed one after another."""
     suites = {kind: partial(attempts, chosen) for kind, attempts in KINDS.items()}
     return run_suites(suites, chosen.only, "verify", _OF_THE_USER)

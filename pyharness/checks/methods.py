@@ -37,14 +37,20 @@ _PREPARED_TURNED = ("auto", "taylor")
 
 
 def methods(chosen: Selection) -> Iterator[Attempt]:
-    """Judge every method that states an error, at all times of a case and at one later time."""
+    """Yield deferred checks of omega, by every method that states an error, against the reference.
+
+    Each case is compared at all its times and at one later time.
+    """
     for case in cases(chosen):
         scene = case_scene(case)
         yield from _solved("methods", case, scene, (*scene.times(), _LATER), _SOLVED, chosen.thin)
 
 
 def prepared(chosen: Selection) -> Iterator[Attempt]:
-    """Judge prepared solvers, forward and backward; compare bits for the scene's own steps."""
+    """Yield deferred checks of prepared solvers against the reference, forward and back in time.
+
+    In the scene's own steps, prepared solvers are compared bit for bit with the kernel.
+    """
     for case in cases(chosen):
         scene = case_scene(case)
         forms = _PREPARED if closed_form(scene) else _PREPARED[:-1]
@@ -55,7 +61,10 @@ def prepared(chosen: Selection) -> Iterator[Attempt]:
 
 
 def attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Judge the attitude of every method that propagates it, by `solve` and prepared."""
+    """Yield deferred checks of attitudes against the reference in every case.
+
+    Every method that propagates the attitude is tried, by `solve` and as a prepared solver.
+    """
     for case in cases(chosen):
         scene = replace(case_scene(case), attitude=START)
         times = (*scene.times()[9::10], _LATER)
@@ -65,7 +74,7 @@ def attitudes(chosen: Selection) -> Iterator[Attempt]:
 
 
 def cases(chosen: Selection, thin: Sequence[int] = (4, 5)) -> Sequence[int]:
-    """Return the cases in which checks are made; the self-test makes them in the cases `thin`."""
+    """Return the numbers of the cases in which checks are made; in the self-test, return `thin`."""
     return thin if chosen.thin else list(case_numbers())
 
 
@@ -96,7 +105,11 @@ def _prepared(
 
 
 def solve_tried(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> Tried:
-    """Return a `Tried` that runs a method at all times."""
+    """Return a run of a method by `solve` at all times (s), made when judged.
+
+    With attitude, a method of SciPy takes the finest tolerance that it can meet, if `tolerance` is
+    finer.
+    """
     if method in SCIPY_METHODS and scene.attitude:
         # SciPy's methods can't be requested to have so small an error over a long time.
         tolerance = max(tolerance, 1.01 * finest(method, scene, times[-1]))
@@ -104,9 +117,9 @@ def solve_tried(method: str, tolerance: float, scene: Scene, times: Sequence[flo
 
 
 def call_tried(method: str, tolerance: float, scene: Scene, time: float) -> Tried:
-    """Return a `Tried` that calls a prepared solver at one time (s).
+    """Return a call of a prepared solver at one time (s), made when judged.
 
-    Another call comes first, which must leave no trace.
+    Another call with another initial omega comes first, which must leave no trace.
     """
     prepare = attitude_candidate if scene.attitude else prepared_candidate
     return by_end(method, prepare(method, tolerance, primed=True), tolerance, scene, time)
@@ -117,7 +130,10 @@ def _judged(tried: Callable[[], Tried], truth: Callable[[], Truth], name: Name) 
 
 
 def _same_steps(scene: Scene, name: Name) -> Check:
-    """Compare a prepared solver in the scene's own steps with the kernel itself, bit for bit."""
+    """Check that a prepared solver and the kernel itself give the same bits after 100 steps.
+
+    Both use the scene's own steps.
+    """
     method, time = name.subject, 100.0 * scene.step_size
     found = prepared_candidate(method, 1.0).end(scene, time).omega
     if method in FIXED_STEP:

@@ -1,8 +1,8 @@
 """Checks of the order of methods: the power with which errors decrease as the step is halved.
 
-The errors of corrected programs are measured with `solve_ivp`, and the errors of methods with the
-reference. The velocity of the programs is also compared with the reference, because no other method
-computes it.
+The errors of corrected programs are measured against `solve_ivp`, and the errors of methods with a
+fixed step against the reference. The translational velocity of the programs is also compared with
+the reference, because no other method computes it.
 """
 
 from collections.abc import Callable, Iterator
@@ -33,7 +33,10 @@ _ORDER_SLACK = 0.2
 
 
 def orders(chosen: Selection) -> Iterator[Attempt]:
-    """Measure every order; the value of a check is the deficit from the expected order."""
+    """Yield deferred checks of the order of each corrected program and each fixed-step method.
+
+    The value of a check is the expected order less the measured one.
+    """
     for case in cases(chosen, (5,)):
         scene = case_scene(case)
         known = cache(partial(reference, scene, scene.times()))
@@ -71,14 +74,18 @@ def _of_method(scene: Scene, truth: Callable[[], Reference], name: Name) -> Chec
 
 
 def judged_order(name: Name, found: Order) -> Check:
-    """Return the check of an order; it also fails if the order can't be determined."""
+    """Return the check that a measured order is at most `_ORDER_SLACK` below the expected one.
+
+    The check also passes if the error is rounding error before an order can be observed. It fails
+    if the order can't be determined for another reason.
+    """
     missing = None if found.value is None else found.due - found.value
     passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK
     return name.judged(passed, str(found), missing, _ORDER_SLACK)
 
 
 def _by_ivp(scene: Scene) -> Reference:
-    """Return the solution of `solve_ivp` as a true solution, accurate to its tolerance."""
+    """Return the solution of `solve_ivp` as a true solution, accurate to its finest tolerance."""
     tolerance = 1.01 * finest(_IVP, scene, scene.times()[-1])
     run = method_candidate(_IVP, tolerance).rows(scene)
     largest = float(np.abs(run.omega).max())

@@ -1,4 +1,4 @@
-"""The figures of the checks: results of any trial, Brouwer's law, regions of linear stability."""
+"""The pictures of the checks: results of any trial, Brouwer's law, regions of linear stability."""
 
 import re
 import textwrap
@@ -30,10 +30,11 @@ _COARSE = 1e-6
 
 
 class _Mark(NamedTuple):
-    """A check as a mark in a figure: its method, its circumstance and its series.
+    """A check as a mark in a picture: its method, its circumstance and its series.
 
-    `kind` is the part of the circumstance before its first number. `rank` is the kind of setting.
-    `what` is error or drift, if it is one of them.
+    `kind` is the part of the circumstance before its first number. `rank` is ``coarse`` or ``fine``
+    if the setting is a tolerance, and otherwise the setting itself. `what` is ``error`` or
+    ``drift`` if the check compares one of these, and otherwise empty.
     """
 
     method: str
@@ -45,7 +46,7 @@ class _Mark(NamedTuple):
 
     @property
     def style(self) -> dict[str, Any]:
-        """Return the style of the marker."""
+        """Return the marker and the colour of the mark, as options of Matplotlib."""
         marker = _MARKERS.get(self.what, "s" if self.rank else "D")
         return {"marker": marker, "color": _COLORS.get(self.rank, "black"), "linestyle": "none"}
 
@@ -62,9 +63,10 @@ def _mark(check: Check) -> _Mark:
 
 
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
-    """Draw the checks of a trial, with a panel for each method.
+    """Return a picture of a trial's checks: values and limits, in a panel for each method.
 
-    Circumstances whose names begin alike are drawn together, in the order in which they were tried.
+    Circumstances whose names begin alike are drawn side by side, in the order in which they were
+    tried. Raise InputError if no check has a value.
     """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -118,7 +120,10 @@ def _label(rank: str, what: str) -> str:
 
 
 def _places(marks: Sequence[_Mark]) -> dict[tuple[str, str], float]:
-    """Return the position of each circumstance: kinds side by side, spaced for their names."""
+    """Return the position of each circumstance on the horizontal axis, by its kind and its name.
+
+    Circumstances of one kind are side by side, with space for the name of the kind above them.
+    """
     names = dict.fromkeys((mark.kind, mark.circumstance) for mark in marks)
     places = {}
     place = 0.0
@@ -181,7 +186,10 @@ _OF_METHODS: dict[str, dict[str, Any]] = {
 
 
 def length_picture(found: Sequence["Drift"]) -> Picture:
-    """Draw the errors of energy and phase of each motion against the number of steps."""
+    """Return a picture of errors in energy and phase against the number of steps.
+
+    There is a column of panels for each motion.
+    """
     from matplotlib.figure import Figure
 
     motions = list(dict.fromkeys(each.motion for each in found))
@@ -236,7 +244,11 @@ _LEAST = 1e-13
 
 
 def regions_picture(found: Regions) -> Picture:
-    """Draw the regions of stability, beside the growth along the imaginary axis."""
+    """Return a picture of the regions of stability in the plane of z.
+
+    z is the step size times an eigenvalue of the linearised equations. A second panel shows the
+    growth of a perturbation in a step along the imaginary axis.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 5.8), dpi=100, layout="constrained")

@@ -1,6 +1,6 @@
-"""Checks of a port of the programs, in any language, against the twins, bit for bit in all cells.
+"""Checks of a port, an implementation of the programs in any language, against the twins.
 
-`docs/how-to/ports.md` describes the protocol.
+The results must agree bit for bit in all cells. `docs/how-to/ports.md` describes the protocol.
 """
 
 import math
@@ -27,7 +27,11 @@ Cell = tuple[str, Listing, int]
 
 
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
-    """Return name, listing and case of the requested cells; `cells` are leading parts of names."""
+    """Return name, listing and case number of the requested cells.
+
+    A cell is a program with a case, defects and readings. `cells` are leading parts of names of
+    cells; if it is empty, all cells of the programs and cases are requested.
+    """
     return [
         (cell_name(listing, case), listing, case)
         for listing, case in all_cells()
@@ -38,10 +42,10 @@ def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[st
 
 
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[Check]:
-    """Compare a port with the twins; an invalid answer fails and ends the checks.
+    """Yield checks that a port gives the same bits as the twins; `command` starts the port.
 
-    `patience` is the longest time to wait for an answer (s). Raise InputError if there is no
-    command.
+    An invalid answer is a failed check and ends the comparison. `patience` is the longest time to
+    wait for an answer (s). Raise InputError if `command` is empty.
     """
     verb = f"python -m pyharness verify --port {shlex.quote(command)}"
     name, again = Name("port", "start"), verb
@@ -65,7 +69,11 @@ def _held(name: Name, process: PortProcess, listing: Listing, scene: Scene) -> C
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
-    """Describe an answer's first difference from the twin, and all differences in its ending."""
+    """Describe the differences of a port's answer from the twin; empty if there are none.
+
+    They are the first row that differs, the number of rows, how the run ended, where the stop test
+    ended it, and the first IER that differs.
+    """
     wanted, given = _rows(twin), answer.rows
     found = []
     for step, (due, row) in enumerate(zip(wanted, given, strict=False), 1):

@@ -1,4 +1,7 @@
-"""A port as a process: it reads and writes lines within a time limit, and is always ended."""
+"""The process of a port, an implementation of the programs that answers requests line by line.
+
+The port must answer within a time limit. It is always ended, with all processes that it started.
+"""
 
 import contextlib
 import os
@@ -14,9 +17,9 @@ from typing import Self
 from pyharness.model.errors import InputError, printable
 
 PATIENCE = 60.0  # s for a run, including the start of an interpreter that compiles
-_LARGEST = 1 << 26  # bytes of an answer
+_LARGEST = 1 << 26  # most bytes of an answer
 _PIECE = 1 << 16
-_TO_END = 1.0  # s to end after closing its output
+_TO_END = 1.0  # s that a port may take to end after it has closed its input or output
 # Limit on the rounds of searching for processes that a port has started, and of reading its last
 # output.
 _ROUNDS = 100
@@ -24,11 +27,14 @@ _MARK = "PYHARNESS_PORT"  # environment variable that marks each process of a po
 
 
 class PortError(Exception):
-    """A port did something that is no valid answer; the message is one line."""
+    """An error raised if a port gives no valid answer; its message is one line."""
 
 
 def split_command(command: str) -> list[str]:
-    """Return the words of a command, split as by a shell; raise InputError if there is none."""
+    """Return the program and the arguments of a command line, split as by a shell.
+
+    Raise InputError if the command is empty or can't be split.
+    """
     try:
         words = shlex.split(command)
     except ValueError as error:
@@ -39,7 +45,10 @@ def split_command(command: str) -> list[str]:
 
 
 def _processes_with(mark: str) -> list[int]:
-    """Return the live processes with `mark` in their environment; none if there is no /proc."""
+    """Return the ids of the live processes that have `mark` in their environment.
+
+    `mark` has the form ``NAME=value``. Without /proc no process is found.
+    """
     found = []
     for folder in Path("/proc").glob("[1-9]*"):
         # A process may have ended meanwhile, or belong to another user. A process that has ended
@@ -51,7 +60,7 @@ def _processes_with(mark: str) -> list[int]:
 
 
 class PortProcess:
-    """A port from its start to its end, as a context manager; PortError if it can't be started."""
+    """A running port as a context manager; entering it raises PortError if the port can't start."""
 
     def __init__(self, command: str, patience: float = PATIENCE) -> None:
         """Store the command to start, and the longest time to wait for an answer (s)."""
@@ -61,7 +70,7 @@ class PortProcess:
     def __enter__(self) -> Self:
         """Start the port in its own process group, so that the children of a shell end with it."""
         self._mark = f"{_MARK}={os.urandom(16).hex()}"
-        self._told = b""  # the last part of what it wrote to stderr
+        self._told = b""  # the last part of what the port wrote to stderr
         try:
             self._process = subprocess.Popen(
                 self._words,
@@ -109,7 +118,11 @@ class PortProcess:
             file.close()
 
     def ask(self, line: bytes) -> bytes:
-        """Return the line that answers a line; raise PortError if none or more than one comes."""
+        """Send a request to the port and return its answer, both one line without a line feed.
+
+        Raise PortError if the port does not answer in time, ends, or writes too much or a second
+        line.
+        """
         end = time.monotonic() + self._patience
         rest = line + b"\n"
         found = bytearray()
@@ -142,7 +155,7 @@ class PortProcess:
         return answer
 
     def _hear(self) -> bool:
-        """Read from stderr and keep the last part; return whether there was anything."""
+        """Read the port's stderr and keep the last part; return whether there was any output."""
         try:
             piece = os.read(self._errors.fileno(), _PIECE)
         except BlockingIOError:

@@ -17,22 +17,22 @@ from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop
 from pyharness.original.equations import card_torque
 
 VARIABLES = ("TIME", "U1", "U2", "U3", "V1", "V2", "V3")
-"""Columns of a row, in the order of TAPE5: s, rad/s and m/s."""
+"""Columns of each row of results, in the order of TAPE5; their units are s, rad/s and m/s."""
 ENDINGS = ("complete", "stopped", "overflow")
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The result of a run by a port.
+    """The result of one run of a program by a port.
 
     Attributes
     ----------
     rows : ndarray, shape (n, 7)
-        `VARIABLES` after each step.
+        The values of `VARIABLES` after each step.
     ended : str
-        One of `ENDINGS`.
+        How the run ended, one of `ENDINGS`.
     stop : Stop or None
-        The step, variable and quotient at which the Lipschitz test stopped the run.
+        The step, variable and quotient at which the Lipschitz test stopped the run, if it did.
     ier : list of int, or None
         IER of each step; None for a program that prints none.
     """
@@ -46,10 +46,10 @@ class Answer:
 def request(
     scene: Scene, listing: Listing, lipschitz: float | None = None, may_stop: bool = True
 ) -> bytes:
-    """Return the line that requests a run; its decimals reproduce the floats exactly.
+    """Return the line that requests a run from a port; its decimals reproduce floats exactly.
 
-    `lipschitz` is in 1/s, by default the value of the decks. Without `may_stop` no test ends the
-    run.
+    `lipschitz` is the constant of the stop test (1/s), by default its value in the decks. Without
+    `may_stop` the test does not end the run.
     """
     asked = {
         "schema": SCHEMAS["port request"],
@@ -63,7 +63,7 @@ def request(
 
 
 def asked_scene(scene: Scene) -> dict[str, Any]:
-    """Return the record of a scene that a port reads."""
+    """Return a scene as the dictionary that a request sends to a port."""
     return {
         **scene_record(scene),
         "masses": scene.masses,
@@ -73,7 +73,10 @@ def asked_scene(scene: Scene) -> dict[str, Any]:
 
 
 def read_answer(line: bytes, steps: int) -> Answer:
-    """Return a port's answer to a scene with `steps` steps; raise PortError if it is invalid."""
+    """Return a port's answer to a scene with `steps` steps; raise PortError if it is invalid.
+
+    `line` is the answer as JSON, without a line feed.
+    """
     try:
         given = json.loads(line)
     except (ValueError, RecursionError) as error:
@@ -133,7 +136,10 @@ def _whole(where: str, value: object) -> int:
 
 
 def _number(where: str, value: object) -> float:
-    """Return a JSON number, or one in text form: hexadecimal, decimal, inf, nan."""
+    """Return the value of a JSON number, or of one in text form: hexadecimal, decimal, inf, nan.
+
+    Raise PortError, with `where` in front of its message, if `value` is neither.
+    """
     if type(value) is float:
         return value
     try:

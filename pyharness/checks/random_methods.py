@@ -1,8 +1,10 @@
-"""Checks of methods in scenes drawn from a seed, against the second reference.
+"""Checks of methods in scenes drawn from a seed, against an independent true solution.
 
-Methods are run through every entry point. A tolerance applies to the error at the requested times,
-or to the angle. The error is relative to the largest omega from 0 to the last of these times. If
-the motion amplifies perturbations K times, rounding alone causes errors of 2e-15 K.
+The true omega comes from `integer_series`, and the true attitude from `reference`. Methods are run
+through every entry point, by `solve` and as prepared solvers. A tolerance applies to the error of
+omega at the requested times, or to the angle (rad). The error of omega is relative to the largest
+omega from 0 to the last of these times. If the motion amplifies perturbations K times, rounding
+alone causes errors of 2e-15 K.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -42,7 +44,7 @@ from pyharness.truth.integer_series import integer_series
 # arithmetic cost more than the true solution, and are tried in one of 60 pairs. Attitudes are tried
 # in one of 20 draws.
 _EVERY, _EVERY_SLOW, _EVERY_ATTITUDE = 4, 60, 20
-_EFFORT = 0.05  # work limit of the reference, for an attitude
+_EFFORT = 0.05  # factor on the work limit of the reference, for an attitude
 ROUNDING = 2e-15  # relative, for an error amplification of 1
 _CALM = 10.0  # error amplification below which the series has no reason to refuse
 # Kinds of random scenes that may diverge, or be too fast for any true solution and any series.
@@ -55,7 +57,11 @@ Entrances = Mapping[str, Callable[[], Tried]]
 
 
 def truth_of(drawn: Draw) -> Truth:
-    """Return the true solution of a draw; raise InputError if there is none."""
+    """Return the true omega of a draw, at a fraction .4 of its last time and at the last time.
+
+    Raise InputError if the solution grows without bound or is too fast, or if amplified rounding
+    errors leave no digit of omega.
+    """
     times = [_EARLIER * drawn.time, drawn.time]
     path = integer_series(drawn.scene, times)
     flow = along(drawn.scene, path.nodes, path.way)
@@ -66,10 +72,12 @@ def truth_of(drawn: Draw) -> Truth:
 
 
 def may_refuse(tried: Tried, truth: Truth, why: str) -> bool:
-    """Return whether a method may refuse a scene that takes too long or leaves too few digits.
+    """Return whether a method may refuse the scene of `tried` with the message `why`.
 
-    The automatic choice of a method may not refuse. A closed form may refuse only near the limits
-    of the range of numbers.
+    The automatic choice of a method may not refuse. A closed form may refuse only scenes near the
+    limits of the range of numbers. Any other method may refuse a scene of the kinds `_MAY_REFUSE`,
+    or one whose error amplification exceeds `_CALM`. `quick` may refuse every scene, and a method
+    of SciPy may refuse a tolerance that is too fine for it.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -95,11 +103,18 @@ def _limit(truth: Truth, tried: Tried) -> float:
 
 
 POLICY = Policy(_limit, may_refuse)
-"""Policy like `IF_CALM`, with `ROUNDING` for each factor of the error amplification."""
+"""Policy that grants the tolerance, plus `ROUNDING` times the error amplification.
+
+The tolerance is multiplied by the error amplification where that exceeds `LIVELY`.
+"""
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Judge every entry point in scenes drawn from the seed."""
+    """Yield deferred checks of omega, by every entry point, against the true omega of each draw.
+
+    The draws come from the seed of `chosen`. A draw without a true solution yields one finished
+    check, which passes if the scene is of the kinds `_MAY_REFUSE`.
+    """
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
@@ -120,7 +135,11 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
 
 
 def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Judge the attitude of the automatic choice and of the series, in random scenes."""
+    """Yield deferred checks that compare attitudes with the true attitude in random scenes.
+
+    The attitudes come from the automatic choice of a method, from the Taylor series and from a
+    prepared solver. Draws without a usable true solution are left out.
+    """
     tolerance_at = METHODS["taylor"].finest
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
         if not chosen.may_ask(f"random/{number}"):
@@ -149,7 +168,11 @@ def _requested(chosen: Selection, number: int, entrances: Entrances) -> Entrance
 
 
 def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
-    """Return the methods to try in a draw, by name of the check; if `thin`, compiled ones."""
+    """Return the calls to try in draw number `number`, by the subject of their checks.
+
+    SciPy's methods and the reference are slow. They are tried in few draws, and in none with
+    `thin`, which the self-test sets.
+    """
     forms = ["closed-form"] if closed_form(drawn.scene) else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
     if number // 2 % _EVERY_SLOW == 0 and not thin:
@@ -183,7 +206,10 @@ def _sampled(
 
 
 def _sample(tried: Callable[[], Tried], truth: Truth, policy: Policy, name: Name) -> Sample:
-    """Judge an entry point, and record the quantities that determine its limit."""
+    """Run an entry point and return the check of its error, within the limit of the policy.
+
+    The check also has the tolerance and the error amplification, which determine its limit.
+    """
     one = tried()
     found, tolerance = judge(name, one, truth, policy), tolerance_of(one)
     growth = truth.flow.amplification

@@ -18,7 +18,10 @@ _GROUPS = (
 def checks_report(
     verb: str, checks: Sequence[Check], text: Sequence[Section], **extra: Any
 ) -> Report:
-    """Return the report of checks: `text` is printed, `extra` is added to the record."""
+    """Return the report of a verb's checks: sections for the screen, JSON record and JUnit cases.
+
+    `text` has the sections that are printed, and `extra` has further fields of the JSON record.
+    """
     return Report(
         verb,
         text,
@@ -42,9 +45,10 @@ def _failure(check: Check) -> str:
 def summary(
     title: Sequence[str], checks: Sequence[Check], depth: int = 1, more: Section = ()
 ) -> list[Section]:
-    """Return the failures, then a row for each group of checks that share `depth` parts.
+    """Return the printed sections: title, failures, a table of groups of checks, and verdict.
 
-    `more` is printed between these rows and the verdict.
+    A group has the checks whose ids share their first `depth` parts. The section `more` is printed
+    between the table and the verdict.
     """
     groups: dict[str, list[Check]] = {}
     for check in checks:
@@ -57,7 +61,11 @@ def summary(
 
 
 def told_singly(checks: Sequence[Check]) -> list[str]:
-    """Return each failed check with its replay; if the checks are few, also those that passed."""
+    """Return lines that show each failed check, with the command that repeats it.
+
+    At most `_MOST_FAILURES` are shown. If there are no more than `_FEW` checks, the lines also show
+    those that passed.
+    """
     failed = [check for check in checks if not check.passed]
     lines = []
     for check in failed[:_MOST_FAILURES]:
@@ -85,11 +93,12 @@ _SAMPLES = (
 
 
 def samples(checks: Sequence[Check], rounding: float) -> Section:
-    """Return a table of the worst error over the tolerance, by entry point and band of tolerances.
+    """Return a table of the worst ratio of error to tolerance, by entry point and tolerance.
 
-    Rounding, `rounding` times the error amplification, is subtracted from the error first. There
-    are columns for three ranges of the error amplification: the number of checks with a result, and
-    the worst of them.
+    Only checks of random scenes count. `rounding` is the relative rounding error for an error
+    amplification of 1. Before division by the tolerance, `rounding` times the error amplification
+    is subtracted from the error. For each of three ranges of the error amplification, the table has
+    the number of checks with a result, and the worst ratio among them.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:
@@ -110,7 +119,7 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
 
 
 def verdict(checks: Sequence[Check]) -> str:
-    """Return a line with the number of checks and of failures."""
+    """Return a line with the number of checks and the number of failed ones."""
     failed = sum(not check.passed for check in checks)
     made = counted(len(checks), "check")
     return f"{made}, {failed} failed" if failed else f"{made}, all well"

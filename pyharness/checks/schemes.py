@@ -1,7 +1,8 @@
 """Checks of the corrected programs against their schemes, by recomputing every step.
 
-Both languages could be wrong alike, by less than an order shows. Here each step starts from the
-program's own state before it, so that only the rounding of one step may differ.
+Fortran and the Python twin could have the same fault, too small to change the order. Here the
+scheme starts each step from the program's own state before that step. The two results may therefore
+differ only by the rounding of one step.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,18 +28,23 @@ _ROUNDINGS = 32.0
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """One stage, or collocation point, of every step; columns are U1 ... U3, V1 ... V3."""
+    """One stage, or one collocation point, of every step of a run: its states and its rates.
 
-    # shape (n, 6); the arguments of the right-hand sides (rad/s, m/s), and their values per second
+    The columns of each array are U1, U2, U3 (omega) and V1, V2, V3 (translational velocity).
+    """
+
+    # shape (n, 6); the arguments of the right-hand sides (rad/s, m/s), and the right-hand sides
+    # (rad/s2, m/s2)
     state: Array
     rate: Array
     rounding: Array  # shape (n, 6); bound on the difference of two computations of the rate
 
 
 def schemes(chosen: Selection) -> Iterator[Attempt]:
-    """Compare every step of the corrected programs with its scheme, for omega and velocity.
+    """Yield deferred checks that compare every step of the corrected programs with its scheme.
 
-    The value of a check is the largest ratio of a difference to the rounding bound.
+    The value of a check is the largest ratio of a difference in omega or translational velocity to
+    its rounding bound. The limit is 1.
     """
     for case in cases(chosen, (7,)):
         for program in PROGRAMS:
@@ -61,18 +67,18 @@ def _held(scene: Scene, name: Name) -> Check:
 
 
 def is_whole(scene: Scene, run: Trajectory) -> bool:
-    """Return whether a run has all its rows, with velocity."""
+    """Return whether a run has a row for every step of the scene, with translational velocity."""
     return run.velocity is not None and len(run.omega) == len(run.velocity) == scene.steps
 
 
 def rows(run: Trajectory) -> Array:
-    """Return U and V after every step, shape (n, 6)."""
+    """Return omega (rad/s) and translational velocity (m/s) after every step, shape (n, 6)."""
     assert run.velocity is not None
     return np.hstack([run.omega, run.velocity])
 
 
 def stages(scene: Scene, run: Trajectory) -> tuple[Stage, Stage, Stage, Stage]:
-    """Return the four stages of W. Kutta (1901) in every step of a complete run."""
+    """Return the four stages of the scheme of W. Kutta (1901) in every step of a complete run."""
     h = scene.step_size
     first = _beginning(scene, run)
     second = _stage(scene, 0.5, first.state + 0.5 * h * first.rate)
@@ -82,7 +88,11 @@ def stages(scene: Scene, run: Trajectory) -> tuple[Stage, Stage, Stage, Stage]:
 
 
 def _scheme(name: str, scene: Scene, run: Trajectory) -> tuple[Array, Array]:
-    """Return U and V after every step, and the rounding that is allowed for them."""
+    """Return the state after every step by a program's scheme, and the bound of its rounding.
+
+    `name` is the program. Each step starts from the state of `run` before the step. Both arrays
+    have the shape (n, 6), with omega (rad/s) and translational velocity (m/s).
+    """
     if name not in PARTS:
         kutta = stages(scene, run)
         return _put_together(scene, kutta[0], kutta, (1 / 6, 1 / 3, 1 / 3, 1 / 6), 1.0)
@@ -90,7 +100,7 @@ def _scheme(name: str, scene: Scene, run: Trajectory) -> tuple[Array, Array]:
     parts = np.array([float(part) for part in PARTS[name]])
     powers = np.arange(1, len(parts) + 1)
     matrix = np.power.outer(parts, powers - 1)
-    # Integrate the polynomial through the rates at the points over the step.
+    # Integrate the polynomial through the rates at the collocation points over the step.
     weights = np.linalg.solve(matrix.T, 1.0 / powers)
     points = [
         _stage(scene, part, first.state + part * scene.step_size * first.rate) for part in parts
@@ -120,9 +130,10 @@ def _beginning(scene: Scene, run: Trajectory) -> Stage:
 
 
 def _stage(scene: Scene, part: float, state: Array) -> Stage:
-    """Return the rates of equations 16-18 and of dV/dt = F/m - omega x V in every step.
+    """Return the rates of the given states in every step, with a bound of their rounding.
 
-    `part` is the fraction of a step at which they are taken.
+    `state` has the shape (n, 6), one row for each step. The rates are those of equations 16-18 and
+    of dV/dt = F/m - omega x V. `part` is the fraction of a step at which the torque is taken.
     """
     omega, velocity = state[:, :3], state[:, 3:]
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)

@@ -18,26 +18,29 @@ RECORD = Path(__file__).parent.parent.parent / "tests" / "golden"
 
 @dataclass(frozen=True)
 class Selection:
-    """The selection of what `verify` checks."""
+    """The checks that one run of `verify` makes, with the seed and the files that they use."""
 
     only: Sequence[str] = ()  # leading parts of names, as in ``cells/two-term``; empty: all
     seed: str = field(default_factory=weekly_seed)  # of the random draws; by default the week
     draws: int = DRAWS  # number of random draws
     record: Path = RECORD  # folder of the golden record; by default the checkout's
-    # with published figures; None selects the problems of the package
+    # problems with published results; None selects the problems of the package
     problems: Sequence["Problem"] | None = None
-    thin: bool = False  # a part of every kind, for `verify --self-test`
+    thin: bool = False  # only a few checks of every kind, for `verify --self-test`
 
     def asks(self, id: str) -> bool:
         """Return whether the check with this id is requested."""
         return selected(id, self.only)
 
     def may_ask(self, id: str) -> bool:
-        """Return whether a check below this id may be requested."""
+        """Return whether a check whose id begins with this id may be requested."""
         return may_hold(id, self.only)
 
     def drawn(self, number: int, subject: str = "") -> Name:
-        """Return the name of a check of a random draw."""
+        """Return the name of the check of `subject`, a program or method, in random draw `number`.
+
+        The options of the name repeat the draw.
+        """
         draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
         options = f"{draws} --seed {shlex.quote(self.seed)}"
         return Name("random", subject, str(number), options=options)

@@ -1,8 +1,8 @@
 """Checks of the Runge-Kutta program's stop test against eq. 19, recomputed along its own run.
 
-Both languages could test the wrong quantity alike. Here the quotients of all steps are computed
-first. The program is then run with constants just below and just above each quotient that exceeds
-all earlier ones.
+Fortran and the Python twin could both test the same wrong quantity. Here the quotients of all steps
+are computed first. The program is then run with stop constants just below and just above each
+quotient that exceeds all earlier ones.
 """
 
 from collections.abc import Callable, Iterator
@@ -30,7 +30,11 @@ Stages = tuple[Stage, Stage, Stage, Stage]
 
 @dataclass(frozen=True, eq=False)
 class Quotients:
-    """Change of K over change of U in every step, in the order of the program's tests."""
+    """The quotients that the program tests in every step, in the order of its tests.
+
+    A quotient is the change of K over the change of U within a step, where K is the right-hand side
+    and U the state.
+    """
 
     values: Array  # shape (n, m), 1/s
     rounding: Array  # shape (n, m); bound on the difference of two computations
@@ -38,10 +42,11 @@ class Quotients:
 
 
 def stops(chosen: Selection) -> Iterator[Attempt]:
-    """Compare the program's stopping step, variable and quotient with the formula.
+    """Yield deferred checks that compare where the program stops with where eq. 19 requires it.
 
-    This is done for every form of the test that a listing can have. The value of a check is the
-    largest ratio of a quotient's difference to its rounding bound.
+    The number of the step, the variable and the quotient are compared, for every form of the test
+    that a listing can have. The value of a check is the largest ratio of a quotient's difference to
+    its rounding bound. The limit is 1.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):
@@ -53,7 +58,10 @@ def stops(chosen: Selection) -> Iterator[Attempt]:
 
 
 def _run(scene: Scene) -> tuple[Trajectory, Stages | None]:
-    """Return a run that no test stops, and the stages of its steps if it is complete."""
+    """Return a run of the corrected program without the stop test, and the stages of its steps.
+
+    The stages are None if the run is not complete.
+    """
     run = PROGRAM_REGISTRY[_PROGRAM].run(scene, corrected(_PROGRAM), may_stop=False)
     return run, stages(scene, run) if is_whole(scene, run) else None
 
@@ -107,7 +115,7 @@ def _quotients(scene: Scene, run: Trajectory, kutta: Stages, listing: Listing) -
 
 
 def _constants(quotients: Quotients) -> list[float]:
-    """Return constants on both sides of each quotient that exceeds all quotients of earlier steps.
+    """Return stop constants (1/s) on both sides of each quotient that exceeds all earlier ones.
 
     Each constant differs by more than rounding from all quotients of its step.
     """
@@ -122,7 +130,10 @@ def _constants(quotients: Quotients) -> list[float]:
 
 
 def _due(quotients: Quotients, constant: float) -> Stop | None:
-    """Return the stop at the first quotient above `constant`, or None."""
+    """Return the stop that must occur with a stop constant (1/s); None if none must occur.
+
+    It is at the first quotient above the constant.
+    """
     above = np.argwhere(quotients.values > constant)
     if not len(above):
         return None

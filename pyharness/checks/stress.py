@@ -1,4 +1,4 @@
-"""Stress trials of numerical stability up to its limits, with bounds derived beforehand."""
+"""Stress trials: checks of methods under extreme conditions, with bounds derived beforehand."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,12 +16,16 @@ TRIALS = (
 LISTINGS = tuple(f(program) for program in PROGRAMS for f in (original, corrected))
 
 named = partial(Name, command="stress")
-"""Return the name of a check of a trial."""
+"""Return the name of a check of a trial, a `Name` with the command `stress`."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A named trial: its title, the origin of its bound, and the attempts that `only` requests."""
+    """A group of checks of `stress` under one kind of extreme conditions.
+
+    `bound` explains the origin of the limits. `attempts` takes leading parts of ids, and returns
+    the attempts that may make the requested checks.
+    """
 
     name: str
     title: str
@@ -30,20 +34,24 @@ class Trial:
 
 
 def trial(name: str) -> Trial:
-    """Return the trial with a name of `TRIALS`."""
+    """Return the trial with the given name, one of `TRIALS`; its module is imported here."""
     found: Trial = import_module(f"pyharness.checks.trials.{name.replace('-', '_')}").TRIAL
     return found
 
 
 def stress(only: Sequence[str] = ()) -> Iterator[Check]:
-    """Make the checks whose ids begin as in `only`, as in ``separatrix/taylor``; by default all."""
+    """Yield the checks of all trials whose ids begin as in `only`, as in ``separatrix/taylor``.
+
+    Without `only`, yield the checks of all trials.
+    """
     suites = {name: lambda name=name: trial(name).attempts(only) for name in TRIALS}
     return run_suites(suites, only, "stress")
 
 
 def worst(checks: Iterable[Check]) -> dict[str, Check]:
-    """Return the check with the largest ratio to its limit, for each trial and subject.
+    """Return the check with the largest ratio of value to limit, by trial and method.
 
+    The keys have the form ``shapes/auto``. A failed check counts as worse than one that passed.
     Only checks with a limit and a scene are considered.
     """
     found: dict[str, Check] = {}

@@ -20,7 +20,7 @@ _NOTE = (
 
 
 def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
-    """Return the report: the failures, then a table for each trial; each trial has a figure."""
+    """Return the report of `stress`: the failures, then a table and a picture for each trial."""
     text: list[Section] = [told_singly(checks), [_NOTE]]
     for each in trials:
         own = [check for check in checks if check.suite == each.name]

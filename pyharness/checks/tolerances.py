@@ -20,7 +20,7 @@ from pyharness.theory.conditioning import Conditioning
 OF_CASES = (1e-3, 1e-6, 1e-9, 1e-12)
 _SCIPY_OF_CASES = (1e-6, 1e-9)
 _OF_SELF_TEST = 1e-9
-# A middling tolerance. If a motion is violent, the next one of the ladder is used.
+# A middling tolerance, and the tolerances that are tried if a finer one is not possible.
 MIDDLING = 1e-6
 _LADDER = (1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-7, MIDDLING, 1e-5, 1e-4, 1e-3)
 # At their finest tolerances these methods take minutes, where the others take seconds.
@@ -33,7 +33,10 @@ _STAGES = {"dop853": 12, "lsoda": 2, "radau": 20, "rk45": 6}
 
 
 def of_case(name: str, thin: bool) -> list[float]:
-    """Return the tolerances at which a method is tried in a case; `thin` is for the self-test."""
+    """Return the tolerances at which the method `name` is tried in a case.
+
+    With `thin`, which the self-test sets, there is only one tolerance.
+    """
     finest = METHODS[name].finest
     if name in SCIPY_METHODS:
         return [_SCIPY_OF_CASES[0]] if thin else list(_SCIPY_OF_CASES)
@@ -43,10 +46,10 @@ def of_case(name: str, thin: bool) -> list[float]:
 
 
 def finest(name: str, scene: Scene, time: float) -> float:
-    """Return the finest tolerance at which a method is tried until `time` (s).
+    """Return the finest tolerance at which the method `name` is tried until `time` (s).
 
-    It is the finest that the method claims. If `solve_ivp` can't meet that in the scene, it is the
-    next one of the ladder.
+    It is the finest that the method claims to meet. If a method of `solve_ivp` can't meet this
+    tolerance in the scene, it is the finest value of `_LADDER` that the method can meet, or 1.
     """
     met = finest_of(name, scene, time)
     claimed = REGISTRY[name].finest
@@ -54,7 +57,11 @@ def finest(name: str, scene: Scene, time: float) -> float:
 
 
 def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
-    """Return two tolerances at which a method is tried: its finest and a middling one."""
+    """Return the tolerances at which a method is tried until `time` (s).
+
+    They are its finest tolerance, and 1e-6 if this is coarser. A method that is slow at its finest
+    tolerance is tried only at 1e-6.
+    """
     if name in _ONLY_MIDDLING:
         return [MIDDLING]
     least = finest(name, scene, time)
@@ -62,10 +69,11 @@ def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
-    """Return the tolerances to try: the finest within the work limit, and a middling one.
+    """Return the tolerances at which the method `name` is tried until `time` (s).
 
-    None means the scene's own steps. They are used for methods with a fixed step, and also for
-    Gauss collocation.
+    They are the finest tolerance within the work limit, and a middling one. An element None means
+    the scene's own steps. These are used for methods with a fixed step, and also for Gauss
+    collocation. `flow` has the error amplification of the scene, on which the work depends.
     """
     if name in FIXED_STEP:
         return [None]
@@ -73,8 +81,8 @@ def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list
         return [METHODS["closed-form"].finest]
     least = FEW_DIGITS if name == "quick" else finest(name, scene, time)
     if name in GAUSS:
-        # The two solutions that must agree can't if rounding separates them. Take the next
-        # tolerance of the ladder.
+        # The two solutions that must agree can't if rounding separates them. A coarser tolerance of
+        # `_LADDER` is then taken.
         meetable = [each for each in _LADDER if each >= 4.0 * flow.rounding]
         least = max(least, min(meetable, default=math.inf))
     radians = speed(scene, flow.largest) * abs(time)
@@ -96,10 +104,14 @@ def _within_budget(name: str, least: float, radians: float, amplification: float
 
 
 def _cost(name: str, tolerance: float, radians: float, amplification: float) -> float:
-    """Return an estimate of the right-hand sides that a tolerance takes."""
+    """Return an estimate of the number of right-hand sides that a method takes at a tolerance.
+
+    `radians` is the fastest rate of the motion times the time, and `amplification` is the error
+    amplification. The estimate is 0 for a method without a work limit.
+    """
     if name in GAUSS:
         stages = int(name[-1])
-        # Steps of z radians cause an amplified error of amplification times radians times z**order.
+        # Steps of z radians cause an error of amplification times radians times z**order.
         z = math.pow(tolerance / (max(radians, 1.0) * amplification), 0.5 / stages)
         return 12.0 * stages * radians / min(z, 1.0)
     if name in SCIPY_METHODS:

@@ -1,4 +1,4 @@
-"""Checks of machine words: CDC vectors; our arithmetic against the processor and Fortran."""
+"""Checks of machine arithmetics: vectors of the CDC, and runs in our own arithmetic."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -21,11 +21,16 @@ _THIN_CASE = 3
 
 
 def words(chosen: Selection) -> Iterator[Attempt]:
-    """Check every CDC vector, the twin in `Word(53)` against floats, and Fortran in its words.
+    """Yield deferred checks of our arithmetic of machine words, bit for bit.
 
-    Runs are compared bit for bit. If words are requested by name, every cell is checked. Otherwise
-    only the cells with all defects, one or none are checked. Of these, Fortran is run with all or
-    none.
+    The test vectors of the CDC's arithmetic are checked first. Then, in each cell (program, case
+    and listing), two comparisons of runs follow. The Python twin in our arithmetic of 53 bits must
+    agree with the twin in floats. The compiled program in other words must agree with the twin in
+    the same words.
+
+    Every cell is checked if `chosen.only` requests some checks. Otherwise the first comparison
+    covers listings that are original or have at most one defect or reading. The second covers the
+    original and the corrected listings.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -62,11 +67,11 @@ def _same(name: Name, one: Trajectory, other: Trajectory) -> Check:
 
 
 def _has_all_or_none(listing: Listing) -> bool:
-    """Return whether a listing is the original or the corrected one."""
+    """Return whether a listing is the original program without readings, or the corrected one."""
     return listing.label != "custom" and not listing.readings
 
 
 def _is_few(listing: Listing) -> bool:
-    """Return whether a listing has all defects, one or none; or only a single reading."""
+    """Return whether a listing is the original program, or has at most one defect or reading."""
     few = len(listing.defects) + len(listing.readings) <= 1
     return few or _has_all_or_none(listing)

@@ -1,4 +1,4 @@
-"""The command line, and the functions that write its text to a stream."""
+"""The command line, and the functions that write its text to stdout and stderr."""
 
 import sys
 from contextlib import suppress
@@ -11,10 +11,10 @@ _LAYOUT = "\n\t\f"
 
 
 def shown(text: str) -> str:
-    """Return a text in the form in which this program writes it to a terminal or a file.
+    """Return a text with its control characters replaced by escape sequences.
 
-    Names may come from third-party files and command lines. Their control characters could steer a
-    terminal, and are replaced by escape sequences; no other function does this.
+    Names may come from third-party files and command lines, and their control characters could
+    steer a terminal. Reports and messages are therefore written through this function.
     """
     return printable(text, _LAYOUT)
 
@@ -29,7 +29,7 @@ def write_text(stream: TextIO, text: str) -> None:
 
 
 def say(text: str) -> None:
-    """Write to stderr; a failure, as of a full or closed stderr, does not end the command."""
+    """Write a text to stderr; a failure to write, as to a closed stderr, is ignored."""
     with suppress(OSError, ValueError):
         write_text(sys.stderr, text)
         sys.stderr.flush()

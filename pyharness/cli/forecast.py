@@ -1,4 +1,7 @@
-"""Limits and forecasts of the run time of random draws, checked before the first draw."""
+"""Limits of the number of random draws, and forecasts of their run time.
+
+Both are applied before the first draw.
+"""
 
 from typing import NamedTuple
 
@@ -9,22 +12,29 @@ _WORTH_SAYING = 60.0  # s
 
 
 class Cost(NamedTuple):
-    """The cost of one draw, measured on one core of 2026, and the largest number of draws."""
+    """The cost of one random draw in time and memory, and the largest allowed number of draws.
 
-    what: str  # name of the drawn things, in the plural
-    seconds: float
-    n_bytes: float
-    most: int
+    The cost was measured on one core of 2026.
+    """
+
+    what: str  # plural noun for the draws, as in "random scenes"
+    seconds: float  # per draw
+    n_bytes: float  # per draw
+    most: int  # largest allowed number of draws
 
 
-# A draw makes nearly three checks; each stays in memory until the report.
+# A draw leads to nearly three checks; each check stays in memory until the report.
 CHECKS = Cost("random draws", 0.035, 2e3, 1_000_000)
-# A scene runs every contender with every setting, and the reference.
+# Every contender runs with every setting on a scene, and so does the reference.
 SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 
 
 def check_count(option: str, count: int, least: int, cost: Cost) -> None:
-    """Raise InputError if a number of draws is not allowed; print a forecast of a long run."""
+    """Raise InputError if a number of random draws is not allowed.
+
+    `option` is the option with the number `count`, and `least` the smallest allowed number. If the
+    draws will take more than a minute, print a forecast of time and memory.
+    """
     from pyharness.ensembles.forecast import duration
 
     if not least <= count <= cost.most:

@@ -1,7 +1,7 @@
 """Ctrl-C on the command line: one line on stderr and exit status 130, at any time.
 
 A KeyboardInterrupt can be raised between any two instructions, and not all code propagates it. An
-import may replace it by another exception; a finalizer or a callback drops it. This module
+import may replace it by another exception, and a finalizer or a callback may drop it. This module
 therefore records the signal itself, and raises KeyboardInterrupt again if it was dropped.
 """
 
@@ -27,14 +27,18 @@ LINE = "pyharness: interrupted\n"
 
 
 class _Interruption:
-    """The number of interrupts by the user, whether they were reported, and the signal handlers."""
+    """The state of interruption of this process, and the handlers of its signals.
+
+    `count` is the number of interrupts by the user, and `is_reported` is true once the user was
+    told.
+    """
 
     def __init__(self) -> None:
         self.count = 0
         self.is_reported = False
 
     def leave_at_once(self, *_: object) -> None:
-        """End the process at once, without any cleanup."""
+        """End the process at once with exit status 130, without any cleanup; a signal handler."""
         try:
             if not self.is_reported:
                 os.write(2, LINE.encode())
@@ -42,7 +46,11 @@ class _Interruption:
             os._exit(CODE)
 
     def interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Raise KeyboardInterrupt, and start the timer that raises it again if it is dropped."""
+        """Raise KeyboardInterrupt; this is the handler of SIGINT.
+
+        A timer is started that raises the exception again if it is dropped. The third interrupt
+        ends the process at once.
+        """
         self.count += 1
         if self.count >= _MOST:
             self.leave_at_once()
@@ -62,17 +70,17 @@ _SHOW_WARNING = warnings.showwarning
 
 
 def came() -> bool:
-    """Return whether the user has interrupted this command."""
+    """Return whether the user has interrupted this command by Ctrl-C."""
     return _STATE.count > 0
 
 
 def leave_when_interrupted() -> bool:
-    """Make Ctrl-C end the process at once with its line; return False if SIGINT is ignored.
+    """Make Ctrl-C end the process at once, and return True; return False if SIGINT is ignored.
 
-    This handler is for times that need no cleanup: while modules are imported, and after the
-    results are written.
+    The handler prints one line on stderr. It is for times that need no cleanup: while modules are
+    imported, and after the results are written.
     """
-    # A shell starts a background process with SIGINT ignored; it remains ignored.
+    # A shell starts a background process with SIGINT ignored. It then remains ignored.
     if not callable(signal.getsignal(signal.SIGINT)):
         return False
     signal.signal(signal.SIGINT, _STATE.leave_at_once)
@@ -80,7 +88,10 @@ def leave_when_interrupted() -> bool:
 
 
 def run_interruptible(main: Callable[[], int]) -> int:
-    """Run a command and return its exit status, 130 if the user interrupted it."""
+    """Run a command, the function `main`, and return its exit status.
+
+    The exit status is 130 if the user interrupted the command.
+    """
     hook, escaped, code = sys.unraisablehook, False, CODE
     try:
         sys.unraisablehook = _quiet_of(hook)
@@ -102,7 +113,7 @@ def run_interruptible(main: Callable[[], int]) -> int:
 
 
 def report() -> int:
-    """Print the line that reports the interrupt, once, and return the exit status."""
+    """Print the line that reports the interrupt, once, and return exit status 130."""
     if not _STATE.is_reported:
         _STATE.is_reported = came()
         end_progress()
@@ -111,11 +122,11 @@ def report() -> int:
 
 
 def leave(code: int) -> None:
-    """Remove temporary files and end the process with an exit status.
+    """Remove temporary files and end the process with the exit status `code`.
 
-    The normal exit of Python would wait for threads and free all memory piece by piece. It would
-    drop an interrupt, or end by its signal. After an interrupt this function waits for no process
-    and, beyond the time limit of the cleanup, for no thread.
+    The normal exit of Python would wait for threads and free all memory piece by piece. On Ctrl-C
+    it would drop the interrupt, or end by its signal. After an interrupt this function ends child
+    processes, and waits at most two seconds for the cleanup.
     """
     if code == CODE:
         # The interrupt was reported; messages of ending threads and finalizers are suppressed.
@@ -138,7 +149,7 @@ def leave(code: int) -> None:
 
 
 def _is_on_its_way() -> bool:
-    """Return whether a KeyboardInterrupt is being handled, so that cleanup is running now."""
+    """Return whether code is running now that handles a KeyboardInterrupt, as in a cleanup."""
     error: BaseException | None = sys.exception()
     while error is not None:
         if isinstance(error, KeyboardInterrupt):
@@ -161,7 +172,10 @@ def _show_warning(
 
 
 def _quiet_of(hook: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return a hook for unraisable exceptions that does not report KeyboardInterrupt."""
+    """Return a hook for unraisable exceptions that suppresses KeyboardInterrupt after Ctrl-C.
+
+    Any other exception is passed to `hook`.
+    """
 
     def told(unraisable: Any) -> None:
         if not (came() and issubclass(unraisable.exc_type, KeyboardInterrupt)):

@@ -42,8 +42,10 @@ _GROUPS = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit status.
 
-    It is 0 for expected results, 1 for an unexpected difference, 2 for wrong usage or input, 3 if
-    the extension is not built, and 130 after an interrupt.
+    `arguments` follow the name of the command, and are by default the arguments of this process.
+    The exit status is 0 for expected results and 1 for an unexpected result, such as a failed
+    check. It is 2 for wrong usage or input, 3 if the extension is not built, and 130 after an
+    interrupt.
     """
     # A command is short. Garbage collection during the imports costs 4 % and frees nothing.
     gc.set_threshold(100_000)
@@ -103,7 +105,10 @@ def _run(arguments: list[str]) -> int:
 
 
 def _complete() -> int:
-    """Return the completions of the line typed so far to a shell that uses argcomplete."""
+    """Print the completions of a partly typed command line for a shell that uses argcomplete.
+
+    Return the exit status, which is 1 if argcomplete is not installed.
+    """
     from argparse import ArgumentParser
 
     try:

@@ -1,4 +1,4 @@
-"""Options that verbs share: their declaration, parsing and rejection."""
+"""Options that verbs (subcommands) share: their declaration, parsing and rejection."""
 
 import argparse
 import math
@@ -21,7 +21,8 @@ from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.scene_file import case_numbers, case_scene, read_scene
 
 FORMATS = ("table", "json", "csv", "markdown")
-# Options that several verbs share, each with its help; an option without a placeholder is a switch.
+# Options that several verbs share, each with its help. An option without a placeholder takes no
+# value.
 SCENE = {
     "--case N": "Take the scene of this case of Table 1, 1 to 7.",
     "--scene FILE": "Take the scene from this scene file (TOML).",
@@ -63,10 +64,13 @@ class _Formatter(argparse.HelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose error messages are one line and suggest the nearest name."""
+    """The parser of one verb, whose error messages are one line and suggest the nearest name."""
 
     def __init__(self, verb: str, description: str = "") -> None:
-        """Declare the OPTIONS of a verb's module."""
+        """Declare the options of a verb, which are the OPTIONS of its module.
+
+        `description` is the line of the overview about the verb.
+        """
         self._width = _WIDEST
         self.module = import_module(f"pyharness.cli.verbs.{verb}")
         super().__init__(
@@ -93,22 +97,26 @@ class Parser(argparse.ArgumentParser):
         groups["output"].add_argument("-h", "--help", action="help", help="Print this help.")
 
     def format_help(self) -> str:
-        """Return the help in the width of the terminal or COLUMNS, limited to 80 to 100 columns."""
+        """Return the help text in the width of the terminal, but from 80 to 100 columns wide."""
         from shutil import get_terminal_size
 
         self._width = min(max(get_terminal_size().columns, _NARROWEST), _WIDEST)
         return super().format_help()
 
     def error(self, message: str) -> NoReturn:
-        """Raise InputError; argparse would print the usage."""
+        """Raise InputError with the message, because argparse would print the usage too."""
         raise InputError(message)
 
     def option_names(self) -> list[str]:
-        """Return the names of all options."""
+        """Return the names of all options of the verb, as in ``--case``."""
         return [name for name in self._option_string_actions if name.startswith("--")]
 
     def read(self, verb: str, arguments: Sequence[str]) -> argparse.Namespace:
-        """Return the options of a command line; raise InputError if an option is unknown."""
+        """Return the parsed options of a command line.
+
+        `arguments` are those after the name of the verb. Raise InputError if an option or the
+        output format is unknown.
+        """
         options, rest = self.parse_known_args(self._joined(arguments))
         if rest:
             raise unknown("option", rest[0], self.option_names(), verb)
@@ -120,7 +128,10 @@ class Parser(argparse.ArgumentParser):
         return options
 
     def _joined(self, arguments: Sequence[str]) -> list[str]:
-        """Join a value that begins with a minus sign to its option; argparse would reject it."""
+        """Return the arguments with each negative number joined to its option, as in --x=-1.
+
+        Otherwise argparse would take the number for an option.
+        """
         result: list[str] = []
         for argument in arguments:
             if result and result[-1] in self.option_names() and _NEGATIVE.match(argument):
@@ -131,7 +142,11 @@ class Parser(argparse.ArgumentParser):
 
 
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "Draw a picture") -> dict[str, str]:
-    """Return the output options; `plot` is the help text of --plot, empty to omit --plot."""
+    """Return the options --format, --plot and --out, each with its help text.
+
+    `formats` are the allowed formats, the default first. `plot` is the beginning of the help text
+    of --plot; if it is empty, there is no --plot.
+    """
     first, *others = formats
     form = {"--format F": f"Form of the result: {first} (default), {', '.join(others)}."}
     picture = {"--plot FILE": f"{plot} in this file, and write its numbers beside it as CSV."}
@@ -140,19 +155,22 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "Draw a picture") -> d
 
 
 def chosen_effort(options: argparse.Namespace) -> float:
-    """Return the factor on the work limits."""
+    """Return the factor on the work limits that --effort gives, by default 1."""
     return positive(options.effort, "--effort", 1.0)
 
 
 def chosen_tolerance(options: argparse.Namespace) -> float | None:
-    """Return the requested tolerance, or None for the default of the method."""
+    """Return the relative tolerance that --tolerance gives, or None for the method's default."""
     if options.tolerance is None:
         return None
     return positive(options.tolerance, "--tolerance", 1.0)
 
 
 def chosen_seed(options: argparse.Namespace) -> str | None:
-    """Return the seed of random draws; raise InputError if it has unprintable characters."""
+    """Return the seed of random draws that --seed gives, or None if it is not given.
+
+    Raise InputError if the seed has unprintable characters.
+    """
     if options.seed is not None and not options.seed.isprintable():
         raise InputError("--seed: has letters that can't be printed; allowed: any others")
     seed: str | None = options.seed
@@ -160,13 +178,20 @@ def chosen_seed(options: argparse.Namespace) -> str | None:
 
 
 def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
-    """Raise InputError if the value `name` of the option --`what` is given but not allowed."""
+    """Raise InputError if the value of an option is given, but is not one of `allowed`.
+
+    `what` is the name of the option without its dashes, and `name` its value, None if not given.
+    """
     if name is not None and name not in allowed:
         raise unknown(what, name, allowed, f"--{what}")
 
 
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
-    """Return the names in --only, as in kind/check; raise InputError if a kind is unknown."""
+    """Return the names in the value of --only, each a kind of check, or kind and check, as in a/b.
+
+    `text` is the value of --only, None if not given. `what` is the noun for a kind in a message.
+    Raise InputError if a kind is not one of `allowed`.
+    """
     only = names(text)
     for each in only:
         if each.partition("/")[0] not in allowed:
@@ -177,10 +202,11 @@ def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[st
 def chosen_scene(
     options: argparse.Namespace, any_axes: bool = False, any_torque: bool = False
 ) -> Scene:
-    """Return the requested scene; warn if no rigid body can have its moments.
+    """Return the scene that --case or --scene requests, with the changes by further options.
 
-    Raise InputError for a full inertia matrix unless `any_axes`, and for a torque about the axes
-    of space unless `any_torque`.
+    The further options are --omega0, --step-size and --steps. A warning is printed if no rigid body
+    can have the moments, or if the attitude was normalised. Raise InputError for a full inertia
+    matrix unless `any_axes`, and for a torque about the axes of space unless `any_torque`.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -214,13 +240,17 @@ def _norm(length: float) -> str:
 
 
 def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
-    """Return the requested program, or all three by default."""
+    """Return the program that --program names in a tuple, or by default all three programs."""
     check_known("program", options.program, PROGRAMS)
     return PROGRAMS if options.program is None else (options.program,)
 
 
 def chosen_listing(options: argparse.Namespace) -> Listing:
-    """Return the requested listing of the requested program."""
+    """Return the listing of the requested program that --listing, --fix and --keep describe.
+
+    The options --reading and --conjecture are taken into account too. A requested name without
+    effect leads to a warning.
+    """
     chosen_programs(options)
     listing = subset(
         options.program,
@@ -235,7 +265,7 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
 
 
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
-    """Warn of requested readings and conjectures that have no effect."""
+    """Print a warning for each requested reading or conjecture that is active in no listing."""
     asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
     active = {name for listing in listings for name in listing.active}
     for name in sorted(asked - active - set(names(options.fix))):
@@ -243,7 +273,7 @@ def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> N
 
 
 def listing_text(listing: Listing) -> str:
-    """Return a description of a listing in one line."""
+    """Return a description of a listing in one line: its label and the active names."""
     active = ", ".join(sorted(listing.defects)) or "no defects"
     more = {"readings": listing.readings, "conjectures": listing.conjectures}
     told = [f"; {what}: {', '.join(sorted(names))}" for what, names in more.items() if names]
@@ -251,7 +281,9 @@ def listing_text(listing: Listing) -> str:
 
 
 def chosen_lipschitz(options: argparse.Namespace) -> float:
-    """Return the constant of the stop test (1/s), by default the constant of the decks.
+    """Return the constant of the stop test (1/s) that --lipschitz gives.
+
+    The default is the constant on the cards of the programs.
 
     Raise InputError if the program has no stop test but one of its options is given, or if both
     --no-stop and --lipschitz are given.
@@ -264,24 +296,30 @@ def chosen_lipschitz(options: argparse.Namespace) -> float:
 
 
 def refuse(options: argparse.Namespace, chosen: str, names: Sequence[str]) -> None:
-    """Raise InputError if one of the options `names` is given; none has a meaning with `chosen`."""
+    """Raise InputError if an option is given that has no meaning with the option `chosen`.
+
+    `names` are the options that have no meaning, without dashes, as in "no_stop".
+    """
     for name in names:
         if getattr(options, name):
             raise InputError(f"--{name.replace('_', '-')} has no meaning with {chosen}")
 
 
 def names(text: str | None) -> list[str]:
-    """Return the names of a comma-separated list, as in a,b."""
+    """Return the names in a comma-separated list, as in a,b; the list is empty for None."""
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 
 def numbers(text: str, option: str) -> list[float]:
-    """Return the finite numbers of a comma-separated list, as in 1,2."""
+    """Return the finite numbers in a comma-separated list, as in 1,2.
+
+    `text` is the value of `option`, which an InputError names if the value is invalid.
+    """
     return [number(part, option) for part in text.split(",")]
 
 
 def number(text: str, option: str) -> float:
-    """Return a text as a finite number; raise InputError if it is none."""
+    """Return the value `text` of an option as a finite number; raise InputError if it is none."""
     try:
         value = float(text)
     except ValueError:
@@ -292,7 +330,10 @@ def number(text: str, option: str) -> float:
 
 
 def positive(text: str | None, option: str, default: float) -> float:
-    """Return a text as a number above 0, or the default for None."""
+    """Return the value `text` of an option as a number above 0, or `default` if it is None.
+
+    Raise InputError for any other value.
+    """
     if text is None:
         return default
     value = number(text, option)
@@ -302,7 +343,7 @@ def positive(text: str | None, option: str, default: float) -> float:
 
 
 def whole(text: str, option: str) -> int:
-    """Return a text as a whole number; raise InputError if it is none."""
+    """Return the value `text` of an option as a whole number; raise InputError if it is none."""
     try:
         return int(text)
     except ValueError:
@@ -315,7 +356,10 @@ def warn(message: str) -> None:
 
 
 def check_outputs(options: argparse.Namespace) -> None:
-    """Raise InputError before any computation if an output can't be written."""
+    """Raise InputError if the file of --out or --plot can't be written.
+
+    Verbs call this before any computation.
+    """
     picture = getattr(options, "plot", None)
     if picture is None and options.out is None:
         return
@@ -340,7 +384,8 @@ def show(
 ) -> None:
     """Write a report in the requested format, and its picture if --plot is given.
 
-    `own` maps the names of formats that only this report has to the functions that make them.
+    `own` maps a format that only this report has, as in "tape5", to a function that returns the
+    report in this format.
     """
     from pyharness.views.render import render
 
@@ -358,7 +403,7 @@ def show(
 
 
 def emit(content: str | bytes, out: str | None) -> None:
-    """Write a result to the file `out`, or to stdout for None."""
+    """Write `content`, a report or other result, to the file `out`; if `out` is None, to stdout."""
     if out is not None:
         from pyharness.cli.output import write_files
 

@@ -1,4 +1,4 @@
-"""Output files and folders, each written as a whole or not at all."""
+"""Writing of output files and folders, each as a whole or not at all."""
 
 import json
 import os
@@ -19,7 +19,11 @@ _LARGEST_MARK = 1 << 24  # bytes of the file that lists the files written by a v
 
 
 def check_writable(path: str, option: str) -> None:
-    """Raise InputError before any computation if a path can't be written."""
+    """Raise InputError if no file can be written at a path.
+
+    Callers check this before any computation. `option` is the option that gave the path, for the
+    message.
+    """
     try:
         # A link is followed to its target, as in an ordinary write.
         target = Path(os.path.realpath(path)) if "\0" not in path else Path()
@@ -54,7 +58,11 @@ def check_writable(path: str, option: str) -> None:
 
 
 def check_apart(picture: str, out: str) -> None:
-    """Raise InputError if the result would overwrite the picture or its numbers."""
+    """Raise InputError if the file of --out is also a file that --plot writes.
+
+    `picture` is the path in --plot, beside which the numbers are written as CSV. `out` is the path
+    in --out.
+    """
     for path, what in ((picture, "the picture"), (numbers_beside(picture), "its numbers")):
         if os.path.realpath(path) == os.path.realpath(out):
             raise InputError(
@@ -63,10 +71,12 @@ def check_apart(picture: str, out: str) -> None:
 
 
 def write_files(contents: dict[str, bytes], option: str) -> None:
-    """Write all files or none: first under temporary names, then all are renamed.
+    """Write several files, given by path, either all or none.
 
-    After any failure or interrupt, Ctrl-C included, the old files are restored. A path that is a
-    special file (a device, a pipe) is written to first, and never replaced.
+    The files are first written under temporary names, and then all are renamed. `option` is the
+    option that gave the paths, for a message. After any failure or interrupt, Ctrl-C included, the
+    old files are restored. A path that is a special file (a device, a pipe) is written to first,
+    and never replaced.
     """
     path = ""
     try:
@@ -98,7 +108,7 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
 
 
 class _DeferredInterrupt:
-    """A context that defers Ctrl-C, which would leave temporary files behind during cleanup."""
+    """A context that defers Ctrl-C, because an interrupt could leave temporary files behind."""
 
     def __enter__(self) -> Self:
         """Defer interrupts from now on."""
@@ -111,7 +121,7 @@ class _DeferredInterrupt:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Restore the handler, and call it if an interrupt was deferred."""
+        """Restore the previous signal handler, and call it if an interrupt was deferred."""
         if self._holds:
             signal.signal(signal.SIGINT, self._before)
         if self._came and callable(self._before):
@@ -127,7 +137,11 @@ class _DeferredInterrupt:
 
 
 class _File:
-    """A file being written: `new` is its temporary name, and `old` a copy of the old target."""
+    """A file that is being written.
+
+    `target` is its path, `new` the temporary path of the new content, and `old` the path of a copy
+    of the previous content.
+    """
 
     def __init__(self, path: str) -> None:
         self.path = path
@@ -175,12 +189,16 @@ def _remove(names: list[str]) -> None:
 
 
 def _is_special(path: str) -> bool:
-    """Return whether a path exists and is no ordinary file, but a device, a pipe or a folder."""
+    """Return whether a path exists and is not an ordinary file: a device, a pipe or a folder."""
     return Path(path).exists() and not Path(path).is_file()
 
 
 def check_folder(path: str, names: Iterable[str], option: str) -> None:
-    """Raise InputError before any computation if `names` can't be written in a folder."""
+    """Raise InputError if the files `names` can't be written in the folder `path`.
+
+    The folder may be missing if it can be made. Callers check this before any computation. `option`
+    is the option that gave the path, for the message.
+    """
     folder = Path(path)
     if not path or "\0" in path or os.path.lexists(folder):
         if not path or "\0" in path or not folder.is_dir():
@@ -195,10 +213,10 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
 
 
 def _why_not_made(folder: Path) -> str:
-    """Return the reason why a folder can't be made, after a colon; empty if it can.
+    """Return the reason why a folder can't be made, after a colon; an empty text if it can.
 
-    The folder is made and removed: permissions do not show that a name is too long, or that a
-    file system accepts no folder.
+    The folder is made and removed for this, because permissions do not show that a name is too
+    long, or that a file system accepts no folder.
     """
     if not folder.parent.is_dir():
         return ": there is no such folder"
@@ -211,7 +229,11 @@ def _why_not_made(folder: Path) -> str:
 
 
 def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
-    """Write all files or none into a folder, which is made if it is missing."""
+    """Write files into a folder, either all or none; a missing folder is made.
+
+    `path` is the folder, and `contents` are the contents of the files by name. `option` is the
+    option that gave the path, for a message.
+    """
     folder = Path(path)
     files = {str(folder / name): content for name, content in contents.items()}
     with _DeferredInterrupt():
@@ -229,10 +251,11 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 
 
 def check_tree(path: str, mark: str, option: str) -> None:
-    """Raise InputError before any computation if `write_tree` may not replace a folder.
+    """Raise InputError if `write_tree` may not replace the folder `path`.
 
-    The folder may be new or empty. Otherwise it may contain only the JSON file `mark` and the
-    files that its entry `files` lists.
+    The folder may be new or empty. Otherwise it may contain only the JSON file `mark`, and the
+    files that are listed in this JSON file under `files`. Callers check this before any
+    computation. `option` is the option that gave the path, for the message.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
@@ -253,7 +276,10 @@ def check_tree(path: str, mark: str, option: str) -> None:
 
 
 def _why_not_anew(folder: Path, mark: str) -> str:
-    """Return the reason why a folder may not be replaced; empty if it may."""
+    """Return the reason why a folder may not be replaced; an empty text if it may.
+
+    `mark` is the name of the JSON file that lists the files which an earlier run wrote.
+    """
     if Path.cwd().is_relative_to(folder):
         return "is the folder that you are in, or one above it"
     if not os.access(folder.parent, os.W_OK) or os.path.ismount(folder):
@@ -279,16 +305,21 @@ def _listed(mark: Path) -> Iterable[str]:
 
 
 def _beside(folder: Path) -> tuple[Path, Path]:
-    """Return the temporary names of the new folder and of the old one."""
+    """Return two temporary paths beside a folder, for use while the folder is replaced.
+
+    The first is for the folder with the new content, the second for the folder with the previous
+    content.
+    """
     new, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{what}") for what in ("new", "old"))
     return new, old
 
 
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
-    """Replace a folder by one with these files alone, in subfolders; write all or none.
+    """Replace the folder `path` by a folder that has only the files in `contents`.
 
-    The files are written to a temporary folder beside it, which is then renamed. The old folder
-    is removed after that.
+    `contents` are the contents of the files by their paths in the folder. The files are written to
+    a temporary folder, which is then renamed. The previous folder is removed after that, so that a
+    failure leaves it unchanged. `option` is the option that gave the path, for a message.
     """
     folder = Path(os.path.realpath(path))
     new, old = _beside(folder)
@@ -310,7 +341,7 @@ def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
                     raise
             finally:
                 shutil.rmtree(new, ignore_errors=True)
-            # The old folder is kept until the new one has its name.
+            # The previous folder is kept until the new folder has its name.
             shutil.rmtree(old, ignore_errors=True)
     except OSError as error:
         raise InputError(f"{option} '{path}': {error.strerror or error}") from None

@@ -6,28 +6,32 @@ from typing import Any
 
 from pyharness.cli import shown
 
-_bar: Any = None  # the bar that is on the terminal
+_bar: Any = None  # the progress bar that is on the terminal
 
 
 class _Terminal:
-    """Standard error, without the errors of one that is full or closed."""
+    """Standard error as a stream that ignores errors, as of a closed terminal."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(sys.stderr, name)
 
     def write(self, text: str) -> None:
-        """Write a text."""
+        """Write a text; a failure is ignored."""
         with suppress(OSError, ValueError):
             sys.stderr.write(text)
 
     def flush(self) -> None:
-        """Write what is buffered."""
+        """Write the buffered text; a failure is ignored."""
         with suppress(OSError, ValueError):
             sys.stderr.flush()
 
 
 def progress(done: int, total: int, what: str) -> None:
-    """Show the completed part of a computation, the current part, and the time to go."""
+    """Show the progress of a computation on a terminal, with an estimate of the remaining time.
+
+    `done` is the number of completed parts, `total` the number of all parts, and `what` the name of
+    the current part.
+    """
     global _bar
     if not sys.stderr.isatty():
         return
@@ -35,7 +39,7 @@ def progress(done: int, total: int, what: str) -> None:
         end_progress()
         from tqdm import tqdm
 
-        # Its thread would watch for bars that stand still, and this process may start others.
+        # The monitor of tqdm would be a thread, and this process may start other processes.
         tqdm.monitor_interval = 0
         _bar = tqdm(total=total, leave=False, dynamic_ncols=True, file=_Terminal())
     _bar.set_description_str(shown(what), refresh=False)
@@ -43,7 +47,7 @@ def progress(done: int, total: int, what: str) -> None:
 
 
 def end_progress() -> None:
-    """Remove the bar from the terminal."""
+    """Remove the progress bar from the terminal, if there is one."""
     global _bar
     if _bar is not None:
         bar, _bar = _bar, None

@@ -1,4 +1,7 @@
-"""Two separate measures of agreement: errors against the reference, and bits between languages."""
+"""Two measures of agreement: errors against the reference, and bits between two languages.
+
+The languages are Fortran, in the compiled programs, and Python, in the twins.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -17,15 +20,15 @@ class Accuracy:
     """The errors of a trajectory against the reference solution."""
 
     omega: tuple[float, float, float]  # largest error of each component (rad/s)
-    velocity: float | None  # largest error of any component of V (m/s)
+    velocity: float | None  # largest error of any component of translational velocity (m/s)
     # Largest drifts of the energy and of the squared angular momentum, relative to the initial
     # values; None if a torque acts or the moments are unknown.
     energy: float | None
     momentum: float | None
-    error: Array  # largest error of any component of omega at each result (rad/s)
-    turned: Array | None = None  # error of the attitude at each result (rad), if it is known
-    # Largest drift of the angular momentum in space, relative to its initial norm; None as `energy`
-    # is.
+    error: Array  # shape (n,): largest error of any component of omega at each time (rad/s)
+    turned: Array | None = None  # shape (n,): error of the attitude at each time (rad), if known
+    # Largest drift of the angular momentum in space, relative to its initial norm; None if a torque
+    # acts, or if the moments or the attitude are unknown.
     momentum_in_space: float | None = None
 
     @property
@@ -35,7 +38,11 @@ class Accuracy:
 
 
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
-    """Return the errors of a trajectory against the reference at the times that both have."""
+    """Return the errors of a trajectory against the reference solution `truth`.
+
+    Both must have rows at the same times; if one ends earlier, the further rows of the other are
+    not compared. Energy and angular momentum are compared with their initial values instead.
+    """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
         errors = np.abs(trajectory.omega[:n] - truth.omega[:n])
@@ -77,8 +84,9 @@ def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float | None:
 
 
 def distance(first: Trajectory, second: Trajectory) -> float:
-    """Return the largest distance of two trajectories in TIME, U and V, in units in the last place.
+    """Return the largest distance of two trajectories of a program, in units in the last place.
 
+    TIME, the angular velocity U and the translational velocity V are compared element by element.
     Two NaNs have the distance 0. If the numbers of rows differ, the distance is infinite.
     """
     if len(first.time) != len(second.time):
@@ -93,8 +101,9 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
     """Return the names of the results in which two trajectories of a program differ.
 
-    If the counters, the ending or the stop differ, only these are named. Otherwise the rows and IER
-    are compared bit for bit.
+    The number of steps or evaluations, how the run ended, and what the stop test found are compared
+    first. If any of them differ, only these are named. Otherwise the rows and the error code IER of
+    the linear solver are compared bit for bit. The list is empty if all agree.
     """
     counts = (
         ("steps", first.steps, second.steps),
@@ -127,7 +136,11 @@ def _velocity(trajectory: Trajectory) -> Array:
 
 
 def ulps(x: Array, y: Array) -> float:
-    """Return the largest distance of two arrays of one shape, in representable values."""
+    """Return the largest distance of two arrays of the same shape, element by element.
+
+    The distance of two floats is the number of steps from one to the other through all
+    representable floats. It is 0 for two NaNs, and infinite for a NaN and a number.
+    """
     both_nan = np.isnan(x) & np.isnan(y)
     one_nan = np.isnan(x) ^ np.isnan(y)
     if one_nan.any():
@@ -137,6 +150,6 @@ def ulps(x: Array, y: Array) -> float:
 
 
 def _ordinal(x: Array) -> NDArray[np.uint64]:
-    """Return the rank of each value among all representable ones; -0 comes just before +0."""
+    """Return the rank of each float among all representable floats; -0 comes just before +0."""
     bits = np.ascontiguousarray(x).view(np.uint64)
     return np.where(bits >> 63, ~bits, bits | np.uint64(1 << 63))

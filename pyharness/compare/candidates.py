@@ -1,4 +1,7 @@
-"""Candidates: methods, prepared solvers and programs that are run on a scene, judged and timed."""
+"""Candidates: methods, prepared solvers and programs behind one interface.
+
+Checks and timings run a candidate on a scene without knowing which of the three it is.
+"""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -25,28 +28,34 @@ _SAME = 1e-9  # relative difference up to which two times are equal, because ste
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """The result of a candidate for a scene at one time."""
+    """The result of a candidate (a method, prepared solver or program) for a scene at one time."""
 
     omega: Array  # rad/s; NaN if the candidate did not reach the time
-    ended: str = "complete"  # or why the result is not complete
+    ended: str = "complete"  # how the run ended: "complete", or why there is no full result
     steps: int = 0  # as the candidate counts them
     evaluations: int | None = None  # evaluations of the right-hand side, if they are counted
     attitude: Array | None = None  # shape (4,), scalar first, if it was propagated
 
     @property
     def is_refused(self) -> bool:
-        """Return whether the kernel of a prepared solver refused or exceeded its work limit."""
+        """Return whether a prepared solver refused the scene or exceeded its work limit."""
         return self.ended in ("refused", "gave up")
 
     @property
     def has_result(self) -> bool:
-        """Return whether the candidate reached the time, though the result may be sensitive."""
+        """Return whether the candidate reached the time of the result.
+
+        The result may still be sensitive: amplified rounding exceeds the tolerance.
+        """
         return self.ended in WITH_ALL_ROWS
 
 
 @dataclass(frozen=True)
 class Ready:
-    """A call that only integrates from time 0 to T, and a function that reads its result."""
+    """An integration from time 0 to a time T, prepared so that it can be timed alone.
+
+    `run` is a function that only integrates. `read` converts the result of `run` to an End.
+    """
 
     run: Callable[[], Any]
     read: Callable[[Any], End]
@@ -54,7 +63,10 @@ class Ready:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A method with its tolerance, a prepared solver, or a program with its listing."""
+    """A method with its tolerance, a prepared solver, or a program with its listing.
+
+    Checks run it, judge it and time it through the same functions.
+    """
 
     name: str
     # Takes a scene and a time (s). Raises InputError if the candidate can't take them, as a program
@@ -65,15 +77,16 @@ class Candidate:
     rows: Callable[..., Trajectory]
 
     def end(self, scene: Scene, time: float) -> End:
-        """Run the candidate to one time (s); raise InputError if it refuses the scene."""
+        """Return the result at one `time` (s); raise InputError if the scene is refused."""
         ready = self.ready(scene, time)
         return ready.read(ready.run())
 
 
 def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
-    """Return a method of the registry as a candidate, run by `solve`.
+    """Return a candidate that runs the method `name` by `solve`.
 
-    Its rows include the attitude if the scene has one.
+    `tolerance` is relative to the largest component of omega, and `effort` is the factor on the
+    work limit. The candidate's rows include the attitude if the scene has one.
     """
 
     def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
@@ -87,10 +100,11 @@ def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candid
 
 
 def prepared_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a prepared solver as a candidate.
+    """Return a candidate that runs a solver prepared for the method `name`.
 
     If `primed`, the solver is first called with another initial omega, which must have no effect on
-    the run. A method with a fixed step, and Gauss collocation, use the scene's step size.
+    the run that counts. `tolerance` is relative to the largest component of omega, None for the
+    method's own. A method with a fixed step, and Gauss collocation, use the scene's step size.
     """
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -103,7 +117,10 @@ def prepared_candidate(name: str, tolerance: float | None, primed: bool = False)
 
 
 def attitude_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a prepared solver with attitude as a candidate; see `prepared_candidate`."""
+    """Return a candidate that runs a solver prepared for omega and the attitude.
+
+    The arguments are those of `prepared_candidate`.
+    """
 
     def ready(scene: Scene, time: float) -> Ready:
         solver, start = prepare(scene, name, tolerance, attitude=True), np.array(scene.omega)
@@ -132,7 +149,10 @@ def program_candidate(
     effort: float = 1.0,
     word: str = BINARY64,
 ) -> Candidate:
-    """Return a program with its listing as a candidate; the options are those of `Program.run`."""
+    """Return a candidate that runs the program of a listing.
+
+    The other arguments are those of `Program.run`.
+    """
     options = lipschitz, may_stop, velocity
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -152,17 +172,23 @@ def program_candidate(
 
 
 def unstopped(listing: Listing) -> Candidate:
-    """Return a compiled program as a candidate, without its stop test and without velocity."""
+    """Return a candidate that runs a listing's compiled program without its stop test.
+
+    The program does not return the translational velocity.
+    """
     return program_candidate(listing, may_stop=False, velocity=False)
 
 
 def plain(values: Iterable[float]) -> Array:
-    """Return a copy of the values in an array, because the next call reuses the buffer."""
+    """Return a copy of `values` as an array of floats.
+
+    The copy is needed because the next call of a kernel reuses the memory of its result.
+    """
     return np.array([float(x) for x in values])
 
 
 def not_finite(why: str = "overflow") -> End:
-    """Return the end of a call without a result."""
+    """Return an End whose omega is NaN, for a run without result; `why` says how it ended."""
     return End(np.full(3, math.nan), why)
 
 
@@ -182,7 +208,10 @@ def _answered(solver: Solver, omega: Array) -> End:
 
 
 def _printed(result: Any) -> End:
-    """Return the end of a compiled program's run, from its last row."""
+    """Return the last row of a compiled program's run as an End.
+
+    `result` is the tuple that the extension's function `run_program` returned.
+    """
     rows, _, n_rows, status, evaluations, variable, _ = result
     if status == STOPPED:
         return not_finite(f"stopped at step {n_rows} by {STOP_VARIABLES[variable - 1]}")

@@ -1,8 +1,9 @@
-"""Comparisons of original and corrected, of Fortran and twin, and of all with the reference.
+"""Comparisons of original and corrected programs, of Fortran and twin, and with the reference.
 
-Two measures of agreement are never mixed. One is the distance between languages, in units in the
-last place. The other is the error against the reference, in rad/s, which has no meaning below the
-error bound of the reference itself.
+A twin is the Python port of a Fortran program. Two measures of agreement are never mixed. One is
+the distance between the results of Fortran and twin, in units in the last place. The other is the
+error against the reference solution, in rad/s, which has no meaning below the error bound of the
+reference itself.
 """
 
 import itertools
@@ -42,27 +43,30 @@ _TIMING_SECONDS = 3e-4
 
 @dataclass(frozen=True, eq=False)
 class ProgramFinding:
-    """The results of one program with one listing."""
+    """The results of one program with one listing, and how well they agree."""
 
     listing: Listing
     trajectory: Trajectory
     accuracy: Accuracy
     ulps: float | None  # between Fortran and the twin; None if another word runs in the twin alone
-    differences: tuple[str, ...]
-    order: Order | None
+    differences: tuple[str, ...]  # names of the results in which Fortran and the twin differ
+    order: Order | None  # measured for a corrected program in binary64 only
     seconds_per_step: float
 
     __repr__ = short_repr
 
     @property
     def who(self) -> str:
-        """Return the program and its listing."""
+        """Return the names of the program and of its listing, as in ``two-term original``."""
         return f"{self.listing.program} {self.listing.label}"
 
 
 @dataclass(frozen=True, eq=False)
 class MethodFinding:
-    """The results of one method of `solve_ivp`; `failure` says why there is no trajectory."""
+    """The results of one method of SciPy's `solve_ivp`.
+
+    If the method failed, `failure` says why, and there is no trajectory and no accuracy.
+    """
 
     method: str
     tolerance: float
@@ -109,20 +113,20 @@ class Comparison:
 
     @property
     def digits(self) -> float | None:
-        """Return the decimal digits left when the motion amplifies rounding, for any method.
+        """Return how many correct decimal digits amplified rounding leaves to any method.
 
-        None if the error amplification is unknown.
+        The result is None if the error amplification is unknown.
         """
         return None if self.growth is None else digits_left(ROUNDING * self.growth)
 
     @property
     def tolerance(self) -> float:
-        """Return the smallest tolerance of the methods."""
+        """Return the smallest tolerance of the methods of `solve_ivp` (relative)."""
         return min(each.tolerance for each in self.methods)
 
     @property
     def is_sensitive(self) -> bool:
-        """Return whether the motion amplifies rounding beyond what the tolerance allows."""
+        """Return whether rounding that the motion amplifies exceeds a fraction of `tolerance`."""
         return is_sensitive(self.growth, self.tolerance)
 
     @property
@@ -130,7 +134,7 @@ class Comparison:
         """Return one sentence for each unexpected result; empty if there is none.
 
         A result is unexpected if Fortran and the twin differ, or if the error of a corrected
-        program does not decrease with its order.
+        program does not decrease with the order of the program as the step is halved.
         """
         found = []
         for each in self.programs:
@@ -146,7 +150,10 @@ class Comparison:
 
     @property
     def not_judged(self) -> tuple[str, ...]:
-        """Return the corrected programs that this scene can't judge, each with the reason."""
+        """Return one sentence for each corrected program whose order this scene can't judge.
+
+        The sentence names the program and the reason.
+        """
         return tuple(
             f"{each.who}: {each.order}"
             for each in self.programs
@@ -164,7 +171,7 @@ def compare_programs(
     attitude: bool = False,
     word: str = BINARY64,
 ) -> Comparison:
-    """Compare programs and methods on one scene, with each other and with the reference solution.
+    """Compare programs and SciPy's methods on one scene with each other and with the reference.
 
     Parameters
     ----------
@@ -179,7 +186,7 @@ def compare_programs(
         Whether the stop test may end a run.
     tolerance : float, optional
         The tolerance of each method of `solve_ivp`, relative to the largest component of omega; by
-        default the method's own, as in `solve`.
+        default it is the method's own, as in `solve`.
     effort : float
         Factor on the work limit of each program, of each method and of the reference.
     attitude : bool
@@ -188,8 +195,8 @@ def compare_programs(
         method of order 4.
     word : str
         The arithmetic of the programs, one of `pyharness.original.programs.WORD_NAMES`. If the
-        compiled programs do not support it, the twins run alone, and no bits are compared. Orders
-        are measured in binary64 only.
+        compiled programs do not support it, only the Python twins run, and they are not compared
+        with Fortran. Orders are measured in binary64 only.
 
     Returns
     -------
@@ -257,11 +264,13 @@ def listings_for(
     readings: Sequence[str] = (),
     conjectures: Sequence[str] | None = None,
 ) -> list[Listing]:
-    """Return the listings to compare: for each program the original and the corrected one.
+    """Return the listings to compare: for each program the original and the corrected listing.
 
-    If `fix` or `keep` applies to a program, its requested subset comes between the two. A defect,
-    reading or conjecture applies to the programs that have it; raise InputError if no program has
-    it. With `base`, and without `fix` and `keep`, only that listing is returned.
+    If a name in `fix` (to correct) or `keep` (to leave active) applies to a program, the listing
+    with that selection comes between these two. A defect, reading or conjecture applies to the
+    programs that have it; raise InputError if no program has it. `base` is ``original`` or
+    ``corrected``: without `fix` and `keep` only this listing is returned, else the selection starts
+    from it.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]

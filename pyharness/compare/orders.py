@@ -1,4 +1,4 @@
-"""Measured orders: the power of the step with which the error against the reference decreases."""
+"""Measured orders: the power of the step size with which the error against the reference falls."""
 
 import itertools
 import math
@@ -20,9 +20,9 @@ from pyharness.truth.reference import Reference
 
 # A measured order may be below the expected one by at most this.
 ORDER_SLACK = 0.5
-# The order is measured once halving the step changes the result by less than this, relative to the
-# largest value, and a step turns body and torque by less than this angle (rad). The angle is
-# limited because steps that skip periods of the torque seem to converge too.
+# The order is measured once halving the step changes the result by less than `_SMALL_CHANGE`,
+# relative to the largest value, and a step turns body and torque by at most `_SMALL_ANGLE` (rad).
+# The angle is limited because steps that skip periods of the torque seem to converge too.
 _SMALL_CHANGE = 1e-3
 _SMALL_ANGLE = 0.5
 # The step is halved until this many steps are taken, and at least eight times.
@@ -32,7 +32,7 @@ _HALVINGS = 8
 # does not converge is at fault.
 _MARGIN = 4
 _TEXTBOOK = {2: "improved-euler", 4: "rk4"}
-# Rounding errors in a step.
+# Number of rounding errors of omega in a step.
 _ROUNDINGS = 8.0
 # A matrix with a larger condition number may be found singular.
 _CONDITION = 1e15
@@ -42,28 +42,28 @@ State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensit
 
 @dataclass(frozen=True)
 class Order:
-    """The order that was measured by halving the step, or the reason why it is unknown."""
+    """The order of convergence measured by halving the step, or the reason why it is unknown."""
 
-    due: int  # the expected order, which the method has
+    due: int  # the expected order, which theory gives to the method
     # `as due`: the order was observed. `rounding`: the error was rounding error before the order
     # could be observed. `misses`: the error decreases more slowly. The last four leave the order
     # undecided: no step was small enough (`unsettled`), the program found its matrix singular
     # (`singular`), the motion amplifies rounding too much (`sensitive`), or the solution is
     # unbounded (`unbounded`).
     state: State
-    value: float | None  # the measured order, if there is one
+    value: float | None  # the measured order, if it could be measured
     step_size: float  # the smallest that was tried (s); if `singular`, the longest singular one
-    steps: int = 0  # of the finest run that could be compared with the reference
+    steps: int = 0  # number of steps of the finest run that was compared with the reference
     error: float = math.inf  # the largest error of that run (rad/s)
     time: float = math.nan  # the time of that error (s)
 
     @property
     def is_judged(self) -> bool:
-        """Return whether the measurement decides if the method has its order."""
+        """Return whether the measurement decides if the method has its expected order."""
         return self.state in ("as due", "rounding", "misses")
 
     def __str__(self) -> str:
-        """Return the result of the measurement in a few words."""
+        """Return the measured order as text, or in a few words why it is unknown."""
         if self.value is not None:
             return f"order {self.value:.2f}"
         return {
@@ -75,16 +75,21 @@ class Order:
 
 
 class _SingularError(Exception):
-    """A collocation matrix was rightly found singular, so that the program is another method."""
+    """The signal that a run failed at a step size for which its matrix may be singular.
+
+    If LEQT1F finds the collocation matrix singular, the program uses the right-hand sides in place
+    of the solution. It is then another method, whose order is not measured.
+    """
 
 
 def measured_order(
     scene: Scene, program: Program, listing: Listing, truth: Reference, pairs: int = 2
 ) -> Order:
-    """Measure the order of a compiled program's omega; see `order_of`.
+    """Measure the order with which omega of a listing's compiled program converges to `truth`.
 
-    An error that may be amplified rounding counts as `sensitive`, not as `misses`. Failure to
-    converge counts as `misses` if a textbook method of the same order converges.
+    The measurement and the result are those of `order_of`, which explains `truth` and `pairs`. An
+    error that may be amplified rounding counts as `sensitive`, not as `misses`. Failure to converge
+    counts as `misses` if a textbook method of the same order converges.
     """
 
     def omega(finer: Scene) -> Array:
@@ -116,12 +121,14 @@ def order_of(
     pairs: int = 2,
     most_steps: int | None = None,
 ) -> Order:
-    """Measure the order of a solution by halving the step until it is small.
+    """Measure the order of a numerical solution by halving the step size until it is small.
 
-    `scene` has the longest step, and `truth` has results at its times. `solution` returns the
-    judged quantity after each step of the scene that it is given, shape (n, 3), with fewer rows if
-    it overflows. The order is decided if it appears, or fails to appear, in `pairs` consecutive
-    halvings. By default the step is halved until there are 2**18 steps, and at least eight times.
+    `scene` has the longest step, and `truth` is the reference solution at the times of `scene`.
+    `solution` takes a scene and returns the judged `quantity` after each step of that scene, shape
+    (n, 3), with fewer rows if it overflows. `due` is the expected order. The order is decided if it
+    appears, or fails to appear, in `pairs` consecutive halvings. The step is halved as long as
+    there are at most `most_steps` steps; by default until there are 2**18 steps, and at least eight
+    times. The result is an Order, with the state that was found and the measured order.
     """
     n = len(truth.time)
     if n < scene.steps:
@@ -178,7 +185,10 @@ def _shows(order: float, due: int) -> bool:
 
 
 def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
-    """Yield the scene with its own step size, with half of it, and so on."""
+    """Yield the scene with its own step size, with half of it, with a quarter, and so on.
+
+    All have the same last time, and at most `most_steps` steps.
+    """
     most = max(_MOST_STEPS, scene.steps << _HALVINGS) if most_steps is None else most_steps
     for halvings in itertools.count():
         parts = 2**halvings
@@ -193,7 +203,11 @@ def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
 
 
 def _fastest(scene: Scene, omega: Array) -> float:
-    """Return an upper bound (rad/s) for the rates of perturbations of omega and of the torque."""
+    """Return the fastest rate (rad/s) that a step has to resolve.
+
+    It is the largest angular frequency of the torque's waves, or a bound on the rate at which the
+    equations change a perturbation of the solution `omega` (rad/s), whichever is larger.
+    """
     sizes = np.abs(np.vstack([scene.omega, omega]))
     others = np.roll(sizes, -1, axis=1) + np.roll(sizes, -2, axis=1)
     waves = scene.torque.sines + scene.torque.cosines
@@ -202,7 +216,11 @@ def _fastest(scene: Scene, omega: Array) -> float:
 
 
 def _is_grown_rounding(scene: Scene, found: Order) -> bool:
-    """Return whether the error may be amplified rounding; True if that can't be computed."""
+    """Return whether the error of a measured order may be rounding that the motion amplifies.
+
+    `found` is the measurement. Its error may be rounding if it is not above the bound on amplified
+    rounding errors, or if this bound can't be computed.
+    """
     if not found.steps or not math.isfinite(found.error):
         return False
     try:
@@ -213,7 +231,10 @@ def _is_grown_rounding(scene: Scene, found: Order) -> bool:
 
 
 def _may_be_singular(program: str, step_size: float) -> bool:
-    """Return whether the collocation matrix at a step size (s) may be found singular."""
+    """Return whether LEQT1F may find a program's collocation matrix at a step size (s) singular.
+
+    It may if the matrix overflows, or if its condition number is not below 1e15.
+    """
     from pyharness.theory.collocation_matrices import PARTS
 
     if program not in PARTS:

@@ -1,4 +1,4 @@
-"""The picture of a comparison: omega over time, and its error below, in a column per program."""
+"""The picture of a comparison: omega over time, its error below, one column for each program."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,8 @@ _STYLES: dict[str, dict[str, Any]] = {
     "corrected": {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.0},
 }
 _REFERENCE: dict[str, Any] = {"color": "#b8b8b8", "linestyle": "-", "linewidth": 3.5}
-# For a single row, which a line does not show. Markers at one place can all be distinguished.
+# For a trajectory of a single row, which a line does not show. Markers that lie on one another can
+# still be distinguished.
 _MARKERS: dict[str, dict[str, Any]] = {
     "reference": {"marker": "s", "markersize": 11.0},
     "original": {"marker": "o", "markersize": 8.0, "markerfacecolor": "none"},
@@ -29,7 +30,12 @@ _MARKERS: dict[str, dict[str, Any]] = {
 
 
 def comparison_picture(comparison: Comparison) -> Picture:
-    """Return the picture of the trajectories, the reference and the errors."""
+    """Return the picture of a comparison, and the table of numbers that it shows.
+
+    Each program has a column of panels: three with a component of omega (rad/s) over time, from its
+    listings and from the reference solution, and below them the errors of omega (rad/s) and, if
+    attitudes were requested, of the attitude (rad).
+    """
     from matplotlib.figure import Figure
 
     names = list(dict.fromkeys(each.listing.program for each in comparison.programs))
@@ -103,7 +109,11 @@ def _line(axes: "Axes", time: np.ndarray, values: np.ndarray, label: str) -> Non
 
 
 def _frame(axes: "Axes", truth: np.ndarray) -> None:
-    """Limit the vertical range to values near the reference; a program that diverges leaves it."""
+    """Limit the vertical range of a panel to values near the reference solution.
+
+    `truth` is a component of the reference omega (rad/s). The curve of a program that diverges
+    leaves the range.
+    """
     if not len(truth):
         return
     low, high = float(truth.min()), float(truth.max())

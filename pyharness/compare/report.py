@@ -1,4 +1,4 @@
-"""The report of `compare`."""
+"""The report of the verb `compare`: tables, verdict, picture and data of a comparison."""
 
 from typing import Any
 
@@ -31,7 +31,7 @@ _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 
 
 def comparison_report(comparison: Comparison) -> Report:
-    """Return the report of a comparison: programs, methods of `solve_ivp`, and our verdict."""
+    """Return the report of a comparison: programs, methods of SciPy's `solve_ivp`, our verdict."""
     in_floats = comparison.word == BINARY64
     scene, truth = heading(comparison.scene), comparison.reference
     reference = (
@@ -84,9 +84,11 @@ def comparison_report(comparison: Comparison) -> Report:
 
 
 def verdict(comparison: Comparison) -> list[str]:
-    """Return our verdict: one sentence if all is as expected, else one for each unexpected result.
+    """Return our verdict on a comparison, as a list of sentences.
 
-    Further sentences say whether the scene is sensitive, and which programs are not judged.
+    It is one sentence if all results are as expected, else one for each unexpected result. Further
+    sentences say if the scene is sensitive to rounding, and name each corrected program whose order
+    of convergence this scene can't judge.
     """
     told = [f"UNEXPECTED: {each}" for each in comparison.unexpected] or [_as_expected(comparison)]
     if comparison.is_sensitive:
@@ -150,7 +152,10 @@ def _methods(comparison: Comparison) -> Table:
 
 
 def _attitudes(comparison: Comparison) -> list[list[Table]]:
-    """Return the table of attitudes in lists; an empty list if attitudes were not requested."""
+    """Return the table of attitude errors, as a list of blocks of the report's text.
+
+    The list is empty if attitudes were not requested.
+    """
     if comparison.reference.attitude is None:
         return []
     columns = (
@@ -169,7 +174,7 @@ def _attitudes(comparison: Comparison) -> list[list[Table]]:
 
 
 def _data(comparison: Comparison) -> Table:
-    """Return programs and methods in one table."""
+    """Return the results of all programs and methods as one table with a row for each."""
     names = (
         "method listing active steps ended stop_variable stop_quotient error_w1 error_w2 error_w3 "
         "error_v energy_drift momentum_drift ulps order order_state evaluations seconds"

@@ -24,10 +24,13 @@ def seconds(
     clocks: Sequence[Clock] | None = None,
     slow: float = SLOW,
 ) -> list[float]:
-    """Return the time of one call of each run (s), measured in rounds of batches of `length` (s).
+    """Return the time of one call of each function in `runs` (s), measured in several rounds.
 
-    It is the median over the rounds, or another `statistic`. `clocks` has a clock for each run; by
-    default it is the wall clock.
+    In each of the `rounds` rounds, each function is called for about `length` seconds; the first
+    call of all is not counted. A function whose call takes longer than `slow` (s) has at most three
+    rounds. The result is the median over the rounds, or another `statistic`. `say` is called with a
+    message at the beginning of each round. `clocks` has a clock (s) for each function; by default
+    it is the wall clock.
     """
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))
@@ -51,7 +54,10 @@ def seconds(
 
 
 def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> float:
-    """Return the time of one call (s), averaged over consecutive calls."""
+    """Return the time of one call of the function `run` (s), averaged over consecutive calls.
+
+    `calls` is the number of calls that are timed. If it is above 1, an untimed call precedes them.
+    """
     if calls > 1:
         run()
     begin = clock()
@@ -62,7 +68,7 @@ def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> floa
 
 @contextlib.contextmanager
 def silenced() -> Iterator[None]:
-    """Suppress warnings and floating-point errors while calls are timed."""
+    """Suppress Python warnings and NumPy's floating-point errors while calls are timed."""
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield

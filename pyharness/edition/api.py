@@ -20,7 +20,11 @@ class Item(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A public name: its signature, its docstring in parts, and the methods of a class."""
+    """A public name on the API page: its signature, its docstring in parts, its methods if a class.
+
+    `anchor` is its anchor in the page. `summary` is the first line of the docstring, `text` has the
+    further paragraphs, and `groups` has the sections with their titles, such as Parameters.
+    """
 
     name: str
     anchor: str
@@ -33,7 +37,7 @@ class Entry(NamedTuple):
 
 
 def entries() -> list[Entry]:
-    """Return an entry for each public name."""
+    """Return an entry of the API page for each public name of the package."""
     return [_entry(name, getattr(pyharness, name)) for name in pyharness.__all__]
 
 

@@ -1,5 +1,6 @@
-"""ES modules as one classic script, because browsers do not import modules into a page from a file.
+"""Bundling of JavaScript (ES) modules into one classic script.
 
+Browsers do not import modules into a page that is opened from a file, but they run such a script.
 Every module becomes a function that returns the exports of the module, in order of dependency.
 Only the forms of import and export that the project's modules use are known; any other is an error.
 """
@@ -17,10 +18,11 @@ _UNKNOWN = re.compile(r"^\s*(?:import|export)\b.*|\bimport\s*[(.]", re.M)
 
 
 def bundle(entry: Path) -> str:
-    """Return a module and all its imports as one script, inside a function.
+    """Return the text of one script with the module in the file `entry` and all that it imports.
 
-    Raise ValueError, with file and line, for an unknown form of import or export, an import of a
-    missing file or name, and modules that import each other.
+    The script runs inside a function, so that it defines no global names. Raise ValueError, with
+    file and line, for an unknown form of import or export, an import of a missing file or name, and
+    modules that import each other.
     """
     exports: dict[Path, list[str]] = {}
     parts: list[str] = []
@@ -31,7 +33,11 @@ def bundle(entry: Path) -> str:
 def _add(
     path: Path, importing: tuple[Path, ...], exports: dict[Path, list[str]], parts: list[str]
 ) -> None:
-    """Append a module after its imports; `importing` is the chain of modules that import it."""
+    """Append the text of the module in the file `path` to `parts`, after the modules it imports.
+
+    `importing` is the chain of modules that import this one. The names that each appended module
+    exports are stored in `exports`.
+    """
     text = path.read_text(encoding="utf-8")
     for found in _IMPORT.finditer(text):
         needed = (path.parent / found["path"]).resolve()
@@ -65,7 +71,7 @@ def _add(
 
 
 def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
-    """Yield the exported and the local name of everything that an import names."""
+    """Yield the exported and the local name of each item in braces of an import statement."""
     for each in (found["names"] or "").split(","):
         name, _, alias = each.strip().partition(" as ")
         if name:
@@ -73,7 +79,11 @@ def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
 
 
 def _as_constant(found: re.Match[str], path: Path, modules: list[Path]) -> str:
-    """Return an import as a declaration with the same number of lines."""
+    """Return the declaration, with as many lines, that replaces an import statement in a script.
+
+    `found` is the match of the statement in the module `path`. `modules` has the paths of the
+    modules that are in the script already, in their order.
+    """
     number = modules.index((path.parent / found["path"]).resolve())
     renamed = ", ".join(f"{name}: {here}" for name, here in _names(found))
     lines = "\n" * found[0].count("\n")

@@ -1,4 +1,8 @@
-"""The data of the listing's pages: each card with its scan, port, twin and apparatus entries."""
+"""The data of the listing's pages: each card with its scan, port, twin and apparatus entries.
+
+The port is the program in Fortran of today, and the twin is the program in Python. An entry of the
+critical apparatus explains, for example, a defect, or a difference between a card and the scan.
+"""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
@@ -6,7 +10,8 @@ from typing import Any, NamedTuple
 from pyharness.history.ablation import entries
 from pyharness.original.cards import Card, Place, deck, parallels, tight
 
-# Kinds by precedence: a card with entries of several kinds has the colour of the first.
+# Kinds of apparatus entries by precedence: a card with entries of several kinds has the colour of
+# the first one.
 _ORDER = (
     "defect", "reading", "conjecture", "missing text", "unreachable", "unread", "redundant",
     "dialect", "normalization", "misreading",
@@ -14,14 +19,24 @@ _ORDER = (
 
 
 class Run(NamedTuple):
-    """A run of characters, and the entry that explains why card and scan differ here, or None."""
+    """A run of consecutive characters of a card, or of the line of the scan that shows the card.
+
+    `entry` is the apparatus entry that explains why card and scan differ in these characters. It is
+    None if they agree.
+    """
 
     text: str
     entry: str | None = None
 
 
 class CardView(NamedTuple):
-    """A card as a page shows it: `card` and `scan` are runs; `scan` is None for a lost card."""
+    """A card as a page shows it, with its line of the scan and its apparatus entries.
+
+    `card` is the text of the card and `scan` the line of the scan, which is None if the scan lacks
+    the card. `port` and `twin` are the card's lines in the Fortran port and the Python twin.
+    `absent` is the reason why the port has no statement for the card, and `otherwise` the reason
+    why its statement is different. `parallels` are the cards of other decks with the same text.
+    """
 
     number: int
     card: list[Run]
@@ -57,7 +72,7 @@ def card_views(program: str) -> list[CardView]:
 
 
 def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
-    """Return the number of cards for each kind of entry, in the order of precedence."""
+    """Return the number of cards for each kind of apparatus entry, in the kinds' precedence."""
     counts = dict.fromkeys(_ORDER, 0)
     for view in views:
         for kind in view.kinds:
@@ -66,7 +81,10 @@ def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
 
 
 def _scan(card: Card) -> list[Run] | None:
-    """Return a card's line of the scan as runs, with the card number; None for a lost card."""
+    """Return the line of the scan that shows a card, as runs: number, dash and text.
+
+    Return None if the scan lacks the card.
+    """
     if card.lost:
         return None
     number = Run(*card.printed) if card.printed else Run(str(card.number))

@@ -1,4 +1,4 @@
-"""The documents of `docs/` as pages."""
+"""The documents of the folder `docs` as pages of the site."""
 
 import posixpath
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from pyharness.model.facts import shipped
 
 # Suffixes of the pictures in the documents.
 _PICTURES = (".png", ".svg")
-# Documents with an entry of their own in the menu.
+# Documents with an entry of their own in the menu of the site.
 _OF_THE_MENU = ("index.md", "explanation/findings.md", "explanation/methods.md")
 
 
@@ -41,12 +41,12 @@ def documents(folder: Path) -> Iterator[tuple[str, Document]]:
 
 
 def page_of(name: str) -> str:
-    """Return the path in the site of a document of `docs/`."""
+    """Return the path in the site of the document with the path `name` in its folder."""
     return f"docs/{name.removesuffix('.md')}.html"
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Return the pictures of the documents, by their path in the site."""
+    """Return the content of the pictures in the documents' folder, by their path in the site."""
     return {
         f"docs/{file.relative_to(folder).as_posix()}": file.read_bytes()
         for file in sorted(folder.rglob("*"))
@@ -55,7 +55,10 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def _link(folder: Path, name: str, target: str) -> str | None:
-    """Return the site's link for a target in a document; None if the site lacks the target."""
+    """Return the site's link for `target`, a link in the document `name` in `folder`.
+
+    Return None if the site lacks the target.
+    """
     path, hash_, anchor = target.partition("#")
     if "://" in target or not path:
         return target

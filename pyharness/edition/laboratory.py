@@ -1,4 +1,7 @@
-"""The data of the laboratory page: the programs, and one run for readers without JavaScript."""
+"""The data of the laboratory, the page that runs the programs of the thesis in the browser.
+
+The data include one computed run for readers without JavaScript.
+"""
 
 from functools import cache
 from typing import Any
@@ -20,7 +23,10 @@ from pyharness.truth.reference import reference
 DEFAULTS: dict[str, Any] = {"case": 2, "program": "runge-kutta", "listing": "original"}
 """The run that the page shows if its address specifies none."""
 MOST_STEPS = 3000
-"""The most steps that a page draws without a pause: 3 s with a tenth of the decks' step."""
+"""The most steps of a run on the page, which it draws without a pause.
+
+They cover 3 s with a tenth of the decks' step size.
+"""
 _KINDS = {
     "defect": "Defects left in",
     "reading": "Readings not adopted",
@@ -31,10 +37,11 @@ _SHOWN = 3
 
 @cache
 def context() -> dict[str, Any]:
-    """Return the values for the template of the laboratory.
+    """Return the values for the template of the laboratory page.
 
-    `data` is the object that the script reads as `window.laboratoryData`. `switches` has the flags
-    of each kind with a heading. `first` is the run of the default state, computed here.
+    `data` is the object that the page's script reads as `window.laboratoryData`. `switches` has the
+    defects, readings and conjectures that a reader can switch on or off, each kind with a heading.
+    `first` is the run that `DEFAULTS` specifies, computed here.
     """
     given = data()
     kinds = [
@@ -51,7 +58,7 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the data with which the script can run any state, as JSON values."""
+    """Return the data with which the page's script can run any case and program, as JSON values."""
     return {
         "scenes": [asked_scene(case_scene(number)) for number in case_numbers()],
         "headings": {number: _told(case_scene(number)) for number in case_numbers()},
@@ -77,14 +84,18 @@ def data() -> dict[str, Any]:
 
 
 def _told(scene: Scene) -> list[str]:
-    """Return a case's body, torque and further remarks, without the initial omega."""
+    """Return lines about a case: body, torque and further remarks, without the initial omega."""
     lines = heading(scene)
     body, torque, *_ = lines[1].split("; ")
     return [f"{body}; {torque}", *lines[2:]]
 
 
 def _first() -> dict[str, Any]:
-    """Return the default state's ending, its first and last rows, and its printer page."""
+    """Return the values with which the page shows the run that `DEFAULTS` specifies.
+
+    They include how the run ended, the largest error of its omega (rad/s) against the reference,
+    its first and last rows, the page that the program prints, and the command that repeats the run.
+    """
     scene = case_scene(DEFAULTS["case"])
     program = DEFAULTS["program"]
     run = run_program(scene, original(program), "python")
@@ -106,7 +117,11 @@ def _first() -> dict[str, Any]:
 
 
 def _row(run: Trajectory, number: int, error: float) -> list[str]:
-    """Return a row of the table: step, time, omega, velocity, TIME, IER and the error."""
+    """Return the texts of the table's row for the step with the index `number`.
+
+    They are the step, the time (s), omega (rad/s), the translational velocity (m/s), TIME as the
+    program writes it (s), IER, and `error`, the error of omega (rad/s).
+    """
     assert run.velocity is not None
     values = [run.time[number], *run.omega[number], *run.velocity[number]]
     values.append(run.recorded_time[number])

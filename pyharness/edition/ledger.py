@@ -18,7 +18,10 @@ from pyharness.views import html
 
 
 class SentenceVerdicts(NamedTuple):
-    """A sentence of the thesis with the verdicts on the claims that it makes."""
+    """A sentence of the thesis with the verdicts on the claims that it makes.
+
+    `judged` has the judgements of these claims, and `anchor` is the sentence's anchor in the page.
+    """
 
     sentence: Sentence
     judged: list[Judgement]
@@ -26,7 +29,7 @@ class SentenceVerdicts(NamedTuple):
 
     @property
     def statements(self) -> str:
-        """Return the statements of the sentence's claims."""
+        """Return the statements of the sentence's claims as one text."""
         return " ".join(each.claim["statement"] for each in self.judged)
 
 
@@ -36,7 +39,11 @@ def judgements() -> list[Judgement]:
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
-    """Return, by verdict, the number of `result` claims, for original and corrected programs."""
+    """Return, for each verdict, the numbers of claims of the kind `result` that received it.
+
+    `judged` has the judgements of all claims. The first number is for the original programs, the
+    second for the corrected programs.
+    """
     judged = [each for each in judged if each.claim["kind"] == "result"]
     found: dict[str, tuple[int, int]] = {}
     for each in judged:
@@ -51,19 +58,26 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def kinds(judged: Sequence[Judgement]) -> Markup:
-    """Return an HTML table of the verdicts by kind of claim."""
+    """Return an HTML table of the verdicts in the judgements `judged`, by kind of claim."""
     return Markup(html.table(kinds_table(judged), "verdicts by kind of claim"))
 
 
 def account() -> dict[str, Markup]:
-    """Return the statements that pages and documents share, and the effect of each defect."""
+    """Return, by identifier, the texts that pages and documents share, as HTML.
+
+    The texts are the statements of ``data/account.toml``, and the descriptions of the effect of
+    single defects in ``data/apparatus.toml``.
+    """
     texts = {each["id"]: each["text"] for each in facts("account")["statement"]}
     texts |= {each["id"]: each["part"] for each in entries() if "part" in each}
     return {name: inline(text) for name, text in texts.items()}
 
 
 def context(judged: Sequence[Judgement]) -> dict[str, Any]:
-    """Return the data of the claims page: the table, each claim in detail, and the evidence."""
+    """Return the data of the claims page: the tables, each claim in detail, and the evidence.
+
+    `judged` has the judgements of all claims.
+    """
     table = claims_report(judged).data
     assert table is not None
     links = {each.claim["id"]: f"#{each.claim['id']}" for each in judged}
@@ -81,7 +95,10 @@ def context(judged: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def apparatus() -> list[tuple[dict[str, Any], Markup]]:
-    """Return each entry of the apparatus with its report, which shows its effect in every case."""
+    """Return each entry of the critical apparatus with its report as HTML.
+
+    The report shows the effect of the entry in every case, if the entry can be switched.
+    """
     found = []
     for entry in entries():
         effects = list(effects_of(entry["id"])) if "flag" in entry else []
@@ -92,7 +109,10 @@ def apparatus() -> list[tuple[dict[str, Any], Markup]]:
 
 
 def thesis(judged: Iterable[Judgement]) -> dict[str, list[SentenceVerdicts]]:
-    """Return the sentences and their verdicts by section, in the order of the thesis."""
+    """Return the sentences of the thesis with their verdicts by section, in the thesis's order.
+
+    `judged` has the judgements of all claims.
+    """
     by_name = {each.claim["id"]: each for each in judged}
     found: dict[str, list[SentenceVerdicts]] = {}
     for number, each in enumerate(sentences(), 1):

@@ -22,7 +22,7 @@ class Part(NamedTuple):
 
 
 class Document(NamedTuple):
-    """A rendered document: its title, its HTML without that title, and its parts."""
+    """A rendered document: its title, its HTML without the title, and the text of its parts."""
 
     title: str
     html: Markup
@@ -30,7 +30,7 @@ class Document(NamedTuple):
 
 
 def document(text: str, link: Callable[[str], str | None]) -> Document:
-    """Render a document that begins with its title.
+    """Render the Markdown text of a document that begins with its title.
 
     `link` maps a target in the text to a link of the site, or to None if the site lacks the target.
     Raise ValueError if the site lacks a picture.
@@ -55,12 +55,12 @@ def document(text: str, link: Callable[[str], str | None]) -> Document:
 
 
 def inline(text: str) -> Markup:
-    """Render one line of Markdown, with code, emphasis and formulas."""
+    """Return one line of Markdown, with code, emphasis and formulas, as HTML."""
     return Markup(_parser().renderInline(text))
 
 
 def formula(tex: str, display: bool = False) -> Markup:
-    """Return a LaTeX formula as MathML."""
+    """Return a LaTeX formula as MathML; with `display`, for a line of its own."""
     from latex2mathml.converter import convert
 
     return Markup(convert(tex, display="block" if display else "inline"))
@@ -123,7 +123,7 @@ def _anchor(tokens: Sequence["Token"]) -> None:
 
 
 def slug(title: str) -> str:
-    """Return the anchor that GitHub gives a heading."""
+    """Return the anchor that GitHub gives a heading with the text `title`."""
     return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 

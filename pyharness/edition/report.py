@@ -13,12 +13,18 @@ _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 
 
 def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return the JSON record of files: their sizes in bytes, and the build that wrote them."""
+    """Return the JSON record of a site's files: sizes in bytes, and the build that wrote them.
+
+    `content` has the content of the files by path.
+    """
     return {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
 
 
 def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Report the files of a site that was written to a folder."""
+    """Report the number and size (kB) of the files of a site that was written to a folder, by kind.
+
+    `content` has the content of the files by path.
+    """
     sizes: dict[str, list[int]] = {}
     for name, each in content.items():
         sizes.setdefault(PurePosixPath(name).suffix.lstrip("."), []).append(len(each))

@@ -1,8 +1,8 @@
 """The pages of the site and their content.
 
-Nothing is fetched from a network, and nothing is computed twice. Every page is a template filled
-with data and with the text of reports. A page works from a file, under any path, and without
-JavaScript.
+Every page is a template filled with data and with the text of reports. Each result is computed only
+once. A page works if it is opened from a file, under any path, and without JavaScript, and it
+fetches nothing from a network.
 """
 
 import json
@@ -48,7 +48,7 @@ _DECKS = {"two-term": "Two-term collocation", "four-term": "Four-term collocatio
 
 
 class Found(NamedTuple):
-    """An entry of the search index: the link to a place, its title, its kind and its text."""
+    """An entry of the search index: a link into a page, and the title, kind and text there."""
 
     href: str
     title: str
@@ -57,7 +57,11 @@ class Found(NamedTuple):
 
 
 class Page(NamedTuple):
-    """A page: its path, its title, its template with the values, and its search entries."""
+    """A page of the site, before it is rendered.
+
+    `template` is the name of its template, and `context` has the values for the template. `found`
+    has the page's entries of the search index.
+    """
 
     path: str
     title: str
@@ -68,9 +72,11 @@ class Page(NamedTuple):
 
 
 def build_site(progress: Progress = no_progress, docs: Path | None = None) -> dict[str, bytes]:
-    """Return the files of the site by path; `progress` is called with the name of each part.
+    """Return the content of the site's files by path.
 
-    `docs` is the folder of the documents, by default the folder of the checkout.
+    `progress` is called before each of five parts of the work, with the number of completed parts,
+    the number of all parts, and the name of the part. `docs` is the folder of the documents, by
+    default the folder of the checkout.
     """
     docs = docs or documents.documents_folder()
     progress(0, 5, "figures")
@@ -201,7 +207,10 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
 
 
 def script(name: str, value: Any) -> bytes:
-    """Return data as a script, because a page opened from a file may not fetch data."""
+    """Return a script that assigns `value`, as JSON, to the global variable `name`.
+
+    The site has its data in scripts because a page that is opened from a file can't fetch data.
+    """
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     return f"window.{name}={text};\n".encode()
 

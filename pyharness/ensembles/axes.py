@@ -17,10 +17,10 @@ from pyharness.model.values import finite, integer
 
 Floats = NDArray[np.float64]
 
-# Limit for one axis, because its values are held in memory.
+# Limit of the number of values on one axis, because they are held in memory.
 MOST_VALUES = 100_000_000
 SPACINGS = ("linear", "log")
-# Distributions, and the keys of their parameters.
+# Distributions, and the keys of a sweep file that give the parameters of each.
 DRAWS = {
     "uniform": ("from", "to"),
     "log-uniform": ("from", "to"),
@@ -37,21 +37,25 @@ _SAMPLE = "sample"
 
 @dataclass(frozen=True)
 class Axis:
-    """A field that varies over the grid, and its values; axes of one dimension vary together.
+    """One axis of a sweep's grid: a field of the scene or of the solver, and the values it takes.
+
+    Axes with the same dimension vary together: the scenes with index i along the dimension have
+    value i of each of these axes.
 
     Attributes
     ----------
     field : str
         The field of a scene, or of its solver, that takes the values.
     dimension : str
-        The dimension of the store's arrays. By default it has the field's name, or the name
-        `sample` if the values are drawn from a distribution.
+        The name of the dimension of the store's arrays along which the values vary. By default it
+        is the field's name, or `sample` if the values are drawn from a distribution.
     count : int
         The number of values.
     how : str
-        `listed`, a spacing of `SPACINGS`, or a distribution of `DRAWS`.
+        The source of the values: `listed`, a spacing of `SPACINGS`, or a distribution of `DRAWS`.
     values : tuple of float or str
-        The listed values, or the two parameters of a spacing or distribution; `sphere` has none.
+        The listed values; or the two parameters of a spacing or distribution, which are both ends
+        of the range, or mean and deviation. The distribution `sphere` has no parameters.
     seed : int
         The seed of a distribution.
     """
@@ -65,11 +69,14 @@ class Axis:
 
     @property
     def is_choice(self) -> bool:
-        """Return whether the values are words and not numbers."""
+        """Return whether the values are names, as of programs or methods, and not numbers."""
         return self.field in CHOICES
 
     def coordinates(self) -> NDArray[Any]:
-        """Return all values, as floats or as words. Callers must not change the array."""
+        """Return all values of the axis, as floats in the unit of its field, or as names.
+
+        The array has shape (count,). It is cached, so callers must not change it.
+        """
         return _coordinates(self)
 
 
@@ -112,7 +119,10 @@ def _drawn(axis: Axis) -> Floats:
 
 
 def _between(first: float, last: float, made: Callable[[float, float], Floats]) -> Floats:
-    """Return the values that `made` returns between two ends, even if their distance overflows."""
+    """Return ``made(first, last)``, but without an overflow if `last - first` is not finite.
+
+    `made` is a function that returns values between two ends, `first` and `last`.
+    """
     if math.isfinite(last - first):
         return made(first, last)
     # Halving and doubling are exact, because numbers of that size are far from underflow.
@@ -122,7 +132,11 @@ def _between(first: float, last: float, made: Callable[[float, float], Floats]) 
 
 
 def axis_of(table: object, number: int) -> Axis:
-    """Return the axis that a table of a sweep file describes; `number` counts tables from 1."""
+    """Return the axis that a table [[axis]] of a sweep file describes.
+
+    `number` is the number of the table in the file, from 1, which error messages name. Raise
+    InputError if a key of the table is missing, or has a value that is not allowed.
+    """
     where = f"[[axis]] {number}"
     if not isinstance(table, dict):
         raise InputError(f"{where} is {kind_of(table)}; it must be a table [[axis]]")
@@ -205,7 +219,12 @@ def _refuse(where: str, table: dict[str, Any], chosen: str, keys: Iterable[str])
 
 
 def _checked(where: str, axis: Axis) -> Axis:
-    """Return an axis; raise InputError if its field can't take the smallest or largest value."""
+    """Return `axis` itself; raise InputError if its field does not allow its extreme values.
+
+    The extreme values are the smallest and largest of the listed or normally distributed values;
+    for other axes they are both ends of the range. The distribution `sphere` is not checked.
+    `where` is the beginning of the error message.
+    """
     field = NUMBERS[axis.field]
     if axis.how == "sphere":
         return axis

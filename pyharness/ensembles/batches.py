@@ -1,4 +1,4 @@
-"""Batches of a sweep: the scenes that one call solves, as arrays."""
+"""Batches of a sweep: groups of scenes that share a solver and its settings, as arrays."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -17,7 +17,12 @@ Columns = dict[str, Array]
 
 
 def listing_of(program: str, listing: str, reading: str) -> Listing:
-    """Return the listing that the words of a sweep name; raise InputError for an unknown name."""
+    """Return the listing of a program that the fields `listing` and `reading` of a sweep describe.
+
+    `listing` is ``original`` or ``corrected``, or ``fix:`` or ``keep:`` with the names of defects
+    to correct or to keep, joined by ``+``. `reading` is ``adopted``, or the names of the readings
+    to activate, joined by ``+``. Raise InputError for an unknown name.
+    """
     how, _, names = listing.partition(":")
     readings = [] if reading == "adopted" else reading.split("+")
     if names and how == "fix":
@@ -28,7 +33,10 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 
 
 def looped_fields(sweep: Sweep) -> list[str]:
-    """Return the fields on axes that have one value for all scenes of a batch."""
+    """Return the fields on the sweep's axes that must have one value for all scenes of a batch.
+
+    `batches` makes a batch for each combination of the values of these fields.
+    """
     fields = [axis.field for axis in sweep.axes]
     found = [name for name in fields if name in CHOICES or NUMBERS[name].looped]
     of_arrays = () if sweep.solver.program is None else OF_PROGRAMS
@@ -36,7 +44,11 @@ def looped_fields(sweep: Sweep) -> list[str]:
 
 
 def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch]]:
-    """Yield the batches of some scenes, each with the indices of its scenes among them."""
+    """Yield the batches of the scenes at `where`, each after the positions of its scenes there.
+
+    `where` has an array for each dimension of the grid: the index of every scene along this
+    dimension. The positions are indices into these arrays.
+    """
     columns = value_columns(sweep, where)
     looped = looped_fields(sweep)
     for members, values in groups([columns[name] for name in looped], len(where[0])):
@@ -73,7 +85,11 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
 
 
 def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | None:
-    """Return three numbers for each scene; None if no axis varies any of them."""
+    """Return the components of a quantity for n scenes, shape (n, 3); None if no axis varies them.
+
+    `name` is the quantity, as in ``omega``, of which ``omega.1`` is a field. `own` has the values
+    of the scenes by field. `base` has the numbers of the components that no axis varies.
+    """
     fields = [f"{name}.{axis}" for axis in (1, 2, 3)]
     if not any(field in own for field in fields):
         return None
@@ -82,9 +98,11 @@ def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | 
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return the kind and the values of the bodies; an empty kind and None if no axis varies them.
+    """Return the kind of numbers that describe the bodies, and these numbers, shape (n, 3).
 
-    The kind is `moments` or `coefficients`.
+    The kind is `moments` (kg m2) or `coefficients` (A, B, C of Euler's equations). `own` has the
+    values of the n scenes by field. If no axis varies the body, the kind is empty and the numbers
+    are None.
     """
     if scene.coefficients is not None:
         found = _three("body.coefficients", scene.coefficients, own, n)
@@ -98,8 +116,8 @@ def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
     if "body.square.1" in own or "body.square.2" in own:
         middle = own.get("body.square.1", np.ones(n))
         least = own.get("body.square.2", np.ones(n))
-        # Integrals of x^2, y^2, z^2 over the mass, of which the largest is 1. Every real body has
-        # three.
+        # Every real body has integrals of x^2, y^2 and z^2 over its mass. They are in units of the
+        # largest one here.
         x2, y2, z2 = np.ones(n), middle, middle * least
         size = max(scene.moments) / (x2 + y2)
         return "moments", np.stack([(y2 + z2) * size, (x2 + z2) * size, (x2 + y2) * size], axis=1)
@@ -127,7 +145,12 @@ def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
 
 
 def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) -> Array:
-    """Return unit vectors by their angles from the middle moment's axis and about it (rad)."""
+    """Return unit vectors, shape (n, 3), by two angles that refer to the body's principal axes.
+
+    `tilt` (rad) is the angle from the axis of the middle moment. `azimuth` (rad) is the angle about
+    this axis, from the axis of the least moment. `moments` are those of the n bodies; if None, all
+    scenes have the body of `scene`.
+    """
     bodies = np.array([scene.moments]) if moments is None else moments
     order = np.broadcast_to(np.argsort(bodies, axis=1, kind="stable"), (len(tilt), 3))
     sine = np.sin(tilt)
@@ -138,9 +161,10 @@ def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) ->
 
 
 def _on_sphere(height: Array, longitude: Array) -> Array:
-    """Return unit vectors by their third component and their longitude (rad).
+    """Return unit vectors, shape (n, 3), by their third component `height` and their longitude.
 
-    Equal intervals of the third component are equal areas of the sphere.
+    The longitude (rad) is the angle about the third axis, from the first axis. Equal intervals of
+    the third component are equal areas of the sphere.
     """
     across = np.sqrt(1.0 - height * height)
     return np.stack([across * np.cos(longitude), across * np.sin(longitude), height], axis=1)

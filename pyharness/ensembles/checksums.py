@@ -1,8 +1,9 @@
-"""Checksums of a store: the SHA-256 of each file, bound to its place, its sweep and its version.
+"""Checksums of a store: the SHA-256 of each file, bound to its path, its sweep and its version.
 
-A file of checksums is text that `sha256sum --check` reads. Its first line names the sweep and the
-part of the store. Each further line has the checksum and the path of a file in the store. A file
-that was exchanged with another one, or that belongs to another store, therefore fails the check.
+A file of checksums is text that `sha256sum --check` reads. Its first line names the version
+of pyharness, the sweep and the part of the store. Each further line has the checksum and the path
+of a file in the store. A file that was exchanged with another one, or that belongs to another
+store, therefore fails the check.
 """
 
 import hashlib
@@ -36,7 +37,7 @@ def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], l
     label : Label
         The identity of the store.
     part : str
-        The part of the store that the files are, as in "chunk 0/1".
+        The name of the part of the store to which the files belong, as in "chunk 0/1".
     folder : Path
         The folder of the store.
     names : sequence of str
@@ -60,7 +61,11 @@ def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], l
 def check_files(
     label: Label, part: str, folder: Path, names: Sequence[str], limit: int, checksums: str
 ) -> None:
-    """Raise DamageError if files of a store differ from their checksums in the file `checksums`."""
+    """Raise DamageError if files of a store differ from their checksums in the file `checksums`.
+
+    `checksums` is the path of this file in the store. The other arguments are the same as those of
+    `checksum_text`, with which the file was made.
+    """
     found = checksum_text(label, part, folder, names, limit)
     known = read_bounded(folder, checksums, 2 * len(found))
     if known != found:
@@ -72,7 +77,10 @@ def check_files(
 
 
 def read_bounded(folder: Path, name: str, limit: int) -> bytes:
-    """Return the content of a file of a store; raise DamageError if it exceeds `limit` bytes."""
+    """Return the content of the file `name` of a store.
+
+    Raise DamageError if it is missing, is no regular file, or has more than `limit` bytes.
+    """
     handle = _opened(folder, name, limit)
     try:
         with open(handle, "rb") as file:
@@ -97,9 +105,10 @@ def _digest(folder: Path, name: str, limit: int) -> str:
 
 
 def _opened(folder: Path, name: str, limit: int) -> int:
-    """Return the open descriptor of a regular file.
+    """Open the file `name` of a store for reading, and return its file descriptor.
 
-    Raise DamageError if it is a folder, a device or a pipe, or larger than `limit`.
+    Raise DamageError if the file is missing, is a folder, a device or a pipe, or has more than
+    `limit` bytes.
     """
     try:
         # Without O_NONBLOCK, opening a pipe waits for a writer.
@@ -125,7 +134,7 @@ def _opened(folder: Path, name: str, limit: int) -> int:
 
 
 def exists(folder: Path, name: str) -> bool:
-    """Return whether a path in a store exists; raise DamageError if that can't be determined."""
+    """Return whether a store has the path `name`; raise DamageError if it can't be checked."""
     try:
         os.lstat(folder / name)
     except FileNotFoundError:
@@ -136,9 +145,10 @@ def exists(folder: Path, name: str) -> bool:
 
 
 def clear(folder: Path, name: str) -> None:
-    """Remove whatever is at a file's path, and any file in the place of one of its parent folders.
+    """Remove whatever is at the path `name` in a store, so that a file can be written there.
 
-    A link is removed, but not its target.
+    Also remove any file that has the name of one of its parent folders. A link is removed, but not
+    its target.
     """
     path = folder
     for part in Path(name).parts[:-1]:
@@ -153,7 +163,7 @@ def clear(folder: Path, name: str) -> None:
 
 
 def place(folder: Path, name: str, content: bytes) -> None:
-    """Write a file of a store atomically, so that it is either complete or absent."""
+    """Write the file `name` of a store atomically, so that it never has only part of `content`."""
     path = folder / name
     path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_name(f"{path.name}.{os.urandom(8).hex()}.partial")

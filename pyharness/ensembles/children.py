@@ -12,10 +12,10 @@ from multiprocessing import connection, resource_tracker
 
 @contextlib.contextmanager
 def deaf_children() -> Iterator[None]:
-    """Block Ctrl-C (SIGINT) in all processes and threads that this thread starts meanwhile.
+    """Block Ctrl-C (SIGINT) in all processes and threads that this thread starts in this context.
 
-    A terminal sends SIGINT to all processes, but only this one is to handle it. This thread
-    receives it when the context ends.
+    A terminal sends SIGINT to all processes, but only the parent process is to handle the signal.
+    If a signal arrives during the context, this thread receives it when the context ends.
     """
     # Children inherit a blocked signal. Python would start its resource tracker with the first
     # child, and would then unblock the signal.
@@ -28,10 +28,11 @@ def deaf_children() -> Iterator[None]:
 
 
 def _start_tracker() -> None:
-    """Start Python's resource tracker, which removes semaphores, without its warnings of leftovers.
+    """Start Python's resource tracker so that it does not warn about leftover semaphores.
 
-    After a Ctrl-C the tracker outlives this process, and would write the warnings after this
-    process's last line.
+    The tracker is a process that removes the semaphores that other processes leave behind. After a
+    Ctrl-C the tracker outlives this process, and would write the warnings after this process's last
+    line.
     """
     warning = "ignore:resource_tracker"
     sys.warnoptions.append(warning)

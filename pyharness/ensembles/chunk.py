@@ -1,4 +1,4 @@
-"""Solution of the scenes of a sweep: of a chunk of its grid, or of any scenes."""
+"""Functions that solve scenes of a sweep: all scenes of a chunk of its grid, or a selection."""
 
 from pyharness.ensembles.batches import batches
 from pyharness.ensembles.reductions import empty, reduced
@@ -6,7 +6,12 @@ from pyharness.ensembles.sweep import Arrays, Indices, Sweep, points
 
 
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
-    """Return the arrays of a chunk by name. Every executor runs this function as its task."""
+    """Solve all scenes of a chunk, and return the values of each reduction by its name.
+
+    `chunk` is the number of the chunk, from 0. Each array has the shape of the chunk, and a last
+    dimension of components if a scene has several values. Every executor runs this function as its
+    task.
+    """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)
     found = solve_points(sweep, points(sweep, box))
@@ -14,7 +19,11 @@ def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
-    """Return the arrays of some scenes by name; `where` has their indices for each dimension."""
+    """Solve the scenes at `where`, and return the values of each reduction by its name.
+
+    `where` has an array for each dimension of the grid: the index of every scene along this
+    dimension. The first dimension of each returned array counts these scenes.
+    """
     n = len(where[0])
     found = {asked.name: empty(asked, n) for asked in sweep.reductions}
     for members, batch in batches(sweep, where):

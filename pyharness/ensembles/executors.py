@@ -31,7 +31,11 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(
 
 
 class Engine(NamedTuple):
-    """A started executor: its number of workers, and a function that yields computed chunks."""
+    """A started executor: its number of workers, and a function that computes chunks.
+
+    The function takes a sweep and numbers of its chunks. It yields the number of each chunk with
+    the chunk's arrays by name, in the order in which the chunks are completed.
+    """
 
     workers: int
     computed: Callable[[Sweep, list[int]], Results]
@@ -42,10 +46,12 @@ class Engine(NamedTuple):
 def engine(
     executor: str, workers: int | None = None, address: str | None = None
 ) -> Iterator[Engine]:
-    """Start an executor, yield its engine, and end it.
+    """Start one of `EXECUTORS`, yield its engine, and end it when the context ends.
 
-    Raise InputError if no scheduler answers at the address. The engine's results raise InputError
-    if no process or worker is left to compute them.
+    `workers` is the number of processes, by default the number of processors. `address` is the
+    address of a Dask scheduler; without it, `dask` starts a cluster on this machine. Raise
+    InputError if no scheduler with a worker answers at the address. The results that the engine
+    computes raise InputError if no process or worker is left to compute them.
     """
     if executor == "here":
         yield Engine(1, _here, is_here=True)
@@ -134,7 +140,10 @@ def _client(workers: int, address: str | None) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
-    """Yield a client of a new cluster on this machine; Ctrl-C works while the cluster starts."""
+    """Yield a client of a new Dask cluster on this machine with `workers` processes.
+
+    `dask` is the module `distributed`. Ctrl-C works while the cluster starts.
+    """
     started: list[Any] = []
     errors: list[Exception] = []
     wanted = threading.Event()
@@ -172,7 +181,10 @@ def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
 
 
 def _connected(dask: Any, address: str) -> Any:
-    """Return a client of the scheduler at an address; raise InputError if none answers."""
+    """Return a client of the Dask scheduler at `address`; `dask` is the module `distributed`.
+
+    Raise InputError if no scheduler answers there, or if it has no worker.
+    """
     found = _ADDRESS.fullmatch(address)
     allowed = "allowed: the address of a Dask scheduler with workers, as in tcp://host:8786"
     where = f"--scheduler '{address}'"
@@ -195,7 +207,12 @@ def _connected(dask: Any, address: str) -> Any:
 
 
 async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
-    """Wait without limit until a scheduler has workers; append to `answered` when it answers."""
+    """Wait until the Dask scheduler at `address` has workers; the caller limits the time.
+
+    Append True to `answered` each time when the scheduler answers that it has no workers. The
+    caller can therefore distinguish it from a server that is silent. `dask` is the module
+    `distributed`.
+    """
     # A client would wait for half a minute if a server accepts the connection and stays silent.
     async with dask.rpc(address) as scheduler:
         while not (await scheduler.identity())["workers"]:
@@ -204,9 +221,10 @@ async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
 
 
 def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
-    """Yield the chunks that a cluster computes, and keep all of its workers busy.
+    """Yield the number and the arrays of each chunk as soon as a Dask cluster has computed it.
 
-    Dask computes the chunks of a worker that has died again on another one.
+    `client` is a client of the cluster. All workers are kept busy with submitted chunks. If a
+    worker dies, Dask computes its chunks again on another worker.
     """
     dask: Any = import_module("distributed")
     n_threads = sum(client.nthreads().values())

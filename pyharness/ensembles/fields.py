@@ -1,9 +1,10 @@
-"""Fields that an axis may vary: numbers of a scene or solver, and words that select a solver."""
+"""Fields that an axis may vary: numbers of a scene or solver, and names that select a solver."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-# Fields of words: the program or method, and the program's listing and readings.
+# Fields whose values are names, with the allowed values: the program or method, and the program's
+# listing and readings.
 CHOICES = {
     "program": "a program of the appendix",
     "method": "a method",
@@ -14,10 +15,12 @@ CHOICES = {
 
 @dataclass(frozen=True)
 class Field:
-    """A number of a scene, or of its solver, that an axis may vary.
+    """The properties of a number of a scene, or of its solver, that an axis may vary.
 
-    If `looped`, all scenes of one call share the value. Programs take two of these fields as arrays
-    (`OF_PROGRAMS` in `pyharness.methods.batch`).
+    `units` is its unit and `title` its description. `takes` returns whether a value is allowed, and
+    `allowed` describes the allowed values. If `looped`, all scenes of a batch must have the same
+    value; programs accept two of these fields as arrays, however (`OF_PROGRAMS` in
+    `pyharness.methods.batch`). If `whole`, values are rounded to integers.
     """
 
     units: str
@@ -94,5 +97,5 @@ def field_names() -> list[str]:
 
 
 def units_of(field: str) -> str:
-    """Return the unit of a field; an empty string for a field of words."""
+    """Return the unit of a field; an empty string for a field whose values are names."""
     return NUMBERS[field].units if field in NUMBERS else ""

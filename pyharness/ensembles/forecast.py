@@ -16,8 +16,9 @@ from pyharness.ensembles.sweep import Arrays, Indices, Sweep, spread
 # Numbers of scenes in the samples, which are taken from all over the grid, the smallest first.
 _SAMPLES = (8, 256, 2048, 8192)
 _ENOUGH = 0.2  # s, after which a sample is large enough
-# A larger sample is taken even then if it is at most this part of the sweep and takes at most this
-# long. In a small sample the constant cost of a batch would count as the cost of its scenes.
+# Even after `_ENOUGH`, a larger sample is taken if it is at most the fraction `_PART` of all scenes
+# and takes at most `_LONGEST`. In a small sample the constant cost of a batch would count as the
+# cost of its scenes.
 _PART = 0.01
 _LONGEST = 60.0  # s
 _PLACES = 5  # distinct values in a sample along a dimension whose value a batch shares
@@ -27,7 +28,12 @@ _FILES = 20  # largest number of chunks that are tried for a sample
 
 @dataclass(frozen=True)
 class Estimate:
-    """The expected cost of a sweep's missing chunks: bytes before compression, and seconds."""
+    """The expected cost of computing the missing chunks of a sweep.
+
+    `n_scenes` and `n_chunks` count the scenes and chunks of the whole sweep, and `n_missing` the
+    chunks to compute. `n_bytes` is the size of these chunks on disk, before compression. `memory`
+    is the memory that all workers need together, in bytes. `seconds` is the duration.
+    """
 
     n_scenes: int
     n_chunks: int
@@ -40,7 +46,9 @@ class Estimate:
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
     """Return the seconds to solve and write the missing chunks of a store, and to read all chunks.
 
-    If other processes compute, this process only writes. The longer of the two times counts then.
+    `path` is the path of the store, and `own` the engine that computes the chunks. If other
+    processes compute, this process writes at the same time. In this case only the longer of the
+    times to solve and to write counts.
     """
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
@@ -49,9 +57,10 @@ def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
 
 
 def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
-    """Return the seconds to write and to read the files of a chunk, measured next to a store.
+    """Return the mean seconds to write and to read the files of a chunk, measured next to `path`.
 
-    Both are 0 if the disk refuses the files; the sweep itself then reports the error.
+    The measurement uses a temporary store in the folder that contains the store `path`. Both times
+    are 0 if the disk refuses the files; the sweep itself then reports the error.
     """
     times = []
     try:
@@ -74,7 +83,11 @@ def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
 
 
 def _pattern(sweep: Sweep, chunk: int) -> Arrays:
-    """Return arrays of a chunk with random values, which can't be compressed to almost nothing."""
+    """Return arrays like the results of a chunk, but with random values.
+
+    A file of equal values would be compressed to almost nothing, and written too fast. The number
+    `chunk` is the seed of the random values.
+    """
     draw = np.random.default_rng(chunk)
     shape = tuple(part.stop - part.start for part in sweep.box(chunk))
     found = {}
@@ -87,7 +100,7 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def seconds_per_chunk(sweep: Sweep) -> float:
-    """Return the seconds to solve a chunk, measured on a sample of scenes or of whole chunks."""
+    """Return the seconds to solve a chunk in this process, measured on scenes or whole chunks."""
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)
     if seconds > _ENOUGH:
@@ -121,9 +134,12 @@ def seconds_per_scene(sweep: Sweep) -> float:
 
 
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
-    """Return a sample moved to a few values of each dimension whose value a batch shares.
+    """Return the indices of sampled scenes, moved so that many of them share a batch.
 
-    The batches of the sample then have many scenes, as those of a chunk do.
+    `where` and the result have an array for each dimension of the grid: the indices of the scenes
+    along this dimension. All scenes of a batch have the same value along some of the dimensions.
+    The scenes are moved to at most five values along these. The batches of the sample therefore
+    have many scenes, as the batches of a chunk do.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found = []
@@ -159,12 +175,12 @@ def duration(seconds: float) -> str:
 
 
 def short_count(number: int) -> str:
-    """Return a count as text, with all its digits, or with four if it is large."""
+    """Return a count as text, with all its digits, or with four digits from ten million."""
     return str(number) if number < 10**7 else f"{float(number):.4g}"
 
 
 def byte_count(number: float) -> str:
-    """Return a number of bytes as text, with its unit."""
+    """Return a number of bytes as text, with three digits and a decimal unit, as in 1.25 MB."""
     for unit in ("bytes", "kB", "MB", "GB", "TB"):
         if number < 1000.0:
             return f"{number:.3g} {unit}"

@@ -1,4 +1,7 @@
-"""The picture of a sweep: a reduction over one or two dimensions, with panels for the others."""
+"""The picture of a sweep: a reduction over one or two dimensions of the grid, in panels.
+
+Each panel has fixed values along the other dimensions.
+"""
 
 import itertools
 from typing import TYPE_CHECKING, Any
@@ -18,14 +21,18 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _MOST_PANELS = 6
-_MOST_PLACES = 200  # points along an axis of a map; more would not be visible
+_MOST_PLACES = 200  # values along an axis of a map; more would not be visible
 _MOST_DOTS = 5000
 _COLUMNS = 3
 _ORDERS = 3.0  # orders of magnitude above which positive values are shown on a logarithmic scale
 
 
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
-    """Return the reduction to draw: the named one, or the first whose values are not words."""
+    """Return the reduction to draw: the reduction `name`, or by default the first with numbers.
+
+    A reduction whose integers represent outcomes, such as `status`, is the default only if the
+    sweep has no other reductions. Raise InputError if the sweep has no reduction `name`.
+    """
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
         raise unknown("reduction", name, names, "--quantity")
@@ -34,9 +41,10 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 
 
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
-    """Return the picture of a reduction.
+    """Return the picture of the reduction `asked`, with the values in a store.
 
-    It is a map if two dimensions have numbers on a grid, else a line or dots.
+    The picture is a map over the last two dimensions that have several numbers, listed or with a
+    spacing. If the grid has fewer than two such dimensions, the picture is a line or dots.
     """
     from matplotlib.figure import Figure
 
@@ -87,7 +95,12 @@ Panel = tuple[str, list[Array], Array]
 def _panels(
     store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], shown: list[str]
 ) -> list[Panel]:
-    """Return the panels: the fixed values in words, the indices along `shown`, and the values."""
+    """Return the panels of the picture of a reduction: title, indices and values of each.
+
+    `shown` names the dimensions that each panel shows, and `axis_of` has the axis of every
+    dimension. The title states the fixed values along the other dimensions, and the component of
+    the reduction. The indices, an array for each dimension of `shown`, select the drawn values.
+    """
     reduction = REDUCTIONS[asked.reduction]
     most = _MOST_PLACES if len(shown) == 2 else _MOST_DOTS
     places = [_thinned(axis_of[d].count, most) for d in shown]

@@ -1,4 +1,4 @@
-"""Reductions: the quantities that are kept for each scene, with their functions and properties."""
+"""Reductions: the quantities that a sweep keeps for each scene, and how each is computed."""
 
 import importlib
 from collections.abc import Callable, Mapping
@@ -16,7 +16,7 @@ from pyharness.model.trajectory import STOP_VARIABLES, Array
 from pyharness.theory.flips import flip_times
 
 Found = NDArray[Any]
-# The axes of a body, in the order of their moments.
+# Names of a body's principal axes, in ascending order of their moments.
 RANKS = ("least", "middle", "largest")
 # Value of an integer array where no scene has been computed yet.
 _NOT_YET = -1
@@ -24,26 +24,29 @@ _NOT_YET = -1
 
 @dataclass(frozen=True)
 class Reduction:
-    """A quantity that is kept for each scene, and the conditions under which it is available.
+    """A quantity that a sweep can keep for each scene, and the scenes for which it is available.
 
     Attributes
     ----------
     title, units : str
         The description of the quantity in words, and its unit.
     compute : callable
-        A function of a batch and of the parameters by name, which returns n values.
+        A function of a batch of n scenes, and of the parameters by name. It returns an array of n
+        values, or of n rows if `labels` is not empty.
     dtype : str
-        The type of the array. NaN, or -1 in an integer array, marks values not computed yet.
+        The NumPy type of the array. NaN, or -1 in an integer array, marks values not computed yet.
     labels : tuple of str
-        The labels of the last dimension, `dimension`, if a scene has several values.
+        The labels of the values if a scene has several values.
+    dimension : str
+        The name of the last dimension of the array, along which `labels` run; empty without labels.
     only : str
         `program` or `method` if only one of these can give the quantity.
     needs : tuple of str
-        The requirements, from `moments`, `no torque` and `attitude`.
+        The requirements on scene and method, from `moments`, `no torque` and `attitude`.
     parameters : mapping
         The names of the parameters, with their default values.
     flags : mapping
-        The meaning of each value in words, if the values are codes.
+        The meaning of each value, if the values are integers that represent outcomes.
     """
 
     title: str
@@ -59,7 +62,7 @@ class Reduction:
 
     @property
     def fill(self) -> Any:
-        """Return the value that marks a result not computed yet."""
+        """Return the value that marks a result not computed yet: NaN, or -1 for integers."""
         return np.nan if self.dtype == "f8" else _NOT_YET
 
 
@@ -257,14 +260,14 @@ REDUCTIONS = {
 
 
 def empty(asked: ReductionSpec, n: int) -> Found:
-    """Return the array of a reduction for n scenes, none of which is computed yet."""
+    """Return an array for the results of the reduction `asked` in n scenes, none computed yet."""
     reduction = REDUCTIONS[asked.reduction]
     shape = (n, len(reduction.labels)) if reduction.labels else (n,)
     return np.full(shape, reduction.fill, dtype=reduction.dtype)
 
 
 def reduced(asked: ReductionSpec, batch: Batch) -> Found:
-    """Return the values of a reduction for a batch."""
+    """Compute the reduction `asked` for a batch; return an array with a row for each scene."""
     given = {**dict(asked.parameters), "function": asked.function}
     # Infinities and NaN are results like others.
     with np.errstate(all="ignore"):

@@ -27,9 +27,11 @@ _FLAGS = (*words("reduction value"), Column("scenes"))
 
 
 class Found(NamedTuple):
-    """Statistics of a reduction, or of a component of one.
+    """Statistics over all scenes of a reduction, or of one component of its values.
 
-    `scenes` counts the scenes with a finite value, and `none` the others.
+    `name` is the name of the reduction and `label` the component, which is empty if there is only
+    one. `scenes` counts the scenes with a finite value, and `none` the other scenes. `least`,
+    `mean` and `largest` of the finite values are in `units`; they are None without such values.
     """
 
     name: str
@@ -43,7 +45,11 @@ class Found(NamedTuple):
 
 
 def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
-    """Return the statistics of a reduction by component; for codes, the count of each code."""
+    """Return statistics of the reduction `asked` over all scenes of a store, by component.
+
+    If the values are integers that represent outcomes, as for `status`, the statistics are empty,
+    and the second result counts the scenes with each integer. Otherwise it is empty.
+    """
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)
     count, none, total = (np.zeros(len(labels)) for _ in range(3))
@@ -79,7 +85,10 @@ def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[in
 
 
 def sweep_report(store: Store, outcome: Outcome, path: str) -> Report:
-    """Return the report of a store's content, and of the work that this call did."""
+    """Return the report of a sweep: its axes, statistics of its results, and the work of this run.
+
+    `outcome` describes the work of this run, and `path` is the path of the store.
+    """
     sweep = store.sweep
     found: list[Found] = []
     flags: list[tuple[str, str, int]] = []

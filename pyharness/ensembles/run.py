@@ -17,17 +17,19 @@ from pyharness.ensembles.sweep import Sweep
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
 
-# Memory of a process, in chunks: those that it holds at once, and what computing them takes.
+# Memory that a process needs, divided by the size of a chunk: the process holds several chunks at
+# once, and computing them takes more.
 _COPIES = 12
 _MOST_CHUNKS = 1_000_000
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The work that a call did.
+    """The work that one run of a sweep did.
 
-    `before` counts the chunks that existed before, `computed` those that were computed in
-    `seconds`, and `repaired` those of the computed ones that had been damaged.
+    `estimate` is the forecast, or None if no chunk was missing. `before` counts the chunks that the
+    store had before, and `computed` the chunks that were computed in `seconds`. `repaired` counts
+    the computed chunks that had been damaged.
     """
 
     estimate: Estimate | None
@@ -38,15 +40,16 @@ class Outcome:
 
 
 def bytes_per_scene(sweep: Sweep) -> int:
-    """Return the number of bytes of a scene in the store, before compression."""
+    """Return the size in bytes of the results of one scene in the store, before compression."""
     return sum(empty(asked, 1).nbytes for asked in sweep.reductions)
 
 
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
-    """Return the bytes that a sweep needs on disk, for `missing` chunks, and in memory.
+    """Return the bytes that `missing` chunks need on disk, and the bytes of memory for `workers`.
 
-    Raise InputError if the disk or the memory can't hold them. The check allocates nothing, so that
-    a grid of any size is refused at once.
+    `path` is the path of the store, and `workers` the number of processes. Raise InputError if the
+    disk or half of the memory can't hold these bytes, or if there are too many chunks. The check
+    allocates nothing, so that a grid of any size is refused at once.
     """
     n_bytes = sweep.n_scenes * bytes_per_scene(sweep) * missing // sweep.n_chunks
     shown = f"{short_count(sweep.n_scenes)} scenes in {short_count(sweep.n_chunks)} chunks"
@@ -88,9 +91,10 @@ def swept(
     progress: Progress = no_progress,
     repair: bool = False,
 ) -> Iterator[tuple[Store, Outcome]]:
-    """Compute the missing chunks of a sweep, and yield the open store and the outcome.
+    """Compute the missing chunks of a sweep, and yield the open store and the outcome of the run.
 
-    The parameters and errors are those of `run_sweep`.
+    The parameters and errors are the same as those of `run_sweep`. The store is locked against
+    other processes until the context ends.
     """
     is_there = check_store(sweep, path)
     check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)
@@ -118,7 +122,7 @@ def run_sweep(
     progress: Progress = no_progress,
     repair: bool = False,
 ) -> Outcome:
-    """Compute the chunks of a sweep that a store does not have yet.
+    """Compute the chunks of a sweep that its store does not have yet, and return the outcome.
 
     Parameters
     ----------
@@ -131,11 +135,13 @@ def run_sweep(
     workers : int, optional
         The number of processes; by default the number of processors.
     address : str, optional
-        The address of a scheduler, for `dask`.
+        The address of a Dask scheduler, as in ``tcp://host:8786``, for the executor `dask`. By
+        default this executor starts a cluster on this machine.
     before : callable
-        A function that is called with the estimate before anything is computed.
+        A function that is called with the forecast before anything is computed.
     progress : callable
-        A function that is called with a line of text after each chunk.
+        A function that is called after each chunk with the number of computed chunks, the number of
+        chunks to compute, and the text "chunks".
     repair : bool
         Whether to compute damaged chunks again, and to write damaged metadata again, instead of
         raising an error.

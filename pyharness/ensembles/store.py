@@ -1,9 +1,9 @@
-"""The store of a sweep: a Zarr group in a folder, one array for each reduction.
+"""The store of a sweep: a Zarr group in a folder, with one array for each reduction.
 
-A chunk of the grid is one file of each array, and a file of their checksums, which is written last.
-Every file is written under another name and then renamed. A chunk with checksums is therefore
-complete, whenever and however the writing ended. The checksums show whether the files still are as
-they were written.
+A chunk of the grid is stored in one file of each array, and in a file with the checksums of these
+files, which is written last. Every file is written under another name and then renamed. A chunk
+with checksums is therefore complete, whenever and however the writing ended. The checksums show
+whether the files still are as they were written.
 """
 
 import contextlib
@@ -53,7 +53,7 @@ def check_zarr() -> None:
 
 
 class Store:
-    """The store of one sweep, opened by `opened`.
+    """The open store of one sweep: a folder with an array for each reduction. `opened` makes it.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Store:
     """
 
     def __init__(self, sweep: Sweep, folder: Path) -> None:
-        """Open the arrays in an existing folder."""
+        """Open the arrays of the store of `sweep` in an existing folder."""
         import zarr
 
         self.sweep, self.folder, self.repaired = sweep, folder, 0
@@ -82,7 +82,8 @@ class Store:
     def check(self, repair: bool = False) -> None:
         """Find the chunks that are complete, and compare each of them with its checksums.
 
-        Raise InputError if a chunk is damaged; with `repair` it is removed instead.
+        Raise InputError if a chunk is damaged. With `repair`, remove the files of damaged chunks
+        instead, so that they are computed again.
         """
         damages = {}
         for chunk in range(self.sweep.n_chunks):
@@ -106,11 +107,14 @@ class Store:
         self.repaired = len(damages)
 
     def done(self) -> list[bool]:
-        """Return for each chunk whether it is complete."""
+        """Return, for each chunk of the sweep, whether it is complete in the store."""
         return list(self._done)
 
     def write(self, chunk: int, found: Arrays) -> None:
-        """Write a chunk. Raise OSError if the disk refuses it; the chunk is then not complete."""
+        """Write the arrays of a chunk, `found` by the name of the reduction, and their checksums.
+
+        Raise OSError if the disk refuses one of the files; the chunk is then not complete.
+        """
         for name, array in self._arrays.items():
             array[self.sweep.box(chunk)] = found[name]
         try:
@@ -121,15 +125,15 @@ class Store:
         self._done[chunk] = True
 
     def read(self, name: str, chunk: int) -> Any:
-        """Return a chunk of a reduction's array."""
+        """Return the part of the array of the reduction `name` that belongs to a chunk."""
         return self._arrays[name][self.sweep.box(chunk)]
 
     def array(self, name: str) -> Any:
-        """Return the Zarr array of a reduction, which reads only the parts that are indexed."""
+        """Return the Zarr array of the reduction `name`, which reads only the indexed parts."""
         return self._arrays[name]
 
     def _is_done(self, chunk: int) -> bool:
-        """Return whether a chunk is complete; raise DamageError if it is not as it was written."""
+        """Return whether a chunk is complete; raise DamageError if its files are damaged."""
         checksums = self._checksums(chunk)
         if exists(self.folder, checksums):
             check_files(*self._described(chunk), checksums)
@@ -157,11 +161,11 @@ class Store:
 
 @contextlib.contextmanager
 def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
-    """Make or open the store of a sweep, lock it against other processes, and check all of it.
+    """Make or open the store of a sweep, lock it against other processes, check it, and yield it.
 
-    Raise InputError if the path is the store of another sweep, a folder that is no store, or a
-    damaged store; all of these stay as they are. With `repair`, damaged chunks are removed and
-    count as not computed yet, and damaged metadata are written again.
+    Raise InputError if `path` is the store of another sweep, a folder that is no store, or a
+    damaged store; its files then stay as they are. With `repair`, damage is no error: damaged
+    chunks are removed and count as not computed yet, and damaged metadata are written again.
     """
     check_zarr()
     folder = Path(path)
@@ -193,9 +197,9 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
 
 
 def check_store(sweep: Sweep, path: str) -> bool:
-    """Return whether a path has the store of this sweep.
+    """Return whether `path` is the store of this sweep; return False if it is missing or empty.
 
-    Raise InputError if the path has anything else, or if no store can be made there.
+    Raise InputError if the path is anything else, or if no store can be made there.
     """
     folder = Path(path)
     if not path or "\0" in path:
@@ -218,7 +222,8 @@ def check_store(sweep: Sweep, path: str) -> bool:
     ours, known = label(sweep), labels(folder)
     if not known:
         raise InputError(f"--out '{path}': is not empty, and no store of a sweep; give a new name")
-    # Either identity may be damaged, which is found and reported when the store is opened.
+    # The store states its identity in two files. One of them may be damaged, which is found and
+    # reported when the store is opened.
     if any(type(each.schema) is int and each == ours for each in known):
         return True
     found = known[0]
@@ -235,9 +240,9 @@ def check_store(sweep: Sweep, path: str) -> bool:
 
 
 def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
-    """Compare the metadata with their checksums, and write damaged metadata again with `repair`.
+    """Compare the metadata of the store in `folder` with their checksums.
 
-    Raise InputError if they are damaged and `repair` is not set.
+    If they differ, raise InputError or, with `repair`, write the metadata of `sweep` again.
     """
     files = metadata_files(sweep)
     try:
@@ -255,12 +260,15 @@ def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
 
 
 def _make(sweep: Sweep, folder: Path) -> None:
-    """Make the store under another name and rename it, so that it is either complete or absent."""
+    """Make the store of a sweep under another name, and rename it to `folder`.
+
+    The folder is therefore either a complete store or absent.
+    """
     with filled(sweep, folder) as new:
         try:
             os.rename(new, folder)
         except OSError as error:
-            # Another process was faster, and its store is used as any other.
+            # Another process has made the store meanwhile, and its store is used.
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST) or not check_store(
                 sweep, str(folder)
             ):
@@ -269,6 +277,9 @@ def _make(sweep: Sweep, folder: Path) -> None:
 
 @contextlib.contextmanager
 def scratch(sweep: Sweep, path: str) -> Iterator[Store]:
-    """Yield an empty store of a sweep next to a path, for trials, and remove it."""
+    """Yield a temporary store of a sweep without results, and remove it when the context ends.
+
+    The store is in the folder that contains `path`. It serves to measure the speed of the disk.
+    """
     with filled(sweep, Path(path)) as new:
         yield Store(sweep, new)

@@ -35,12 +35,16 @@ _HEAD = re.compile(
 
 
 def label(sweep: Sweep) -> Label:
-    """Return the identity of a sweep's store."""
+    """Return the identity that this version of pyharness gives to the store of a sweep."""
     return Label(SCHEMAS["sweep store"], version(), sweep.fingerprint)
 
 
 def labels(folder: Path) -> list[Label]:
-    """Return the identities of a store that its metadata and the checksums of these state."""
+    """Return the identities that the files of a store state, at most two.
+
+    One identity is from the metadata, the other from the first line of the file with the checksums
+    of the metadata. An identity that can't be read is left out.
+    """
     found = []
     with contextlib.suppress(
         DamageError, OSError, ValueError, LookupError, TypeError, RecursionError
@@ -58,7 +62,10 @@ def labels(folder: Path) -> list[Label]:
 
 
 def metadata_files(sweep: Sweep) -> list[str]:
-    """Return the files of a store that belong to no chunk: metadata, and the values of the axes."""
+    """Return the paths of the files of a store that belong to no chunk.
+
+    These files have the metadata, the values of the axes, and the labels of components.
+    """
     labels = {
         reduction.dimension
         for reduction in (REDUCTIONS[asked.reduction] for asked in sweep.reductions)
@@ -74,7 +81,10 @@ def metadata_files(sweep: Sweep) -> list[str]:
 
 @contextlib.contextmanager
 def filled(sweep: Sweep, folder: Path) -> Iterator[Path]:
-    """Yield a new store next to a folder, and remove what is left of it."""
+    """Make a store without results next to `folder`, and yield its path.
+
+    When the context ends, all of its files that the caller has not moved are removed.
+    """
     new = folder.absolute().with_name(f".pyharness-{os.urandom(8).hex()}-new")
     try:
         _fill(sweep, new)
@@ -164,6 +174,6 @@ def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> Non
 
 
 def largest_chunk(sweep: Sweep) -> int:
-    """Return the largest size of a chunk's file in bytes, compressed or not."""
+    """Return an upper bound for the size of one file of a chunk in bytes, compressed or not."""
     scenes = math.prod(sweep.chunk_shape)
     return 65536 + 2 * scenes * max(empty(asked, 1).nbytes for asked in sweep.reductions)

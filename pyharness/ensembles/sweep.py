@@ -18,10 +18,11 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class ReductionSpec:
-    """A requested reduction, with the name of its array.
+    """A reduction that a sweep requests, with its parameters and the name of its array.
 
-    For a claim, `function` is the place of its function, as in ``package.module:name``; for other
-    reductions it is empty.
+    `name` is the name of the array, and `reduction` a key of `REDUCTIONS`. If the reduction is
+    `claim`, `function` names the function that checks the claim, as in ``package.module:name``; for
+    other reductions it is empty.
     """
 
     name: str
@@ -32,7 +33,7 @@ class ReductionSpec:
 
 @dataclass(frozen=True)
 class Sweep:
-    """The content of a sweep file.
+    """One sweep as a sweep file describes it: scenes on a grid, their solver and the results kept.
 
     Attributes
     ----------
@@ -68,20 +69,21 @@ class Sweep:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Return the lengths of the dimensions."""
+        """Return the number of scenes along each dimension of the grid."""
         return tuple(self.dimensions.values())
 
     @property
     def n_scenes(self) -> int:
-        """Return the number of scenes."""
+        """Return the number of scenes of the whole grid."""
         return math.prod(self.shape)
 
     @property
     def chunk_shape(self) -> tuple[int, ...]:
-        """Return the lengths of a chunk.
+        """Return the number of scenes of a chunk along each dimension of the grid.
 
-        The last dimensions are whole, one dimension is divided, and those before it have length 1.
-        A chunk never holds two programs, methods, listings or readings.
+        A chunk covers the last dimensions completely and one dimension in part. It has length 1
+        along all dimensions before this one, and along dimensions of programs, methods, listings or
+        readings, so that a chunk has only one of each.
         """
         single = {axis.dimension for axis in self.axes if axis.is_choice}
         room = self.chunk
@@ -94,20 +96,23 @@ class Sweep:
 
     @property
     def chunk_counts(self) -> tuple[int, ...]:
-        """Return the number of chunks along each dimension."""
+        """Return the number of chunks along each dimension of the grid."""
         return tuple(-(-n // c) for n, c in zip(self.shape, self.chunk_shape, strict=True))
 
     @property
     def n_chunks(self) -> int:
-        """Return the number of chunks."""
+        """Return the number of chunks of the whole grid."""
         return math.prod(self.chunk_counts)
 
     def place(self, chunk: int) -> tuple[int, ...]:
-        """Return the indices of a chunk among the chunks, counted from 0 along each dimension."""
+        """Return the index of a chunk along each dimension, counted in chunks from 0.
+
+        `chunk` is the number of the chunk in the whole grid, from 0.
+        """
         return tuple(int(each) for each in np.unravel_index(chunk, self.chunk_counts))
 
     def box(self, chunk: int) -> tuple[slice, ...]:
-        """Return the part of the grid that a chunk covers."""
+        """Return the part of the grid that a chunk covers, as a slice of each dimension."""
         return tuple(
             slice(at * length, min(n, (at + 1) * length))
             for at, length, n in zip(self.place(chunk), self.chunk_shape, self.shape, strict=True)
@@ -115,13 +120,20 @@ class Sweep:
 
 
 def points(sweep: Sweep, box: tuple[slice, ...]) -> list[Indices]:
-    """Return the indices of all scenes of a box for each dimension; the last one varies fastest."""
+    """Return the indices of all scenes in a part of the grid, an array for each dimension.
+
+    `box` has a slice of each dimension. The index along the last dimension varies fastest.
+    """
     ranges = [np.arange(part.start, part.stop) for part in box]
     return [each.ravel() for each in np.meshgrid(*ranges, indexing="ij")]
 
 
 def spread(sweep: Sweep, count: int) -> list[Indices]:
-    """Return the indices of `count` scenes from all over the grid, including both ends."""
+    """Return the indices of `count` scenes that are evenly spread over the grid.
+
+    The result has an array for each dimension of the grid. Two or more scenes include the first and
+    the last scene of the grid.
+    """
     # Python integers, because a grid may have more scenes than 64 bits can count.
     total = sweep.n_scenes
     count = min(count, total)
@@ -135,13 +147,20 @@ def spread(sweep: Sweep, count: int) -> list[Indices]:
 
 
 def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]:
-    """Return the values of every axis at some scenes, by field."""
+    """Return, by field, the values of every axis for the scenes at `where`.
+
+    `where` has an array for each dimension of the grid: the index of every scene along this
+    dimension. Each array of the result has one value for each scene.
+    """
     at = dict(zip(sweep.dimensions, where, strict=True))
     return {axis.field: axis.coordinates()[at[axis.dimension]] for axis in sweep.axes}
 
 
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
-    """Return the members of each distinct row of columns, in order of appearance, with the row."""
+    """Return the groups of the indices 0 to n - 1 that have the same values in all `columns`.
+
+    For each group, return its indices in ascending order, and its values, one from each column.
+    """
     if not columns:
         return [(np.arange(n), ())]
     numbered = [np.unique(column, return_inverse=True) for column in columns]

@@ -1,4 +1,4 @@
-"""Reading of a sweep file, TOML text that is checked once and describes a sweep."""
+"""Reading and checking of a sweep file, the TOML text that describes a sweep."""
 
 import hashlib
 import itertools
@@ -51,9 +51,10 @@ def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = 
     path : path
         The path of the file. The path of a scene file that it names is relative to its folder.
     claims : mapping, optional
-        The function of each claim, as in ``package.module:name``. It takes a `Batch` of n scenes
-        and returns a code for each scene. The codes are 1 if the claim holds, 0 if it fails, 2 if
-        it does not apply to the scene, and 3 if it holds in part.
+        The function that checks each claim, by the claim's identifier, as in
+        ``package.module:name``. It takes a `Batch` of n scenes and returns an integer for each
+        scene: 1 if the claim holds, 0 if it fails, 2 if it does not apply to the scene, and 3 if it
+        holds in part.
 
     Raises
     ------
@@ -100,7 +101,11 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, str
 
 
 def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
-    """Return the scene from which all others are made, and the content of its file, if any."""
+    """Return the scene from which all scenes of a sweep are made, and the bytes of its scene file.
+
+    `table` is the table [scene] of the sweep file, and `path` the path of the sweep file. A zero
+    byte precedes the bytes, which are empty if the table names no scene file.
+    """
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
     given = [key for key in ("case", "file") if key in table]
@@ -239,7 +244,10 @@ def _choices(sweep: Sweep, field: str, default: str | None) -> Iterable[str]:
 
 
 def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
-    """Yield each combination of words in a scene; words along one dimension vary together."""
+    """Yield each combination of program, method, listing and reading that occurs on the axes.
+
+    A combination has the names by field. Axes of one dimension vary together.
+    """
     words = [axis for axis in axes if axis.is_choice]
     counts = {axis.dimension: axis.count for axis in words}
     for at in itertools.product(*map(range, counts.values())):
@@ -248,7 +256,10 @@ def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
 
 
 def _check_solvers(sweep: Sweep) -> None:
-    """Raise InputError for an unknown program, method, listing or reading, or a wrong setting."""
+    """Raise InputError if the sweep has an unknown program, method, listing or reading.
+
+    Also raise it if a method does not allow the tolerance, or if a time `t_end` is 0.
+    """
     solver = sweep.solver
     for program in _choices(sweep, "program", solver.program):
         if program not in PROGRAMS:

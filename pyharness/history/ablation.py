@@ -21,7 +21,12 @@ from pyharness.truth.reference import Reference, reference
 
 @dataclass(frozen=True)
 class Effect:
-    """The largest errors of one listing on a scene (rad/s and m/s), over the steps that it ran."""
+    """The outcome of one listing on one scene: its largest errors, and how the run ended.
+
+    `omega` (rad/s) and `velocity` (translational, m/s) are the largest errors of any component over
+    the completed `steps`. `ended` is how the run ended, as in `Trajectory`. `stop` is the variable
+    and step at which the stop test ended the run, or None.
+    """
 
     listing: Listing
     omega: float
@@ -33,7 +38,11 @@ class Effect:
 
 @dataclass(frozen=True)
 class CaseEffects:
-    """The effects of an apparatus entry in one program and case, corrected alone and kept alone."""
+    """The effect of one apparatus entry in one program and case, shown by four listings.
+
+    The listings are the original program, the original with this entry alone corrected, the
+    corrected program with this entry alone kept, and the corrected program.
+    """
 
     program: str
     case: int
@@ -44,7 +53,10 @@ class CaseEffects:
 
 
 def entries(kind: str | None = None) -> list[dict[str, Any]]:
-    """Return the apparatus entries of one kind or of all; raise InputError for an unknown kind."""
+    """Return the apparatus entries of one kind, as in `data/apparatus.toml`; None means all kinds.
+
+    Raise InputError if no entry has that kind.
+    """
     everything: list[dict[str, Any]] = facts("apparatus")["entry"]
     kinds = sorted({entry["kind"] for entry in everything})
     if kind is not None and kind not in kinds:
@@ -53,7 +65,7 @@ def entries(kind: str | None = None) -> list[dict[str, Any]]:
 
 
 def entry(name: str) -> dict[str, Any]:
-    """Return an entry of the apparatus; raise InputError if no entry has that name."""
+    """Return the apparatus entry with the identifier `name`; raise InputError if none has it."""
     by_name = {each["id"]: each for each in entries()}
     if name not in by_name:
         raise unknown("entry", name, list(by_name))
@@ -61,7 +73,11 @@ def entry(name: str) -> dict[str, Any]:
 
 
 def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0) -> Effect:
-    """Run a listing and compare it with `truth`, a reference with velocity at the scene's times."""
+    """Run a listing on a scene, and return its largest errors and how the run ended.
+
+    `truth` is the reference solution at the scene's times, with the translational velocity.
+    `effort` is a factor on the work limit.
+    """
     run = run_program(scene, listing, effort=effort)
     found = accuracy(scene, run, truth)
     velocity = math.nan if found.velocity is None else found.velocity
@@ -70,16 +86,17 @@ def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0
 
 @cache
 def case_truth(case: int) -> Reference:
-    """Return the reference solution of a case, with velocity; it is computed once."""
+    """Return the reference solution of a case at its steps, with translational velocity; cached."""
     scene = case_scene(case)
     return reference(scene, scene.times(), velocity=True)
 
 
 def effects_of(name: str) -> Iterator[CaseEffects]:
-    """Yield the effect of a flagged apparatus entry in each of its programs, case by case.
+    """Yield the effect of the apparatus entry `name` in each of its programs, case by case.
 
-    For a reading or a conjecture, `original` is the original listing with it, and `corrected_alone`
-    the original listing without it. No listing has a reading by default.
+    The entry must be a switch of the programs. For a reading or a conjecture, `original` is the
+    original listing with it, and `corrected_alone` the original listing without it. No listing has
+    a reading by default.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -105,9 +122,11 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
 def lattice(
     scene: Scene, program: str, readings: tuple[str, ...] = (), effort: float = 1.0
 ) -> list[Effect]:
-    """Return the effect of every subset of a program's defects, largest error of omega first.
+    """Return the outcome of a program with every subset of its defects, largest error first.
 
-    The subsets also include or omit each of `readings`; the corrected program has no reading.
+    The errors are of omega against the reference solution. The subsets also include or omit each
+    reading named in `readings` and, if the torque varies, the conjectures of the original program.
+    A reading changes no corrected statement. `effort` is a factor on the work limit.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
@@ -117,9 +136,10 @@ def lattice(
 
 
 def switched(scene: Scene, program: str) -> tuple[str, ...]:
-    """Return the switches that can affect a scene.
+    """Return the names of the program's defects and conjectures that can affect a scene.
 
-    Under a constant torque only defects can, because the conjectures are about varying torques.
+    Under a constant torque only defects can affect the scene, because the conjectures are about
+    varying torques.
     """
     return switches(program) if scene.torque.varies else names_of("defect", program)
 

@@ -39,7 +39,10 @@ _HALF = 48  # width of each of two texts printed side by side
 
 
 def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
-    """Report a line for each entry: its name, kind, certainty, flag and summary."""
+    """Return the report of the apparatus, with a line for each entry.
+
+    A line has the name, kind, certainty, flag (number of the switch in the programs) and summary.
+    """
     rows = [
         [each["id"], each["kind"], each["certainty"], each.get("flag", "-"), each["summary"]]
         for each in entries
@@ -55,7 +58,11 @@ def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
 def entry_report(
     entry: dict[str, Any], effects: Sequence[CaseEffects], names: Sequence[str] = FIELDS
 ) -> Report:
-    """Report one entry with the fields in `names`, and its effect by program and case."""
+    """Return the report of one entry of the apparatus, and of its effect by program and case.
+
+    `names` are the fields of the entry that are shown. `effects` is empty if the entry has no
+    effect to be shown.
+    """
     cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
     what = {each["siglum"]: each["what"] for each in facts("cards/scan")["ground"]}
     grounds = "; ".join(f"{siglum}, {what[siglum]}" for siglum in entry["grounds"])
@@ -78,14 +85,17 @@ def entry_report(
 
 
 def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
-    """Return two texts side by side under their heads."""
+    """Return lines with two of the `texts` side by side; `heads` are their names and headings."""
     columns = [[head, "-" * _HALF, *textwrap.wrap(texts[head], _HALF)] for head in heads]
     pairs = zip_longest(*columns, fillvalue="")
     return [Line(f"{a.ljust(_HALF)}   {b}".rstrip()) for a, b in pairs]
 
 
 def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
-    """Return tables of the errors and stops of four listings, by program and case."""
+    """Return a table for each program with the errors and stops of four listings, by case.
+
+    `is_reading` is true for a reading and a conjecture, whose four listings have other names.
+    """
     columns = ("original", "this alone corrected", "this alone kept", "all corrected")
     if is_reading:
         columns = ("original, with it", "original", "corrected, with it", "corrected")
@@ -108,7 +118,11 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
 
 
 def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
-    """Report every subset of each program's defects, written as letters and sorted by effect."""
+    """Return the report of every subset of each program's defects, with the errors it causes.
+
+    `found` has, by program, the outcomes in the order of the report. A subset is written as
+    letters, one for each active defect, conjecture or reading.
+    """
     text: list[Section] = []
     rows = []
     for program, effects in found.items():

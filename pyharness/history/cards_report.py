@@ -22,7 +22,11 @@ _HALF = 48  # width of each of two texts printed side by side
 
 
 def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
-    """Report each card with its scan, its lines in port and twin, and its apparatus entries."""
+    """Return the report of `cards`, with one block of lines for each card.
+
+    A block shows the card beside the line of the scan, the corresponding lines of the Fortran port
+    and of the Python twin, and the apparatus entries. `title` is the verb that shows the report.
+    """
     rows = [
         [each.program, each.number, each.statement, each.scan, " ".join(each.entries)]
         for each in cards
@@ -36,9 +40,9 @@ def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
 
 
 def card_record(card: Card) -> dict[str, Any]:
-    """Return a card as a JSON record.
+    """Return a card as a JSON record, with its lines in the Fortran port and in the Python twin.
 
-    `scan` is null if the scan agrees with the card, and empty if the scan lacks the card.
+    The key `scan` is null if the scan agrees with the card, and empty if the scan lacks the card.
     """
     found = deck(card.program)
     scan = (card.scan or "") if card.deviates else None
@@ -59,7 +63,12 @@ def card_record(card: Card) -> dict[str, Any]:
 def scan_report(
     faults: Sequence[str], undeclared: Sequence[str], lines: int, digest: str
 ) -> Report:
-    """Report whether the tables of the edition explain a scan, with every unexplained place."""
+    """Return the report on whether the tables of the edition explain every line of a scan.
+
+    `faults` has a sentence for each line in which the scan and the tables disagree. `undeclared`
+    has one for each disagreement between the cards and the apparatus entries. `lines` is the number
+    of lines that the tables expect, and `digest` the SHA-256 of the scan.
+    """
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)
     pairs = sum(len(each.differences) for each in cards)
@@ -88,10 +97,11 @@ def scan_report(
 
 
 def classes_report() -> Report:
-    """Report the number of entries and cards for each kind of apparatus entry.
+    """Return a report that counts the entries of the apparatus, and the cards they name, by kind.
 
-    The columns count the entries, the entries with a flag, the cards named in each program, and the
-    places where the scan differs because of such an entry.
+    The columns count the entries of a kind, the entries with a flag (a switch in the programs), the
+    cards that they name in each program, and the passages that the scan shows otherwise because of
+    such an entry.
     """
     entries = facts("apparatus")["entry"]
     rows = []

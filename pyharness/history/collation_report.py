@@ -14,7 +14,10 @@ _COLUMNS = (
 
 
 def collation_report(found: Sequence[Row]) -> Report:
-    """Report every step of the programs, with the reason for any disagreement about it."""
+    """Return the report of the collation: how decks and thesis agree on each operation.
+
+    Each row of `found` is one operation of the programs, with the reason for any disagreement.
+    """
     told = faults([*found])
     rows = [
         [

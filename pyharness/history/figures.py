@@ -1,4 +1,7 @@
-"""Figures 6 to 12 of the thesis: the curves and the reference, as pictures and as a report."""
+"""Figures 6 to 12 of the thesis: the curves of omega and the reference, as pictures and a report.
+
+A figure exists in two sets: with the curves of the original or of the corrected programs.
+"""
 
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -43,10 +46,11 @@ _END: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class FigurePlan:
-    """The plan of one figure in one of `SETS`, before anything is computed.
+    """A figure to be drawn: which programs on which case, before anything is computed.
 
-    `number` and `part` are those of the thesis; `part` is `A`, `B` or empty. `caption` is in our
-    words. `source` is the place in the thesis on which the choice of programs rests.
+    `number` and `part` are those of the thesis; `part` is `A`, `B` or empty. `set` is one of
+    `SETS`: whether the programs are original or corrected. `caption` is our own text. `source` is
+    the place in the thesis on which the choice of programs rests.
     """
 
     number: int
@@ -65,7 +69,7 @@ class FigurePlan:
 
     @property
     def files(self) -> list[str]:
-        """Return the names of the figure's files: the pictures and the plotted numbers."""
+        """Return the names of the figure's files: two pictures, and the plotted numbers as CSV."""
         return [f"{self.stem}.{ending}" for ending in ENDINGS]
 
     @property
@@ -76,14 +80,14 @@ class FigurePlan:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The trajectory of one program in a figure."""
+    """The trajectory of one program, which a figure shows as a curve of omega over time."""
 
     listing: Listing
     trajectory: Trajectory
 
     @property
     def ending(self) -> str:
-        """Return where and why the curve ends early; empty if it reaches the last step."""
+        """Return at which step and why the program ended early; empty if it ran all steps."""
         run = self.trajectory
         if run.stop is not None:
             return f"stopped at step {run.stop.step} by {run.stop.variable}"
@@ -91,13 +95,20 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Return the curve's program, and where it ends early."""
+        """Return the label of the curve in a legend: the program, and where and why it ended early.
+
+        A program that ran all steps has its name alone.
+        """
         return self.listing.program + (f" ({self.ending})" if self.ending else "")
 
 
 @dataclass(frozen=True, eq=False)
 class FigureFinding:
-    """A figure with its computed curves; each curve ends where its program ended."""
+    """A planned figure with its scene, the reference solution and the computed curves.
+
+    Each curve ends where its program ended. `limit` is the function to which one of the programs
+    converges as its step size goes to zero, or None.
+    """
 
     plan: FigurePlan
     scene: Scene
@@ -107,7 +118,7 @@ class FigureFinding:
 
 
 def plans() -> list[FigurePlan]:
-    """Return the plans of all figures, first the figures of the original programs."""
+    """Return all figures to be drawn, first the figures of the original programs."""
     return [
         FigurePlan(
             entry["number"], entry.get("part", ""), each, entry["case"], tuple(entry[each]),
@@ -119,7 +130,10 @@ def plans() -> list[FigurePlan]:
 
 
 def findings() -> Iterator[FigureFinding]:
-    """Compute the figures and yield them one by one, in the order of `plans`."""
+    """Compute the curves and the reference of each figure, and yield the figures one by one.
+
+    The figures are in the order of `plans`, and nothing is drawn.
+    """
     truths: dict[int, Reference] = {}
     for plan in plans():
         scene = case_scene(plan.case)
@@ -133,7 +147,11 @@ def findings() -> Iterator[FigureFinding]:
 def _limit(
     plan: FigurePlan, scene: Scene, truths: dict[int, Reference]
 ) -> tuple[str, Array] | None:
-    """Return the limit that a figure of the original programs shows, or None if it shows none."""
+    """Return the program's limit that a figure of the original programs shows: label and omega.
+
+    The limit is the omega (rad/s) to which a program converges as its step size goes to zero.
+    Return None if the figure shows no limit. `truths` has the reference solutions by case.
+    """
     asked = {entry["number"]: entry.get("limit_of") for entry in facts("figures")["figure"]}
     program = asked[plan.number]
     if program is None or plan.set != "original":
@@ -143,7 +161,7 @@ def _limit(
 
 
 def figures_report(findings: Sequence[FigureFinding]) -> Report:
-    """Report the files that were drawn, a line for each figure."""
+    """Return the report of the files that were drawn, with a line for each figure."""
     rows = []
     for each in findings:
         curves = ", ".join(curve.label for curve in each.curves)
@@ -173,7 +191,7 @@ def _record(finding: FigureFinding) -> dict[str, Any]:
 
 
 def curve_numbers(finding: FigureFinding) -> Table:
-    """Return the plotted numbers: omega (rad/s) by curve and time (s)."""
+    """Return a table of the plotted numbers of a figure: omega (rad/s) by curve and time (s)."""
     truth, start = finding.reference, np.array(finding.scene.omega)
     known = [("reference", truth.omega)]
     if finding.limit is not None:
@@ -193,12 +211,12 @@ def curve_numbers(finding: FigureFinding) -> Table:
 
 
 def _from_zero(values: Array, start: Array | float = 0.0) -> Array:
-    """Return values preceded by the value at time 0."""
+    """Return the values of a curve, preceded by `start`, the value at time 0."""
     return np.concatenate([np.array(start, ndmin=values.ndim), values])
 
 
 def figure_picture(finding: FigureFinding) -> Picture:
-    """Draw a figure: its curves over the reference."""
+    """Draw a figure: the three components of omega over time, its curves over the reference."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 8.6), dpi=110, layout="constrained")
@@ -231,10 +249,11 @@ def figure_picture(finding: FigureFinding) -> Picture:
 
 
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
-    """Draw omega1 of a figure that has a limit, original and corrected, over the reference.
+    """Draw omega1 of the original figure `first` and the corrected figure `second` in one picture.
 
-    Beyond the end of an original run, the limit shows where it would have gone. Only the last of
-    the corrected programs is drawn, because the others would draw the same line again.
+    The figure `first` must have the limit of a program. Beyond the end of an original run, the
+    limit shows where the run would have gone. Only the last of the corrected programs is drawn,
+    because the others would draw the same line again.
     """
     from matplotlib.figure import Figure
 
@@ -286,7 +305,10 @@ def _draw(
 
 
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
-    """Return the limits of the axis, which contain all curves that stay near the reference."""
+    """Return the bottom and top (rad/s) of the vertical axis for the omega component `row`.
+
+    The axis contains all curves that stay near the reference.
+    """
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())
     # A curve that is further off than the largest omega diverges, and may leave the frame.

@@ -1,8 +1,9 @@
 """The limits of the original programs as the step size goes to zero.
 
-A program that does not converge to the solution converges to another function, or to none.
-docs/explanation/findings.md derives the limits. This module computes each limit independently of
-the programs, and compares the programs with their limits while the step is halved.
+With ever smaller steps an original program may converge to the solution of Euler's equations, to
+another function of time, or to no function. docs/explanation/findings.md derives these limits. This
+module computes each limit independently of the programs, and compares the programs with their
+limits while the step is halved.
 """
 
 import math
@@ -45,9 +46,10 @@ Rate = Callable[[float, Sequence[float]], list[float]]
 
 @dataclass(frozen=True)
 class Halving:
-    """The largest distances of omega (rad/s) from limit and reference at one step size (s).
+    """The distances of one run from the limit of its program and from the reference solution.
 
-    Both distances are infinite after an overflow.
+    Each distance is the largest difference of any omega component (rad/s) at the scene's times. The
+    run has the step size `step_size` (s). Both distances are infinite after an overflow.
     """
 
     step_size: float
@@ -59,8 +61,10 @@ class Halving:
 class Limit:
     """The limit of an original program, and its order of convergence to this limit.
 
-    `order` is None if the distance is rounding error alone, if one of the last two runs overflows,
-    or if there is no limit. It is also None if the limit is unbounded at the time `blow_up` (s).
+    `tends_to` describes the limit. `halvings` has a run for each step size, the largest first.
+    `order` comes from the last two runs. It is None if their distance from the limit is rounding
+    error alone, if one of them overflows, or if there is no limit. It is also None if the limit is
+    unbounded at the time `blow_up` (s).
     """
 
     program: str
@@ -71,7 +75,7 @@ class Limit:
 
     @property
     def approach(self) -> str:
-        """Return a description of the convergence to the limit."""
+        """Return a phrase for the convergence to the limit, as in `order 1.00 toward the limit`."""
         if self.blow_up is not None:
             return f"no order: the limit grows without bound at t = {self.blow_up:.3g} s"
         if self.order is not None:
@@ -83,9 +87,10 @@ class Limit:
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
     """Measure the distance of an original program, without its stop test, from its limit.
 
-    The step size is halved `halvings` times. If the torque varies with time, the collocation
-    programs have no limit, and the limit of the Runge-Kutta program is computed from its limit
-    equations. Raise InputError if the run exceeds the work limit (`effort`).
+    The step size of the scene is halved `halvings` times, with one run for each step size. If the
+    torque varies with time, the collocation programs have no limit, and the limit of the
+    Runge-Kutta program is computed from its limit equations. Raise InputError if a run exceeds the
+    work limit, on which `effort` is a factor.
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
@@ -114,14 +119,21 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
 def limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float = 1.0
 ) -> Array:
-    """Return the limit of a program (rad/s) at `times`; NaN where it has none."""
+    """Return the omega (rad/s) to which an original program tends as its step goes to zero.
+
+    The shape is (times, 3); rows are NaN where the program has no limit. `truth` is the reference
+    solution at `times`, and `effort` a factor on the work limit.
+    """
     return _limit_solution(program, scene, times, truth, effort)[0]
 
 
 def _limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float
 ) -> tuple[Array, str, float | None]:
-    """Return the limit at `times`, its description, and its blow-up time (s) or None."""
+    """Return the limit of `limit_solution`, its description, and its blow-up time (s) or None.
+
+    The limit becomes unbounded at the blow-up time.
+    """
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)
     if program == "runge-kutta":
@@ -141,10 +153,11 @@ def _limit_solution(
 def _extrapolated(scene: Scene) -> Rate:
     """Return the right-hand side of the two-term program's limit equation.
 
-    In step n the collocation points are t/3 and 2t/3 after the beginning of the step, with t = n h.
-    Along the first estimate the slope is g(s) = F(w + s F) = F + s F' F + s^2 Q(F). Here w is
-    omega, F the right-hand side of Euler's equations, and Q its quadratic part. The line through
-    g(t/3) and g(2t/3), extrapolated to s = 0, is 2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
+    In step n of size h the collocation points are t/3 and 2t/3 after the beginning of the step,
+    with t = n h, because the program lets DT grow. At the time s after the beginning, the slope
+    along the first estimate is g(s) = F(w + s F) = F + s F' F + s^2 Q(F). Here w is omega, F the
+    right-hand side of Euler's equations, and Q its quadratic part. The line through g(t/3) and
+    g(2t/3), extrapolated to s = 0, is 2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
     """
     right_hand_side = scene.right_hand_side()
     a, b, c = scene.euler_coefficients
@@ -160,8 +173,10 @@ def _extrapolated(scene: Scene) -> Rate:
 def _slow_slopes(scene: Scene) -> Rate:
     """Return the right-hand side of the Runge-Kutta program's limit equations, for varying torque.
 
-    In every step U(1) = p grows by h/2 F(p), and the result by h F(p). The slopes are therefore
-    taken at a point that moves at half speed.
+    Let p be the program's U(1), the omega at which it evaluates the first slopes of a step, and F
+    the right-hand side of Euler's equations. In every step of size h, p grows by h/2 F(p), and the
+    resulting omega by h F(p). The slopes are therefore taken at an omega that moves at half speed.
+    The state of the limit equations is p, then the resulting omega.
     """
     right_hand_side = scene.right_hand_side()
 
@@ -175,7 +190,12 @@ def _slow_slopes(scene: Scene) -> Rate:
 def _solved(
     rate: Rate, start: list[float], times: Sequence[float], scale: float, effort: float
 ) -> tuple[Array, float | None]:
-    """Return the solution at `times`, NaN from its blow-up on, and the blow-up time (s) or None."""
+    """Integrate a limit equation numerically from `start` at time 0.
+
+    Return the solution at `times`, shape (times, components), which is NaN from a blow-up on; and
+    the time of the blow-up (s), or None. A blow-up is a component of a million times `scale`, the
+    largest omega of scene and reference (rad/s). `effort` is a factor on the work limit.
+    """
     from scipy.integrate import solve_ivp
 
     evaluations, latest = 0, 0.0
@@ -210,10 +230,10 @@ def _solved(
 
 
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Return, by program, the defects that change no omega of a scene beyond rounding.
+    """Return, by program, the names of the defects that change no omega of a scene beyond rounding.
 
-    A defect is invisible if its correction alone, with all others kept, changes omega by rounding
-    at most, and changes neither the number of steps nor the ending.
+    A defect is invisible if its correction alone, with all other defects kept, changes omega by
+    rounding error at most, and changes neither the number of steps nor how the run ended.
     """
     found = {}
     for program in PROGRAMS:
@@ -236,7 +256,10 @@ def _same(first: Array, second: Array) -> bool:
 def limits_report(
     scene: Scene, found: Sequence[Limit], invisible: Mapping[str, Sequence[str]]
 ) -> Report:
-    """Report the limit of each program, and each program's defects that do not change omega."""
+    """Return the report of `limits`: the programs' distances from their limits, by step size.
+
+    `invisible` has, by program, the names of the defects that do not change omega in this scene.
+    """
     text: list[Section] = [heading(scene)]
     data = []
     for each in found:

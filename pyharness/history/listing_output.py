@@ -1,6 +1,7 @@
-"""A printed page from any machine, compared with the programs' pages in every arithmetic.
+"""A page printed by any machine, compared with the pages that our programs print.
 
-The digits that a machine printed, real or emulated, show in which arithmetic its program ran.
+Our programs print their pages in every arithmetic. The digits that a machine printed, real or
+emulated, therefore show in which arithmetic its program ran.
 """
 
 import re
@@ -25,7 +26,11 @@ _LARGEST = 1 << 24  # bytes
 
 @dataclass(frozen=True)
 class Difference:
-    """A number of a page that differs from ours: its row and place, from 1, and both as printed."""
+    """A number of a page from another machine that differs from the number on our page.
+
+    `row`, and `place` within the row, count from 1. `theirs` and `ours` are the numbers as printed
+    by the other machine and by our program.
+    """
 
     row: int
     place: int
@@ -35,16 +40,18 @@ class Difference:
 
 @dataclass(frozen=True)
 class Fit:
-    """The comparison of a page with a page that our programs print.
+    """The comparison of a page from another machine with a page that our programs print.
 
     Attributes
     ----------
     program, listing, word : str
+        The program of our page, the label of its listing, and the arithmetic in which it ran.
     case : int
+        The case of our page.
     fields : int
-        How many numbers the rows of the page have, theirs or ours, whichever has more.
+        How many numbers the rows of the page have; of the two pages, the one that has more counts.
     differences : tuple of Difference
-        The numbers that are not printed alike.
+        The numbers that the two pages do not print alike.
     """
 
     program: str
@@ -56,12 +63,12 @@ class Fit:
 
     @property
     def is_whole(self) -> bool:
-        """Return whether every number is printed alike."""
+        """Return whether the two pages print every number alike."""
         return not self.differences
 
 
 def read_page(path: str) -> list[list[str]]:
-    """Return the lines of a file that contain only numbers, split into fields.
+    """Return the lines of the file `path` that contain only numbers, split into printed numbers.
 
     Raise InputError if no line has at least six numbers.
     """
@@ -81,8 +88,10 @@ def fits(
 ) -> list[Fit]:
     """Compare a page with each of our pages that has the same moments, torques and columns.
 
-    Return the comparisons, those with the fewest differences first. Raise InputError if none of our
-    pages has these moments, torques and columns.
+    `lines` are the lines of numbers of the page, from `read_page`. Our pages are those of the
+    `programs` in the `cases`, original and corrected, in every arithmetic. Return the comparisons,
+    those with the fewest differences first. Raise InputError if none of our pages has these
+    moments, torques and columns. `progress` is called before each comparison.
     """
     found: list[Fit] = []
     every = len(programs) * len(cases) * 2 * len(WORD_NAMES)
@@ -106,7 +115,7 @@ def fits(
 
 
 def _form(program: str, case: int) -> tuple[list[list[str]], int]:
-    """Return a page's lines of numbers before its rows, and how many numbers a row has."""
+    """Return the lines of numbers at the head of our page, and how many numbers each row has."""
     scene = replace(case_scene(case), steps=1)
     *head, row = _numbers(page(scene, program, run_program(scene, original(program), "python")))
     return head, len(row)
@@ -127,13 +136,17 @@ def _fit(theirs: Sequence[Sequence[str]], listing: Listing, case: int, word: str
 
 
 def _numbers(text: str) -> list[list[str]]:
-    """Return the lines that contain only numbers, split into fields."""
+    """Return the lines of `text` that contain only numbers, split into printed numbers."""
     lines = [line.split() for line in text.splitlines()]
     return [line for line in lines if line and all(map(_FIELD.fullmatch, line))]
 
 
 def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
-    """Report which program, listing and arithmetic print a page, or the first differences."""
+    """Return the report on which program, listing and arithmetic print the page in file `path`.
+
+    If no comparison in `found` is without differences, the report shows the first differences of
+    the nearest page.
+    """
     best = found[0]
     whole = [each for each in found if each.is_whole]
     told = [
@@ -157,7 +170,7 @@ def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
 
 
 def name_of(fit: Fit) -> str:
-    """Return the name of a fit: its program, case, listing and arithmetic."""
+    """Return the description of our page in a comparison: program, case, listing, arithmetic."""
     return f"{fit.program}, case {fit.case}, {fit.listing}, in {fit.word}"
 
 

@@ -1,10 +1,10 @@
 """The lost experiments of IV.2: mistakes with which three weightings could have failed.
 
 The thesis does not print the programs for subdomain, Galerkin and least squares. IV.2 says that
-they gave no meaningful results where the solution is known, in Cases 1 and 2. Each conjecture here
-is a mistake that such a program could have had. The method is programmed as IV.2 describes it: two
-terms, the products written out as polynomials, one solution for a constant right-hand side, and one
-correction.
+they gave no meaningful results where the solution is known, in Cases 1 and 2. Each mistake in
+`data/lost.toml` is a conjecture about a mistake that such a program could have had. The method is
+programmed as IV.2 describes it: a trial function of two terms, the products written out as
+polynomials, one solution for a constant right-hand side, and one correction.
 """
 
 from collections.abc import Sequence
@@ -33,10 +33,11 @@ TERMS = 2
 
 @dataclass(frozen=True)
 class Attempt:
-    """A weighting with one mistake, run on the cases with a known solution.
+    """The result of one weighting with one mistake, on the cases with a known solution.
 
-    `shares` is, by case, the largest error divided by the largest omega, infinite on overflow.
-    `failed` has the cases in which this ratio exceeds the limit in `data/lost.toml`.
+    `mistake` is the identifier of the mistake in `data/lost.toml`. `shares` is, by case, the
+    largest error divided by the largest omega, infinite after an overflow. `failed` has the cases
+    in which this ratio exceeds the limit in `data/lost.toml`.
     """
 
     mistake: str
@@ -47,7 +48,10 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A mistake with its attempts, and the number of weightings that it makes fail."""
+    """A conjectured mistake with its result for each weighting.
+
+    `mistake` is its identifier, and `summary` its description, in `data/lost.toml`.
+    """
 
     mistake: str
     summary: str
@@ -55,17 +59,21 @@ class Ranked:
 
     @property
     def in_both(self) -> int:
-        """Return how many weightings fail in both known cases."""
+        """Return how many weightings fail, with this mistake, in both cases with known solution."""
         return sum(len(each.failed) == len(CASES) for each in self.attempts)
 
     @property
     def in_either(self) -> int:
-        """Return how many weightings fail in at least one known case."""
+        """Return how many weightings fail in at least one of the cases with a known solution."""
         return sum(bool(each.failed) for each in self.attempts)
 
 
 def ranked(word: str = BINARY64) -> list[Ranked]:
-    """Run all conjectured mistakes in the arithmetic `word`; return the best explanation first."""
+    """Run every weighting with every conjectured mistake, in the arithmetic named `word`.
+
+    Return the mistakes in order. The first makes the most weightings fail in both cases and, among
+    equals, the most in at least one case.
+    """
     limit = facts("lost")["limit"]
     found = []
     for entry in facts("lost")["mistake"]:
@@ -81,7 +89,11 @@ def ranked(word: str = BINARY64) -> list[Ranked]:
 
 
 def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> float:
-    """Return the largest error divided by the largest omega, with a mistake or with `none`."""
+    """Return a weighting's largest error against the reference, divided by the largest omega.
+
+    `mistake` is the identifier of a mistake in `data/lost.toml`, or ``none``. The result is
+    infinite after an overflow.
+    """
     given = scene if word == BINARY64 else scene_in(scene, WORDS[word])
     omega = march(given, weighting, mistake)
     truth = reference(scene, scene.times()).omega
@@ -93,8 +105,9 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
 def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
     """Integrate a scene of constant torque by a weighting with one mistake.
 
-    Return omega (rad/s), shape (steps, 3); NaN from an overflow on. The scene's numbers, floats or
-    numbers of another word (`WORDS`), determine the arithmetic.
+    `mistake` is the identifier of a mistake in `data/lost.toml`. Return omega (rad/s), shape
+    (steps, 3); NaN from an overflow on. The scene's numbers, floats or numbers of another word
+    (`WORDS`), determine the arithmetic.
     """
     h = scene.step_size
     coefficients = scene.euler_coefficients
@@ -126,7 +139,11 @@ def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
 
 
 def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
-    """Return the products A omega2 omega3, ... as polynomials of t, one column per component."""
+    """Return the products A omega2 omega3, ... as polynomials of time t, one column per component.
+
+    `estimate` has the coefficients of omega as a polynomial of t, in the same form. `coefficients`
+    are A, B and C of Euler's equations.
+    """
     columns = [
         polynomial.polymul(estimate[:, j], estimate[:, k]) * a
         for a, j, k in zip(coefficients, (1, 0, 0), (2, 2, 1), strict=True)
@@ -136,13 +153,20 @@ def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
 
 
 def _matrix(weighting: str, length: float) -> Array:
-    """Return the weighted integrals of the derivatives of t and t**2 over (0, length)."""
+    """Return the weighted integrals of the derivatives of t and t**2 over (0, length).
+
+    The row is the weight, and the column the power of t. `length` is in s.
+    """
     columns = [_weighted(weighting, length, (i + 1) * _power(i)) for i in range(TERMS)]
     return np.array(columns).T
 
 
 def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
-    """Return c1 and c2 of all components, for which the weighted residuals vanish."""
+    """Return c1 and c2 of all components, for which the weighted residuals vanish; shape (2, 3).
+
+    They solve the linear equations with `matrix` and, a row for each component, `right`. `second`
+    is true for the correction, and false for the first estimate.
+    """
     if mistake == "transposed":
         matrix = matrix.T
     if mistake == "matrix-used-up" and second:
@@ -164,7 +188,10 @@ def _power(exponent: int) -> Array:
 
 
 def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
-    """Return the weighted integrals of a polynomial over (0, length), one for each weight."""
+    """Return the weighted integrals of a polynomial over (0, length), one for each weight.
+
+    `residual` has the coefficients of the polynomial; `length` is in s.
+    """
     found = []
     for k in range(TERMS):
         if weighting == "subdomain":
@@ -178,13 +205,16 @@ def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
 
 
 def _factors(matrix: Array) -> Array:
-    """Return the factors with which Crout's factorization overwrites a 2 x 2 matrix."""
+    """Return the matrix of L and U factors with which Crout's method overwrites a 2 x 2 matrix."""
     (a, b), (c, d) = matrix.tolist()
     return np.array([[a, b], [c / a, d - c / a * b]])
 
 
 def halved(scene: Scene, weighting: str) -> float:
-    """Return the factor by which halving the step reduces the error of a correct weighting."""
+    """Return the factor by which halving the step reduces the error of a weighting.
+
+    The weighting has no mistake, and the end time is the same with both step sizes.
+    """
     finer = replace(scene, step_size=scene.step_size / 2.0, steps=2 * scene.steps)
     return _share(scene, weighting, "none") / _share(finer, weighting, "none")
 
@@ -198,7 +228,10 @@ _TABLE = (
 
 
 def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
-    """Report every mistake, its largest errors, and how many weightings it makes fail."""
+    """Return the report of every mistake: its errors, and how many weightings it makes fail.
+
+    `word` is the name of the arithmetic in which `found` was computed.
+    """
     rows = [
         [
             each.mistake,

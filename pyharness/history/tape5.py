@@ -13,7 +13,10 @@ _RECORD = np.dtype([("head", "<i4"), ("items", "<f8", (7,)), ("tail", "<i4")])
 
 
 def records(trajectory: Trajectory) -> bytes:
-    """Return the TAPE5 records of a program's trajectory, one for each row."""
+    """Return the bytes of the file TAPE5 of a program, one record for each row of its trajectory.
+
+    The trajectory must have translational velocities.
+    """
     assert trajectory.velocity is not None
     result = np.empty(len(trajectory.time), dtype=_RECORD)
     result["head"] = result["tail"] = _RECORD["items"].itemsize

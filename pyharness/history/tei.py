@@ -2,9 +2,10 @@
 
 Each deck is in the order of its cards. A `pb` element marks the beginning of a page of the scan;
 its `n` is the position of the page in the scan. An `app` element marks each place where the scan
-differs: `lem` is our reading, and `rdg` the scan's. To restore the scan, take the pages in the
-order of `n` and each `rdg` instead of its `lem`. The lines of the cards, `fw` and `surplus` are
-then the lines of the scan.
+differs from our text: `lem` is our reading, and `rdg` the scan's. To restore the scan, take the
+pages in the order of `n` and each `rdg` instead of its `lem`. The lines of the scan are then the
+cards, the `fw` elements (headings added by an editor) and the `surplus` elements (text that belongs
+to no card there).
 """
 
 from collections.abc import Iterable, Iterator
@@ -51,7 +52,11 @@ _TOLD = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why
 
 
 class _Page(NamedTuple):
-    """A page of the scan: its position, its lines, and the entry that explains its move, if any."""
+    """A page of the scan with its lines.
+
+    `number` is its position in the scan, from 1. `moved` is the apparatus entry that explains why
+    the page is not in its proper place, or None.
+    """
 
     number: int
     lines: list[Any]
@@ -130,7 +135,10 @@ def _header(root: xml.Element) -> None:
 
 
 def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]:
-    """Append a deck to `body`; yield each card with its block, which is still empty, in order."""
+    """Append the deck of a program to `body`, and yield the XML element of each card with the card.
+
+    The elements are still empty, and in the order of the cards.
+    """
     div = _named(body, "div", program, type="deck")
     _said(div, "head", f"The {program} program")
     cards = deck(program).cards
@@ -216,7 +224,10 @@ def _apparatus(div: xml.Element) -> None:
 
 
 def _targets(entry: dict[str, Any]) -> Iterator[str]:
-    """Yield the identifiers of an entry's cards, or of a deck if the entry names no card of it."""
+    """Yield the XML identifiers of the cards that an apparatus entry names.
+
+    For a program of which the entry names no card, yield the identifier of the whole deck.
+    """
     for program in entry["programs"]:
         cards = deck(program).cards
         named = numbers(entry["cards"].get(program, ""))

@@ -9,18 +9,20 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 
 TABLES = (*(f"cards/{program}" for program in PROGRAMS), "apparatus")
-"""The tables of `data` that make up the text: the cards, the scan's variants, the reasons."""
+"""The tables in `data` that make up the text: the cards with the scan's variants, the apparatus."""
 
 
 def text_digest(table: Callable[[str], Mapping[str, Any]] = facts) -> str:
     """Return the first 12 hexadecimal digits of the SHA-256 of the edition's text.
 
-    The port, the twins, the project's version and comments in the tables do not change the digest.
+    The text is the content of `TABLES`. The Fortran port, the Python twins, the project's version
+    and comments in the tables do not change the digest.
 
     Parameters
     ----------
     table : callable, optional
-        Function that returns each of `TABLES` by its name.
+        Function that returns the content of each of `TABLES` by its name. The default is `facts`,
+        which reads the tables that are shipped with the package.
     """
     told = {name: table(name) for name in TABLES}
     text = json.dumps(told, ensure_ascii=False, sort_keys=True, separators=(",", ":"))

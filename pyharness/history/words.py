@@ -1,4 +1,7 @@
-"""The effect of word length: runs with p bits, compared with binary64 and the reference."""
+"""The effect of word length: runs with p bits of significand, compared with binary64.
+
+The errors of the runs are against the reference solution.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -23,22 +26,24 @@ DOUBLE, WIDEST = Word(53), Word(113)
 
 @dataclass(frozen=True)
 class WordRun:
-    """A run of a program in an arithmetic with words of p bits.
+    """A run of a program in an arithmetic with p bits of significand, compared with binary64.
 
     Attributes
     ----------
     case : int
+        The case of Table 1.
     program, listing : str
+        The name of the program, and the label of its listing.
     p : int
         Bits of the significand.
     rule : str
-        One of `RULES`.
+        The rounding rule, one of `RULES`.
     stop : str
         The reason for an early end and its step, as in ``V2 at 25`` or ``overflow at 50``; empty if
         the run is complete.
     fields, different : int
-        How many numbers the rows of the page have, in binary64 or in this word, whichever has more;
-        and how many of them are not printed alike.
+        How many numbers the rows of the printed page have, in binary64 or in this arithmetic,
+        whichever has more; and how many of them binary64 and this arithmetic do not print alike.
     error : float
         Largest error of any omega component against the reference (rad/s).
     singular : int
@@ -59,18 +64,25 @@ class WordRun:
 
 @dataclass(frozen=True)
 class WordCell:
-    """One listing on one case: its run in binary64, in the widest word, and in each chosen word."""
+    """The runs of one listing on one case, in several arithmetics.
+
+    `double` is the run in binary64, `widest` the run with 113 bits, and `runs` has a run for each
+    chosen number of bits and rounding rule.
+    """
 
     double: WordRun
     widest: WordRun
     runs: tuple[WordRun, ...]
 
     def of(self, p: int, rule: str) -> WordRun | None:
-        """Return the run with p bits and a rounding rule, or None."""
+        """Return the run with p bits and the rounding rule `rule`, or None if there is none."""
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
     def settled(self, rule: str, same: Callable[[WordRun], bool]) -> int | None:
-        """Return the least p from which on `same` holds for all runs of a rule, or None."""
+        """Return the least p (bits) such that `same` holds for all runs with at least p bits.
+
+        Only runs with the rounding rule `rule` count. Return None if there is no such p.
+        """
         least = None
         for run in sorted((r for r in self.runs if r.rule == rule), key=lambda run: -run.p):
             if not same(run):
@@ -85,9 +97,11 @@ def cells(
     lengths: Sequence[int] = LENGTHS,
     progress: Progress = no_progress,
 ) -> Iterator[WordCell]:
-    """Run the programs, original and corrected, on the cases in every word; yield the cells.
+    """Run the programs, original and corrected, on the cases in every arithmetic.
 
-    `progress` is called with the number of finished runs and the number of all runs.
+    The arithmetics have each number of bits in `lengths` with each rounding rule. Yield a
+    `WordCell` for each listing and case. `progress` is called with the number of finished runs and
+    the number of all runs.
     """
     words = [Word(p, rule) for rule in RULES for p in lengths]
     chosen = [
@@ -108,7 +122,10 @@ def cells(
 
 
 class _Judge:
-    """A scene and listing whose runs in words are compared with binary64 and the reference."""
+    """A listing on a scene, with the page in binary64 and the reference solution.
+
+    Runs of the listing in other arithmetics are compared with this page and this solution.
+    """
 
     def __init__(self, scene: Scene, listing: Listing) -> None:
         self.scene, self.listing = scene, listing

@@ -26,7 +26,10 @@ _STYLES: dict[str, dict[str, Any]] = {
 
 
 def words_report(cells: Sequence[WordCell]) -> Report:
-    """Report cells that all have the same word lengths."""
+    """Return the report of `words`: how the arithmetic changes printed pages and errors.
+
+    Each cell has the runs of one listing on one case; all cells must have the same word lengths.
+    """
     runs = [run for cell in cells for run in cell.runs]
     data = numbers(_FIELDS, [list(asdict(run).values()) for run in runs])
     tables: list[Section] = [
@@ -91,7 +94,10 @@ def _machine(cells: Sequence[WordCell]) -> Table:
 
 
 def _changes(cells: Sequence[WordCell]) -> list[str]:
-    """Return, for each arithmetic of the machine, a sentence on its differences from binary64."""
+    """Return, for each arithmetic of the CDC, a sentence on how its runs differ from binary64.
+
+    The arithmetics have 48 bits, with unrounded or rounded operations.
+    """
     told = []
     for name, p, rule in _MACHINE:
         found = [(cell.double, run) for cell in cells if (run := cell.of(p, rule))]
@@ -140,7 +146,10 @@ def _errors(cells: Sequence[WordCell]) -> Table:
 
 
 def _picture(cells: Sequence[WordCell]) -> Picture:
-    """Draw the error against p, by program and listing; a dashed line is the truncation error."""
+    """Draw the error of omega against p (bits), a plot for each program and listing.
+
+    A dashed line shows the truncation error of the method.
+    """
     from matplotlib.figure import Figure
 
     programs = list(dict.fromkeys(cell.double.program for cell in cells))

@@ -28,7 +28,9 @@ _EDGES = [
 def draw_sphere(axes: Any, found: Trajectory) -> None:
     """Draw the paths of the body's axes and of the direction of omega on the unit sphere in space.
 
-    Dots and a cross mark their ends.
+    `axes` is the three-dimensional Matplotlib axes that receives the drawing, and `found` is the
+    trajectory, which must contain the attitude. Dots mark the ends of the paths of the body's axes,
+    and a cross marks the end of the path of omega.
     """
     assert found.attitude is not None
     _frame(axes)
@@ -58,9 +60,10 @@ def _frame(axes: Any) -> None:
 
 
 def check_animation(path: str, scene: Scene) -> None:
-    """Raise InputError if an animation of the scene can't be made or written to `path`.
+    """Raise InputError if no animation can be made of the scene, or none with the ending of `path`.
 
-    The check needs no solution, so that it can come first.
+    The scene needs principal moments that a brick can have. The check needs no solution, so that it
+    can be made before the scene is solved.
     """
     if _form(path) not in ANIMATIONS:
         raise InputError(f"--animate '{path}': allowed: a file .gif or .html")
@@ -71,10 +74,12 @@ def check_animation(path: str, scene: Scene) -> None:
 
 
 def animation(scene: Scene, method: str, tolerance: float | None, end: float, path: str) -> bytes:
-    """Return an animation of a brick with the scene's moments until `end` (s), as GIF or HTML page.
+    """Return the bytes of an animation of a brick with the scene's moments, from 0 to `end` (s).
 
-    A motion of 2 to 10 s is shown in true time. A shorter or longer one is stretched to 2 s or
-    compressed to 10 s, and the title states how much slower or faster it runs.
+    They are a GIF file or an HTML page, depending on the ending of `path`; no file is written. The
+    scene is solved by `method` with `tolerance`, as by `solve`. A motion of 2 to 10 s is shown in
+    true time. A shorter motion is stretched to 2 s, a longer one is compressed to 10 s, and the
+    title states how much slower or faster it runs.
     """
     from matplotlib import rc_context
     from matplotlib.animation import FuncAnimation
@@ -112,9 +117,10 @@ def animation(scene: Scene, method: str, tolerance: float | None, end: float, pa
 
 
 def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: float) -> Any:
-    """Draw the static parts and return the function that draws a frame.
+    """Draw the static parts of the animation and return the function that draws a frame.
 
-    `rate` is the motion's time per second of the animation.
+    That function takes the number of a frame, from 0, which is also the row of the trajectory
+    `found`. `rate` is the time of the motion (s) that passes in one second of the animation.
     """
     axes: Any = figure.add_axes((0.02, 0.02, 0.96, 0.86), projection="3d")
     _frame(axes)
@@ -144,7 +150,10 @@ def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: flo
 
 
 def _brick(scene: Scene) -> Array:
-    """Return the corners of a brick with the scene's moments, shape (8, 3), in the unit ball."""
+    """Return the corners of a brick with the scene's moments, shape (8, 3), within the unit sphere.
+
+    Only the ratios of the moments matter. A side is drawn at least 1 % as long as the longest one.
+    """
     moments = np.array(scene.moments)
     sides = np.sqrt(np.maximum(0.0, moments.sum() - 2.0 * moments))
     sides = np.maximum(sides, 0.01 * sides.max())

@@ -32,8 +32,11 @@ _EFFORT = 1e9  # in effect no work limit: the caller has requested the whole bat
 class Solver:
     """The method or program that solves the scenes of a batch, with its settings.
 
-    Exactly one of `method` and `program` is given. If `t_end` (s) is None, the end is the product
-    of the scene's step size and its number of steps.
+    Exactly one of `method` and `program` is not None. `t_end` is the final time (s); if it is None,
+    the final time is the product of the scene's step size and its number of steps. The other fields
+    are for programs. `listing` and `reading` are the texts by which a sweep selects the defects and
+    the interpretations that are active. `lipschitz` is the constant of the Lipschitz test (1/s),
+    and `may_stop` states whether that test may end a run.
     """
 
     method: str | None = "auto"
@@ -82,52 +85,60 @@ class Batch:
 
     @property
     def step_sizes(self) -> Array:
-        """Return the step sizes, shape (n,), s."""
+        """Return the step size of each scene, shape (n,), s."""
         return self.arrays.get("step_size", np.full(len(self.omega0), self.scene.step_size))
 
     @property
     def bodies(self) -> Array:
-        """Return the moments, shape (n, 3), or (1, 3) if all scenes have the same body."""
+        """Return the moments (kg m2), shape (n, 3), or (1, 3) if all scenes have the same body."""
         return self.arrays.get("moments", np.array([self.scene.moments]))
 
     @property
     def is_program(self) -> bool:
-        """Return whether a program solves the batch, and not a method."""
+        """Return whether a program of the thesis solves the batch, and not a modern method."""
         return self.listing is not None
 
     @cached_property
     def omega(self) -> Array:
-        """Return omega at the end, shape (n, 3), rad/s; NaN for a scene that did not reach it."""
+        """Return omega (rad/s) at `t_end`, shape (n, 3); NaN for a scene that did not reach it."""
         return self._program.omega[:, -1] if self.is_program else self._ends.omega
 
     @property
     def status(self) -> NDArray[np.int8]:
-        """Return how each scene ended, shape (n,), as codes of `pyharness.model.codes.Statuses`."""
+        """Return how the solution of each scene ended, as integers, shape (n,).
+
+        `pyharness.model.codes.Statuses` defines them, for example COMPLETE, OVERFLOW and REFUSED.
+        """
         return (self._program if self.is_program else self._ends).status
 
     @property
     def n_rows(self) -> NDArray[np.int32]:
-        """Return the number of steps for which the program gave a row, shape (n,)."""
+        """Return for each scene the number of steps with a result of the program, shape (n,)."""
         return self._program.n_rows
 
     @property
     def stop_variable(self) -> NDArray[np.int8]:
         """Return the variable that stopped each run of a program, shape (n,).
 
-        The numbers count the names in `STOP_VARIABLES` from 1. A run that was not stopped has 0.
+        A number counts the names in `pyharness.model.trajectory.STOP_VARIABLES` from 1. It is 0 for
+        a run that the Lipschitz test did not stop.
         """
         return self._program.stop_variable
 
     def sample_steps(self, samples: int) -> list[int]:
-        """Return the program's steps nearest to the ends of `samples` equal parts of the time."""
+        """Return the numbers of the program's steps at the ends of `samples` nearly equal parts.
+
+        The parts divide the run of `scene.steps` steps. The numbers are from 1 and in order.
+        """
         steps = self.scene.steps
         return [max(1, round(steps * (i + 1) / samples)) for i in range(samples)]
 
     def rows(self, samples: int) -> Array:
-        """Return omega at the ends of `samples` equal parts of the time, shape (n, samples, 3).
+        """Return omega at `samples` times of each scene, shape (n, samples, 3), rad/s.
 
-        A method solves each scene anew for each of these times, so that the errors of the parts do
-        not add up. A program supplies the rows of the nearest steps.
+        The times are the ends of `samples` equal parts of the time from 0 to `t_end`. A method
+        solves each scene from time 0 for each of these times, so that the errors of the parts do
+        not add up. A program supplies its results at the steps that `sample_steps` returns.
         """
         if samples not in self._rows:
             if self.is_program:
@@ -140,9 +151,10 @@ class Batch:
         return self._rows[samples]
 
     def attitudes(self, samples: int) -> Array:
-        """Return the attitudes at the times of `rows`, as quaternions, shape (n, samples, 4).
+        """Return the attitudes at `samples` times of each scene, shape (n, samples, 4).
 
-        The attitude at time 0 is (1, 0, 0, 0).
+        The times are the same as in `rows`. Attitudes are quaternions from body to space, scalar
+        first; the attitude at time 0 is (1, 0, 0, 0). The batch must be solved by a method.
         """
         ends = []
         for i in range(samples):
@@ -153,18 +165,26 @@ class Batch:
         return np.stack(ends, axis=1)
 
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
-        """Return omega by another method after the fraction `part` of the time, shape (n, 3)."""
+        """Return omega (rad/s) at `part` times `t_end` as another method computes it, shape (n, 3).
+
+        `tolerance` is relative; it is raised to the smallest tolerance that the method accepts.
+        """
         return self._solve(method, tolerance, self.t_end * part).omega
 
     def from_start(self, omega0: Array) -> "Batch":
-        """Return the same batch with other initial angular velocities, shape (n, 3), rad/s."""
+        """Return a copy of the batch with the initial angular velocities `omega0`, (n, 3), rad/s.
+
+        The copy has no results yet.
+        """
         return replace(self, arrays={**self.arrays, "omega0": omega0})
 
     def run(self, at: list[int]) -> ProgramEnsemble:
-        """Return the rows of all scenes by the program at the steps `at`, in ascending order.
+        """Run the program for all scenes and return its results at the steps `at`.
 
-        A scene that the program can't take is refused alone. The scenes are then run one by one,
-        and the result has no IER.
+        `at` contains numbers of steps, from 1, in ascending order. All scenes are run in one call
+        if possible. They are run one by one if their torque rates differ, or if the program can't
+        take one of them. Only the scene that it can't take then has the status REFUSED, and the
+        results do not include the program's error code IER.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:
@@ -174,7 +194,10 @@ class Batch:
         return self._run_each(at)
 
     def scene_of(self, i: int) -> Scene:
-        """Return the scene with index `i`; raise InputError if its numbers are not allowed."""
+        """Return the scene of row `i` of the arrays, without attitude.
+
+        Raise InputError if its numbers are not allowed.
+        """
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
         return scene_of_row(replace(self.scene, attitude=None), own, i)
 
@@ -197,7 +220,11 @@ class Batch:
         return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
-        """Return the final states of all scenes by a method, in one call if it accepts arrays."""
+        """Return the final states of all scenes, solved by a method until `t_end` (s).
+
+        A method in `PREPARED` solves all scenes in one call, any other one by one. `more` contains
+        additional arguments of `solve_many`.
+        """
         if method not in PREPARED:
             return self._solve_each(method, tolerance, t_end)
         tolerance = max(tolerance, REGISTRY[method].finest)

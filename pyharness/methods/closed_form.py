@@ -16,9 +16,10 @@ from pyharness.model.trajectory import Trajectory
 def known_solution(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the solution of a scene in closed form; raise InputError if there is none.
+    """Return the solution of a scene at `times` (s) in closed form.
 
-    `tolerance` decides only whether the result counts as sensitive.
+    `tolerance` is relative and decides only whether the result counts as sensitive. `effort` is a
+    factor on the work limit. Raise InputError if the scene has no closed form.
     """
     work = np.array([effort, 0.0])
     attitudes = None

@@ -41,7 +41,12 @@ class Ensemble(BatchResult):
 
 
 def place_for(out: "Ensemble | Array | None", n: int, with_attitude: bool) -> Ensemble:
-    """Return arrays for the results of n bodies; raise InputError if `out` does not fit them."""
+    """Return an Ensemble into which the results of n bodies are written.
+
+    Its arrays are new if `out` is None. Otherwise `out` supplies them: an Ensemble of an earlier
+    call, or an array of shape (n, 3) for omega alone. `with_attitude` states whether the results
+    include attitudes. Raise InputError if `out` has another shape or type.
+    """
     shape = (n, 3)
     if out is None or isinstance(out, np.ndarray):
         omega = np.empty(shape) if out is None else buffer_of("out", out, shape, "d")

@@ -14,9 +14,11 @@ from pyharness.model.trajectory import Trajectory
 
 
 def fixed_step(name: str) -> Integrator:
-    """Return a solver with a fixed step and without error control.
+    """Return the function that solves a scene by the method `name`, in steps of the scene's size.
 
-    A step that would pass a requested time is shortened to end there.
+    `name` is `improved-euler`, `taylor-3` or `rk4`. There is no error control, so that the function
+    ignores its argument `tolerance`. A step that would pass a requested time is shortened to end at
+    that time.
     """
     number = getattr(Methods, name.upper().replace("-", "_"))
 

@@ -8,8 +8,8 @@ from pyharness.model.attitude import IDENTITY, Quaternion, product
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
-# The Gauss points of a step are _EARLY and 1 - _EARLY. Each exponential has the weights _MORE and
-# _LESS of omega there.
+# The Gauss points of a step are _EARLY and 1 - _EARLY. In each exponential omega at these
+# two points has the weights _MORE and _LESS.
 _EARLY = 0.5 - math.sqrt(3.0) / 6.0
 _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 
@@ -18,11 +18,12 @@ _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
     """Return the attitudes at the times of a table of omega, as quaternions, shape (n, 4).
 
-    `omega` has shape (n, 3), rad/s, `time` shape (n,), s, in order. The integration begins with the
-    attitude of the scene at time 0 and takes one commutator-free step of order 4 from row to row
-    (Celledoni, Marthinsen and Owren 2003). A step is a product of two exponentials of omega at the
-    Gauss points. Omega there comes from a cubic through the rows and their derivatives by Euler's
-    equations. From the first rotation that overflows the attitudes are NaN.
+    `omega` has shape (n, 3), rad/s, and `time` has shape (n,), s, in order. `scene` supplies omega
+    and the attitude at time 0. From each row to the next the integration takes one commutator-free
+    step of order 4 (Celledoni, Marthinsen and Owren 2003). A step multiplies the attitude by two
+    exponentials of combinations of omega at the two Gauss points of the step. Omega at the Gauss
+    points comes from a cubic through the rows and their derivatives, which Euler's equations give.
+    From the first rotation that overflows the attitudes are NaN.
     """
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])
@@ -46,7 +47,11 @@ def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
 
 
 def _between(rows: Array, slopes: Array, span: Array, part: float) -> Array:
-    """Return omega at the fraction `part` of each step, by cubic Hermite interpolation."""
+    """Return omega at the fraction `part` of each step, by cubic Hermite interpolation.
+
+    `rows` is omega at the ends of the steps (rad/s), `slopes` its derivatives there (rad/s2), and
+    `span` the lengths of the steps (s), as a column.
+    """
     rest = 1.0 - part
     ends = (
         rest * rest * (1.0 + 2.0 * part) * rows[:-1] + part * part * (1.0 + 2.0 * rest) * rows[1:]
@@ -56,7 +61,7 @@ def _between(rows: Array, slopes: Array, span: Array, part: float) -> Array:
 
 
 def _turn(angle: Array) -> list[Quaternion]:
-    """Return the quaternions of rotation vectors."""
+    """Return the quaternions of the rotation vectors `angle` (rad), shape (n, 3)."""
     half = 0.5 * np.linalg.norm(angle, axis=1)
     parts = np.column_stack([np.cos(half), 0.5 * np.sinc(half / np.pi)[:, None] * angle])
     return [(w, x, y, z) for w, x, y, z in parts.tolist()]

@@ -28,10 +28,11 @@ _NEAR_THE_END = 1e300
 def gauss(stages: int) -> Integrator:
     """Return a solver by Gauss collocation that halves its steps until two solutions agree.
 
-    The steps of two successive solutions differ by a factor `ratio`. The estimated error of the
-    finer solution is their difference over ratio**order - 1, doubled for safety. The estimate uses
-    at most order 8. Steps of higher order are long, and the coarser ones are too long for the error
-    to fall with the full order.
+    `stages` is the number of stages, 1 to 8; the order is twice that number. The step sizes of two
+    successive solutions have the quotient `ratio`, at most 2. The estimated error of the solution
+    with the shorter steps is the difference of the two over ratio**order - 1, doubled for safety.
+    The estimate uses at most order 8, because methods of higher order take longer steps. In the
+    coarser of the two solutions these are too long for the error to fall with the full order.
     """
 
     def solve(
@@ -122,11 +123,13 @@ class _Solution:
     evaluations: int
 
     def blows_up(self, coarser: "_Solution", start: float) -> bool:
-        """Return whether this and the coarser solution both end where omega grows without bound.
+        """Return whether this solution and a coarser one end because omega grows without bound.
 
-        Both must end at nearly the same time. The largest omega there must grow as the steps
-        shrink, or be near the end of the range of binary64. `start` (rad/s) is the largest initial
-        omega, or the larger omega that torque alone would give; it is needed if there is no row.
+        The coarser solution has longer steps. Both must end early, at nearly the same time. The
+        largest omega at their ends must grow as the steps shrink, or be near the end of the range
+        of binary64. `start` is the largest initial omega (rad/s), or the omega that torque alone
+        would give if that is larger. It counts beside omega at the requested times, because the
+        solution may have reached none of them.
         """
         if COMPLETE in (self.status, coarser.status):
             return False
@@ -139,16 +142,20 @@ class _Solution:
 
 
 def _counts(lengths: Array, step: float) -> Array:
-    """Return how many equal steps, none longer than `step`, the kernel takes in each interval."""
+    """Return the number of equal steps that the kernel takes in each interval between times.
+
+    `lengths` are the lengths of the intervals (s). No step is longer than `step` (s).
+    """
     with np.errstate(over="ignore", divide="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 
 
 def _first_step(scene: Scene, shortest: float) -> float:
-    """Return a first step (s) in which the phase grows by at most about half a radian.
+    """Return a first step (s) in which each phase grows by at most about half a radian.
 
-    The step divides the interval `shortest`. Intervals of equal length therefore have exactly twice
-    as many steps when the step is halved.
+    The phases are those of the motion and of each wave of the torque. `shortest` is the shortest
+    interval between requested times (s), which the step divides into equal parts. Intervals of
+    equal length therefore have exactly twice as many steps when the step is halved.
     """
     rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
     for amplitude, frequency in scene.torque.sines + scene.torque.cosines:

@@ -18,10 +18,13 @@ from pyharness.model.values import Triple
 
 
 class LastCall:
-    """The base class of all prepared solvers, which reports on the last call in this thread."""
+    """A prepared solver that can report how the last call in this thread ended.
+
+    It is the base class of all prepared solvers.
+    """
 
     plan: Plan
-    _given: tuple[float, str, float]  # tolerance, method and effort as requested
+    _given: tuple[float, str, float]  # requested tolerance, method, and factor on the work limit
 
     if TYPE_CHECKING:
 
@@ -29,11 +32,11 @@ class LastCall:
         def _ending(self) -> tuple[int, int, float, float, Triple, float] | None: ...
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and arguments from which a copy is prepared, here or elsewhere."""
+        """Return the class and the arguments from which `copy` and `pickle` prepare a copy."""
         return type(self), (self.plan, *self._given)
 
     def __repr__(self) -> str:
-        """Return a text with the class, the scene and the method."""
+        """Return a text that names the class, the scene and the method."""
         return f"<{type(self).__name__} of '{self.plan.scene.name}' by {self.plan.method}>"
 
     @property
@@ -54,9 +57,10 @@ class LastCall:
     def error(self) -> float | None:
         """Return the estimated error of this thread's last result.
 
-        The error of omega is relative to the largest omega from 0 to the end. With attitude the
-        estimate is the larger of that and the error of the angle (rad). It is None if the method
-        estimates no error, or if there is no result.
+        The error of omega is relative to the largest component of omega from 0 to the end. If the
+        solver computes the attitude too, the estimate is the larger of the error of omega and the
+        error of the attitude's angle (rad). The estimate is None if the method makes none, or if
+        the call had no result.
         """
         return self._found()[1]
 
@@ -65,7 +69,7 @@ class LastCall:
         """Return the error amplification of the motion of this thread's last call, at least 1.
 
         It is the largest norm of the state-transition matrices, the derivatives of omega at the end
-        with respect to omega at any earlier time. It is None if it is unknown.
+        with respect to omega at any earlier time. It is None if the method does not determine it.
         """
         return self._found()[2]
 
@@ -83,15 +87,16 @@ class LastCall:
         return abs(self._counted())
 
     def _counted(self) -> int:
-        """Return the steps of the last call; a negative count means that the kernel chose `quick`.
+        """Return the number of steps of the last call, negative if the kernel chose `quick`.
 
-        The kernel chooses only where the plan's method is `quick or taylor`.
+        `quick` is a Runge-Kutta method. The kernel chooses only if the plan's method is
+        `quick or taylor`.
         """
         ending = self._ending
         return 0 if ending is None else ending[1]
 
     def _found(self) -> tuple[str, float | None, float | None]:
-        """Return status, error and growth of this thread's last call."""
+        """Return status, error and growth (error amplification) of this thread's last call."""
         ending = self._ending
         if ending is None:
             return "complete", None, None

@@ -1,4 +1,7 @@
-"""Linearisation of equations 13-15 along a solution: state-transition matrices and their norms."""
+"""Linearisation of Euler's equations along a solution: state-transition matrices and their norms.
+
+The equations are numbers 13-15 of the thesis.
+"""
 
 import numpy as np
 
@@ -16,8 +19,8 @@ def propagators(scene: Scene, times: Array, omega: Array) -> Array:
     little from each time to the next.
     """
     middle = 0.5 * (omega[1:] + omega[:-1])
-    # The Jacobian hardly changes between two times: its exponential is the matrix from one to the
-    # next.
+    # The Jacobian hardly changes from a time to the next. Therefore its exponential, after
+    # multiplication by the interval, is the state-transition matrix over this interval.
     pieces = exponentials(np.diff(times)[:, None, None] * jacobians(scene, middle))
     found = np.empty((len(times), 3, 3))
     found[-1] = np.eye(3)
@@ -27,14 +30,18 @@ def propagators(scene: Scene, times: Array, omega: Array) -> Array:
 
 
 def growth(propagators: Array) -> float:
-    """Return the error amplification: the largest row-sum norm of the matrices, at least 1."""
+    """Return the error amplification: the largest row-sum norm of the propagators, at least 1.
+
+    `propagators` are state-transition matrices, shape (n, 3, 3).
+    """
     return float(max(1.0, np.abs(propagators).sum(axis=2).max()))
 
 
 def exponentials(small: Array) -> Array:
     """Return the exponentials of matrices of norm below 1, by the Taylor polynomial of degree 8.
 
-    Its truncation error is below 3.1e-6 in norm.
+    `small` contains the matrices, shape (n, 3, 3). The norm of the truncation error is below
+    3.1e-6.
     """
     total = np.broadcast_to(np.eye(3), small.shape)
     for k in range(8, 0, -1):
@@ -43,7 +50,11 @@ def exponentials(small: Array) -> Array:
 
 
 def jacobians(scene: Scene, omega: Array) -> Array:
-    """Return the Jacobian matrix of equations 13-15 at each omega, 1/s, shape (n, 3, 3)."""
+    """Return the Jacobian matrix (1/s) of Euler's equations at each omega, shape (n, 3, 3).
+
+    `omega` has shape (n, 3), rad/s. The right-hand sides of equations 13-15 of the thesis are
+    differentiated with respect to omega.
+    """
     a, b, c = scene.euler_coefficients
     x, y, z = omega.T
     zero = np.zeros(len(omega))

@@ -205,7 +205,14 @@ def _solve_groups(
     scenes: list[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
     **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Solve scenes with different kinds of body and torque axes, with one call for each kind."""
+    """Solve scenes that differ in the kind of body or of torque axes, and return all final states.
+
+    There is one call for the bodies about principal axes, and one for those with a full inertia
+    matrix. Each scene with a torque about the axes of space is solved alone. `t_end` (s) is one
+    time or one for each scene, `step` the step size (s) of methods with a fixed step. `settings`
+    are further arguments of `solve_many`. The final states are in the order of `scenes`. They are
+    written into `out` if it is not None.
+    """
     check_alike(scenes)
     if scenes[0].attitude is None and any(each.torque.in_space for each in scenes):
         raise InputError(NO_ATTITUDE)
@@ -228,7 +235,12 @@ def _solve_groups(
 
 
 class _Bodies:
-    """The checked arguments of the kernel; an array of one row is shared by all bodies."""
+    """The checked arguments of the kernel for n bodies that are solved side by side.
+
+    An array of one row is shared by all bodies. The constructor takes the arrays as a dict
+    (`given`), the final times `t_end` (s), and the integer that the kernel uses for the method
+    (`code`). `tolerance` is relative, and `effort` is a factor on the work limit of a body.
+    """
 
     def __init__(
         self, given: dict[str, Any], t_end: Any, code: int, tolerance: float, effort: float
@@ -263,7 +275,10 @@ class _Bodies:
             )
 
     def solve(self, threads: int, out: "Ensemble | Array | None") -> Ensemble:
-        """Return the final states of all bodies."""
+        """Return the final states of all bodies, computed in at most `threads` threads.
+
+        They are written into `out` if it is not None.
+        """
         found = place_for(out, self.n, self.attitude is not None)
         for_each_piece(partial(self._enter, found), self.n, threads)
         return found
@@ -285,7 +300,11 @@ class _Bodies:
 
 
 def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:
-    """Return the kernel's code of a method and the tolerance; raise InputError for a wrong one."""
+    """Return the integer that the kernel uses for a method, and the tolerance as a float.
+
+    A tolerance of None becomes the method's default. Raise InputError for an unknown method, or for
+    a tolerance out of range.
+    """
     if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)
     finest = max(FINEST, REGISTRY[method].finest if method == "quick" else 0.0)

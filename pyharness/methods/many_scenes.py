@@ -16,14 +16,24 @@ from pyharness.model.trajectory import Array
 
 
 class Axes:
-    """The principal axes of bodies with full inertia matrices; one row is shared by all bodies."""
+    """The principal axes of n bodies with full inertia matrices.
+
+    If there is only one row of axes, all bodies share it.
+    """
 
     def __init__(self, axes: Array, turns: Array) -> None:
-        """Store the axes, columns of (n, 3, 3), and the same rotations as quaternions, (n, 4)."""
+        """Store the principal axes of each body, as columns of `axes`, shape (n, 3, 3).
+
+        `turns` contains the same rotations as quaternions, scalar first, shape (n, 4).
+        """
         self.axes, self.turns = axes, turns
 
     def about_principal(self, given: dict[str, Any], names: Iterable[str]) -> None:
-        """Convert initial omegas and attitudes from the bodies' axes to principal axes."""
+        """Convert initial omegas and attitudes from the bodies' axes to principal axes.
+
+        `given` contains the arrays of `solve_many` and is changed in place. Only the arrays whose
+        names are in `names` are converted: `omega0` and `attitude0`.
+        """
         if "omega0" in names:
             rows = rows_of("omega0", given["omega0"], 3)
             self._check("omega0", rows)
@@ -35,7 +45,7 @@ class Axes:
             given["attitude0"] = turned_back(attitudes, conjugate)
 
     def give_back(self, omega: Array, attitude: Array | None) -> None:
-        """Convert results from principal axes to the bodies' axes, in place."""
+        """Convert final omegas and attitudes from principal axes to the bodies' axes, in place."""
         omega[:] = rotated(omega, self.axes)
         if attitude is not None:
             attitude[:] = turned_back(attitude, self.turns)
@@ -46,10 +56,12 @@ class Axes:
 
 
 def from_rows(rows: Sequence[Scene | None]) -> dict[str, Any]:
-    """Return scenes with a full inertia matrix as arrays about principal axes, one row for each.
+    """Return scenes with a full inertia matrix as arrays about principal axes, a row per scene.
 
-    For None the row is one that the kernel refuses. The arrays contain coefficients instead of
-    moments, because `principal` computes them to more digits than rounded moments would give.
+    The result is a dict of the arrays of `solve_many` and the `Axes`. None in place of a scene
+    gives a row of NaN, which the kernel refuses. The arrays contain the coefficients A, B, C
+    instead of moments, because `principal` computes them to more digits than rounded moments would
+    give.
     """
     each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
     axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))
@@ -80,13 +92,16 @@ def _full_row(scene: Scene) -> dict[str, Any]:
 
 
 def _filled(laws: list[Any]) -> list[Any]:
-    """Return the waves of several laws; waves of amplitude 0 fill up the shorter laws."""
+    """Return the waves of several torque laws as lists of equal length.
+
+    `laws` has a list of waves for each law. Waves of amplitude 0 are appended to shorter lists.
+    """
     most = max(map(len, laws))
     return [waves + [[0.0] * 4] * (most - len(waves)) for waves in laws]
 
 
 def from_scene(scene: Scene) -> dict[str, Any]:
-    """Return a scene as arrays of one row each."""
+    """Return the quantities of a scene as a dict of the arrays of `solve_many`, of one row each."""
     law = checked_scene(scene).body_torque
     return {
         "by_moments": scene.moments is not None,
@@ -111,7 +126,10 @@ def check_alike(scenes: Sequence[Scene]) -> None:
 
 
 def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
-    """Return scenes as arrays with one row for each; raise InputError if they can't be combined."""
+    """Return scenes as a dict of the arrays of `solve_many`, with one row for each scene.
+
+    Raise InputError if there is no scene, or if one call of the kernel can't solve all scenes.
+    """
     if not scenes:
         raise InputError("there is no scene; allowed: a scene, or some")
     check_alike(scenes)
@@ -122,7 +140,10 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 
 def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return arrays with one row for each body; all other entries are taken from the first row."""
+    """Return a dict of arrays with one row for each body, from the dicts `rows` of single bodies.
+
+    Quantities that are not arrays of bodies, such as the step size, are taken from the first dict.
+    """
     found = {**rows[0]}
     for name in ("body", "omega0", "torque_constant", "torque_rate"):
         found[name] = np.array([row[name] for row in rows])
@@ -134,7 +155,10 @@ def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def units_of(values: Any) -> Array:
-    """Return unit quaternions, shape (n, 4); NaN for a row that can't be normalised."""
+    """Return the quaternions `values` divided by their norms, shape (n, 4).
+
+    A row that can't be normalised, such as a row of zeros, becomes NaN.
+    """
     found = rows_of("attitude0", values, 4)
     with np.errstate(all="ignore"):
         found = found / np.abs(found).max(axis=1, keepdims=True)

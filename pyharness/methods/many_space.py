@@ -32,7 +32,8 @@ NO_ATTITUDE = (
 def acts_in_space(scene: Scene, arrays: Iterable[object]) -> bool:
     """Return whether a torque about the axes of space acts, from the scene or from torque arrays.
 
-    Torque arrays have the frame of the scene's torque.
+    `arrays` contains the torque arrays of `solve_many`, and None for an array that was not given.
+    They are about the same axes, of the body or of space, as the scene's torque.
     """
     named = any(each is not None for each in arrays)
     return scene.torque.in_space or (scene.torque.frame == "space" and named)
@@ -42,10 +43,11 @@ def solve_in_space(
     scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
     method: str, tolerance: float, effort: float, threads: int,
 ) -> Ensemble:  # fmt: skip
-    """Solve many bodies under a torque about the axes of space, given by a scene and arrays.
+    """Return the final states of many bodies under a torque about the axes of space.
 
-    An entry of `arrays` is None if `solve_many` was called without that array. An InputError that a
-    body causes refuses that body alone.
+    The arguments are those of `solve_many`. `arrays` contains its arrays by name, and None for an
+    array that was not given; the scene then supplies the quantity. A body whose numbers are not
+    allowed gets the status REFUSED, and all other bodies are solved.
     """
     check_torque(scene, method, attitude=True)
     if arrays["coefficients"] is not None or scene.coefficients is not None:
@@ -87,7 +89,11 @@ def solve_in_space(
 
 
 def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
-    """Return a scene for each full inertia matrix or torque; None for a body that is refused."""
+    """Return a scene for each body, or None for a body whose numbers are not allowed.
+
+    `arrays` contains the arrays of bodies and torques of `solve_many` by name, and None for an
+    array that was not given. The scene supplies all other quantities.
+    """
     rows = _rows(arrays)
     found: list[Scene | None] = []
     for i in range(count_bodies(rows)):
@@ -99,7 +105,7 @@ def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
 
 
 def _rows(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return those arrays of bodies and torques that are not None."""
+    """Return the checked arrays of bodies and torques, without the arrays that are None."""
     shapes = {"moments": (3,), "inertia": (3, 3), "torque_constant": (3,), "torque_rate": (3,)}
     rows = {}
     for name, values in arrays.items():
@@ -111,9 +117,10 @@ def _rows(arrays: dict[str, Any]) -> dict[str, Array]:
 
 
 def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
-    """Return the scene with the numbers of body `i` in place of its own.
+    """Return the scene of body `i`: `scene` with row `i` of each array in place of its own numbers.
 
-    Raise InputError if these numbers are not allowed.
+    `rows` contains the arrays by the names of the arguments of `solve_many`. Raise InputError if
+    the numbers of the body are not allowed.
     """
     own = {name: row_of(each, i) for name, each in rows.items()}
     torque: dict[str, Any] = {

@@ -9,7 +9,11 @@ from pyharness.model.trajectory import Array
 
 
 def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
-    """Return the array that a prepared kernel gets in every call; `Places` defines its elements."""
+    """Return the array that the kernel of a prepared solver gets in every call.
+
+    `Places` defines the elements of the array. `code` is the integer that the kernel uses for the
+    method (`Methods`), `tolerance` is relative, and `effort` is a factor on the work limit.
+    """
     coefficients, constant, rate, sines, cosines = _torque_of(scene)
     packed = np.zeros(Places.WAVES)
     packed[Places.METHOD] = code
@@ -30,6 +34,6 @@ def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Ar
 def _torque_of(scene: Scene) -> tuple[Array, ...]:
     if not scene.torque.in_space:
         return normalized(scene)
-    # The kernel needs no ratios of the moments: the packed array contains the moments.
+    # The ratios of the moments are left out, because the packed array contains the moments.
     coefficients, _, *torque = normalized_in_space(scene)
     return coefficients, *torque

@@ -10,17 +10,21 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 
 FINEST = REGISTRY["auto"].finest
-# For few digits Runge-Kutta may take fewer operations than a series. The kernel chooses.
+# For few digits Runge-Kutta may take fewer operations than a Taylor series. The kernel chooses.
 RK4_OR_TAYLOR = "quick or taylor"
-# Smallest tolerances at which Runge-Kutta may be the faster one: with a constant torque, and with
-# a varying one.
+# Smallest tolerances at which Runge-Kutta may be faster than the Taylor series: with a constant
+# torque, and with a torque that varies with time.
 FEW_DIGITS = 1e-7
 _WAVES_DIGITS = 1e-9
 
 
 @dataclass(frozen=True)
 class Decision:
-    """A decision whether one part of a solution is computed, with the reason."""
+    """A decision whether one part of a computation is carried out, with the reason.
+
+    `part` names the part, for example `torque` or `attitude`, `kept` states whether it is computed,
+    and `why` is the reason.
+    """
 
     part: str
     kept: bool
@@ -29,23 +33,23 @@ class Decision:
 
 @dataclass(frozen=True)
 class Plan:
-    """A plan of the computation for one scene."""
+    """The method, and the parts of the computation, that are chosen before a scene is solved."""
 
     scene: Scene
-    method: str  # the one that was chosen or requested
+    method: str  # name of the method that was chosen or requested
     closed_form: str | None  # sphere, symmetric or elliptic, if a closed form is used
-    fallback: str | None  # the method that is used if the chosen one refuses the scene
-    velocity: bool  # whether it is requested
+    fallback: str | None  # name of the method that is used if `method` refuses the scene
+    velocity: bool  # whether the translational velocity is requested
     rows: bool  # whether intermediate output is requested
 
     @cached_property
     def decisions(self) -> tuple[Decision, ...]:
-        """Return the decisions, part by part."""
+        """Return a decision for each part of the computation."""
         return tuple(_decisions(self))
 
     @property
     def skipped(self) -> frozenset[str]:
-        """Return the parts that are not computed."""
+        """Return the names of the parts that are not computed."""
         return frozenset(each.part for each in self.decisions if not each.kept)
 
 
@@ -56,10 +60,11 @@ def plan(
     velocity: bool = False,
     rows: bool = False,
 ) -> Plan:
-    """Return the plan for a scene; `rows` requests output between the beginning and the end.
+    """Return the plan for a scene: the method that solves it and the parts that are computed.
 
-    Without a tolerance the plan is for the method's default. Raise InputError if the method can't
-    take the scene, or if the tolerance is out of range.
+    `velocity` requests the translational velocity, and `rows` requests intermediate output. A
+    tolerance of None means the method's default. Raise InputError if the method can't take the
+    scene, or if the tolerance is out of range.
     """
     tolerance = requested_tolerance(method, tolerance)
     finest = REGISTRY["quick"].finest if method == "quick" else FINEST

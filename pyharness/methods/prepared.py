@@ -1,7 +1,8 @@
 """Solvers that are prepared once; each call then costs little more than the kernel itself.
 
-`prepare` validates the scene, decides what it needs (`plan`) and packs it. A call then only checks
-its two or three arguments and enters the kernel.
+`prepare` validates the scene, chooses the method and the parts of the computation (`plan`), and
+packs the scene into an array. A call then only checks its two or three arguments and enters the
+kernel.
 """
 
 from dataclasses import replace
@@ -56,7 +57,7 @@ def prepare(
         the tolerance.
     tolerance : float
         Largest error of any component at the end, relative to the largest |omega| from 0 to the
-        end. By default it is the method's own, as in `solve`. Methods with a fixed step ignore it.
+        end. The default depends on the method, as in `solve`. Methods with a fixed step ignore it.
         If the motion amplifies perturbations K times, no method has an error below some 1e-15 K.
     effort : float
         Factor on the work limit of a call; 1 is some ten seconds. A call that exceeds the limit has

@@ -28,13 +28,13 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
 
     Call it as ``solver(omega0, t_end)`` or ``solver(omega0, t_end, attitude0)``. `omega0` is three
     numbers (rad/s), `t_end` a time in seconds, positive, negative or 0. `attitude0` is a quaternion
-    from body to space, scalar first. By default it is the scene's, and for a scene without attitude
-    that of a body whose axes are those of space. A call returns two new arrays: omega, shape (3,),
-    and the attitude, shape (4,), at `t_end`. They are NaN if the kernel could not finish, and
-    `status` gives the reason. Any other argument is refused with an InputError. Calls are fastest
-    with arrays of floats and a unit quaternion.
+    from body to space, scalar first. By default it is the scene's attitude. For a scene without
+    attitude it is (1, 0, 0, 0), so that the body's axes are those of space at time 0. A call
+    returns two new arrays: omega, shape (3,), and the attitude, shape (4,), at `t_end`. Both are
+    NaN if the kernel could not finish, and `status` gives the reason. Any other argument is refused
+    with an InputError. Calls are fastest with arrays of floats and a unit quaternion.
 
-    Threads, copies and pickles are as with `Solver`.
+    As with `Solver`, threads may share a solver, and a solver can be copied and pickled.
 
     Attributes
     ----------
@@ -43,7 +43,11 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
     """
 
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
-        """Pack the data that all calls share; users call `prepare` instead."""
+        """Pack the data that all calls share; users call `prepare` instead.
+
+        `chosen` is the plan, which contains the scene. `tolerance` is relative, `asked` is the name
+        of the requested method, and `effort` is a factor on the work limit of a call.
+        """
         scene, code = chosen.scene, Methods.TAYLOR
         attitude = scene.attitude or IDENTITY
         if scene.torque.in_space:
@@ -64,14 +68,19 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
 
 
 def prepared_attitude(scene: Scene, method: str, tolerance: float, effort: float) -> AttitudeSolver:
-    """Return a solver with attitude; raise InputError if the method can't propagate attitudes."""
+    """Return a prepared solver of omega and attitude, by the method with a name in `PREPARED`.
+
+    `tolerance` is relative, and `effort` is a factor on the work limit of a call. Raise InputError
+    if the method can't propagate attitudes.
+    """
     return AttitudeSolver(attitude_plan(scene, method, tolerance), tolerance, method, effort)
 
 
 def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
-    """Return the plan of a scene with attitude.
+    """Return the plan for solving a scene together with its attitude.
 
-    Raise InputError if the method can't propagate attitudes.
+    A scene without attitude gets the attitude (1, 0, 0, 0) at time 0. Raise InputError if the
+    method can't propagate attitudes.
     """
     check_attitude(method)
     return plan(replace(scene, attitude=scene.attitude or IDENTITY), method, tolerance, rows=True)
@@ -80,7 +89,12 @@ def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
 def _check(
     usual: Quaternion, omega0: object, t_end: object, attitude0: object
 ) -> tuple[tuple[float, ...], float]:
-    """Convert arguments that the C code can't read directly; raise InputError for invalid ones."""
+    """Convert arguments of a call that the C function can't read directly.
+
+    Return the three numbers of `omega0` (rad/s) and the four of the attitude in one tuple, and the
+    time (s). `usual` is the attitude if `attitude0` is None. Raise InputError for an argument that
+    is not allowed.
+    """
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     attitude = usual if attitude0 is None else unit_quaternion("attitude0", attitude0)[0]
     return (*start, *attitude), time

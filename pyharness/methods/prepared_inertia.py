@@ -25,17 +25,23 @@ from pyharness.model.waves import with_merged_waves
 
 
 class InertiaSolver(Solver):
-    """A prepared solver of a scene with a full inertia matrix: see `Solver`.
+    """A prepared solver of a scene with a full inertia matrix, used in the same way as a `Solver`.
 
-    Angular velocities are about the axes of the matrix. `plan` is the plan of the scene about
-    principal axes, and `growth` is the norm of the state-transition matrix about these axes.
+    Angular velocities are about the axes of the inertia matrix. `plan` is the plan for the scene
+    about principal axes, and `growth` is the largest norm of the state-transition matrices of omega
+    about principal axes.
     """
 
     def __new__(
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
         scene: Scene | None = None,
     ) -> Self:  # fmt: skip
-        """Prepare the plan's scene, about principal axes; `scene` is the one with the matrix."""
+        """Prepare a solver of the scene about principal axes; users call `prepare` instead.
+
+        `chosen` is the plan for the scene about principal axes, and `scene` is the scene with the
+        inertia matrix. `tolerance` is relative, `asked` is the name
+        of the requested method, and `effort` is a factor on the work limit of a call.
+        """
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
         solver._scene = scene
@@ -46,11 +52,14 @@ class InertiaSolver(Solver):
     _axes: Array  # the principal axes, in columns
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and arguments from which a copy is prepared, here or elsewhere."""
+        """Return the class and the arguments from which `copy` and `pickle` prepare a copy."""
         return type(self), (self.plan, *self._given, self._scene)
 
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array:
-        """Return the angular velocity at `t_end`, about the axes of the matrix."""
+        """Return omega (rad/s) at `t_end` (s), about the axes of the inertia matrix, shape (3,).
+
+        `omega0` is the initial omega (rad/s). The result is written into `out` if it is not None.
+        """
         start = np.array(three_floats("omega0", omega0))
         if out is not None and (found := no_buffer(out)):
             raise InputError(
@@ -83,16 +92,22 @@ class InertiaSolver(Solver):
 
 
 class InertiaAttitudeSolver(AttitudeSolver):
-    """A prepared solver with attitude of a scene with a full inertia matrix: see `AttitudeSolver`.
+    """A prepared solver with attitude of a scene with a full inertia matrix.
 
-    Angular velocities are about the axes of the matrix, and attitudes are attitudes of these axes.
+    It is used in the same way as an `AttitudeSolver`. Angular velocities are about the axes of the
+    inertia matrix, and an attitude is the attitude of these axes.
     """
 
     def __new__(
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
         scene: Scene | None = None,
     ) -> Self:  # fmt: skip
-        """Prepare the plan's scene, about principal axes; `scene` is the one with the matrix."""
+        """Prepare a solver of the scene about principal axes; users call `prepare` instead.
+
+        `chosen` is the plan for the scene about principal axes, and `scene` is the scene with the
+        inertia matrix. `tolerance` is relative, `asked` is the name
+        of the requested method, and `effort` is a factor on the work limit of a call.
+        """
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
         solver._scene = scene
@@ -104,13 +119,17 @@ class InertiaAttitudeSolver(AttitudeSolver):
     _turn: Quaternion  # from principal axes to the axes of the matrix
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and arguments from which a copy is prepared, here or elsewhere."""
+        """Return the class and the arguments from which `copy` and `pickle` prepare a copy."""
         return type(self), (self.plan, *self._given, self._scene)
 
     def __call__(
         self, omega0: Numbers, t_end: Number, attitude0: Numbers | None = None
     ) -> tuple[Array, Array]:
-        """Return angular velocity and attitude at `t_end`, both for the axes of the matrix."""
+        """Return omega (rad/s) and the attitude at `t_end` (s), for the axes of the inertia matrix.
+
+        `omega0` is the initial omega (rad/s). `attitude0` is the initial quaternion, by default the
+        scene's or (1, 0, 0, 0).
+        """
         start = np.array(three_floats("omega0", omega0))
         attitude = self._scene.attitude or IDENTITY
         if attitude0 is not None:
@@ -122,16 +141,20 @@ class InertiaAttitudeSolver(AttitudeSolver):
 
 
 def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:
-    """Return the principal axes of a scene, as columns of a matrix and as a quaternion."""
+    """Return the principal axes of a scene's inertia matrix, as a matrix and as a quaternion.
+
+    The columns of the matrix, shape (3, 3), are the axes. The quaternion, scalar first, is the same
+    rotation, from principal axes to the axes of the inertia matrix.
+    """
     about_principal, axes = principal(replace(scene, attitude=IDENTITY))
     return axes, about_principal.attitude or IDENTITY
 
 
 def rotated(vectors: Array, matrix: Array) -> Array:
-    """Return the product of a matrix and each vector, shape (3,) or (n, 3).
+    """Return the product of a matrix and each vector, in the shape of `vectors`, (3,) or (n, 3).
 
-    A `matrix` of shape (n, 3, 3) contains one matrix for each vector. The sums have a fixed order,
-    so that each row is bit-for-bit identical for any number of rows.
+    `matrix` has shape (3, 3), or shape (n, 3, 3) with one matrix for each vector. The sums have a
+    fixed order, so that each row is bit-for-bit identical for any number of rows.
     """
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack(
@@ -143,7 +166,8 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 def turned_back(attitudes: Array, turn: Any) -> Array:
     """Convert attitudes of principal axes, shape (4,) or (n, 4), to attitudes of the matrix's axes.
 
-    `turn` is the rotation from principal axes to the axes of the matrix.
+    `turn` is the quaternion, scalar first, of the rotation from principal axes to the axes of the
+    inertia matrix. It has shape (4,), or (n, 4) with one quaternion for each attitude.
     """
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
@@ -152,7 +176,10 @@ def turned_back(attitudes: Array, turn: Any) -> Array:
 
 
 def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float) -> InertiaSolver:
-    """Return a prepared solver of a scene with a full inertia matrix."""
+    """Return a prepared solver of a scene with a full inertia matrix, without attitude.
+
+    `tolerance` is relative, and `effort` is a factor on the work limit of a call.
+    """
     from pyharness.methods.plan import plan
 
     about_principal = with_merged_waves(principal(replace(scene, attitude=None))[0])
@@ -162,7 +189,10 @@ def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float)
 def prepared_inertia_attitude(
     scene: Scene, method: str, tolerance: float, effort: float
 ) -> InertiaAttitudeSolver:
-    """Return a prepared solver with attitude of a scene with a full inertia matrix."""
+    """Return a prepared solver with attitude of a scene with a full inertia matrix.
+
+    `tolerance` is relative, and `effort` is a factor on the work limit of a call.
+    """
     from pyharness.methods.prepared_attitude import attitude_plan
 
     about_principal, _ = principal(replace(scene, attitude=scene.attitude or IDENTITY))

@@ -1,4 +1,7 @@
-"""Conversion of a scene to arguments of the modern kernels, and of their rows to a trajectory."""
+"""Conversion of a scene to arguments of the modern kernels, and of their results to a trajectory.
+
+The modern kernels are the Fortran procedures of the methods that are not programs of the thesis.
+"""
 
 import math
 from collections.abc import Sequence
@@ -18,20 +21,22 @@ _NOT_FINITE = (
 
 
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
-    """Return the arguments of the modern kernels, in which torques are divided by the moments.
+    """Return a scene's coefficients and torques over moments, the arguments of the modern kernels.
 
-    They are A, B, C, then constant torque over moment (1/s2), its rate (1/s3), sines and cosines.
-    Sines and cosines have shape (4, n), with columns of amplitude (1/s2) and frequency (rad/s).
-    Raise InputError if a value is not finite.
+    The five arrays are the coefficients A, B, C of Euler's equations, the constant torque over
+    moment (1/s2), its rate (1/s3), the sines and the cosines of the torque. Sines and cosines have
+    shape (4, n), with columns of amplitude (1/s2) and frequency (rad/s). Raise InputError if a
+    value is not finite.
     """
     return _over(scene, scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0)))
 
 
 def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
-    """Return the arguments of the kernel for a torque about the axes of space.
+    """Return a scene's arguments of the kernel for a torque about the axes of space.
 
-    They are A, B, C, the largest moment over each moment, and the torques as in `normalized`, but
-    divided by the largest moment. The scene must have moments.
+    The six arrays are the coefficients A, B, C, the largest moment over each moment, and the four
+    arrays of torques as in `normalized`, but divided by the largest moment. The scene must have
+    moments. Raise InputError if a value is not finite.
     """
     moments = np.array(scene.moments)
     largest = moments.max()
@@ -44,7 +49,7 @@ def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
 
 
 def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:
-    """Return the name of the kernel that solves a scene by series, and its arguments."""
+    """Return the name of the kernel that solves a scene by Taylor series, and its arguments."""
     if scene.torque.in_space:
         return "space_torque_rows", normalized_in_space(scene)
     return "taylor_rows", normalized(scene)
@@ -66,10 +71,11 @@ def _over(scene: Scene, law: TorqueLaw, moments: Array) -> tuple[Array, Array, A
 
 
 def remainders(scene: Scene) -> Triple:
-    """Return the exact A, B, C minus their rounded values.
+    """Return the exact coefficients A, B, C of a scene minus their values in binary64.
 
-    Without these remainders a phase of 1e6 radians has an error of 1e-10. They are 0 if the body is
-    given by coefficients, and under torque, where no kernel uses them.
+    Without these remainders a phase of 1e6 radians has an error of 1e-10. The remainders are 0 if
+    the body is given by coefficients. They are also 0 under torque, because no kernel uses them
+    there.
     """
     found, moments = scene.euler_coefficients, scene.exact_moments
     if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
@@ -82,7 +88,7 @@ def remainders(scene: Scene) -> Triple:
 
 
 def known(estimate: float) -> float | None:
-    """Return an estimate of a kernel, or None if it is negative, which means unknown."""
+    """Return a kernel's estimate, or None if it is negative, because this means unknown."""
     return float(estimate) if estimate >= 0.0 else None
 
 
@@ -97,9 +103,12 @@ def trajectory_of(
     growth: float | None = None,
     attitudes: Array | None = None,
 ) -> Trajectory:
-    """Return the trajectory from the results of a kernel, which has one column for each time.
+    """Return a trajectory that is built from the results of a kernel at `times` (s).
 
-    `error` and `growth` apply to the last time. They are dropped if it was not reached.
+    `rows` is omega (rad/s), shape (3, n), with one column for each time. `attitudes` are
+    quaternions, shape (4, n). Only the first `n_rows` columns are results. `status` is an integer
+    of `Statuses`. `error` and `growth` (error amplification) apply to the last time. They are
+    dropped if the kernel did not reach it.
     """
     ended = ENDS[status] if ENDS[status] in WITH_ALL_ROWS else "overflow"
     found = rows_trajectory(times[:n_rows], rows.T[:n_rows], evaluations, steps, ended)
@@ -111,13 +120,20 @@ def trajectory_of(
 def rows_trajectory(
     times: Sequence[float], omega: Array, evaluations: int, steps: int, ended: str
 ) -> Trajectory:
-    """Return a trajectory without velocity, whose recorded times are the true times."""
+    """Return a trajectory from omega (rad/s, shape (n, 3)) at `times` (s), without velocity.
+
+    Its recorded times are the true times. `evaluations` is the number of right-hand sides, and
+    `ended` is the text that states how the integration ended.
+    """
     time = np.array(times, dtype=float)
     return Trajectory(time, time, omega, None, steps, evaluations, ended)
 
 
 def closed_form(scene: Scene) -> str | None:
-    """Return the name of the closed form that solves a scene, or None if there is none."""
+    """Return the name of the closed form that solves a scene, or None if there is none.
+
+    The names are `sphere`, `symmetric` and `elliptic`.
+    """
     if scene.torque.in_space:
         return None
     a, b, c = scene.euler_coefficients

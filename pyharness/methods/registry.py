@@ -24,19 +24,22 @@ _DEFAULT = 1e-12
 
 @dataclass(frozen=True)
 class Method:
-    """A method that turns a scene into a trajectory, as distinct from a program of the appendix."""
+    """The properties of one method, which turns a scene into a trajectory.
+
+    Methods are distinct from the programs of the appendix of the thesis.
+    """
 
     name: str
     title: str
     source: str
-    finest: float  # the smallest tolerance that it claims to meet; 1 if it takes no tolerance
-    # The tolerance if none is requested: the finest that the method meets in ordinary scenes
-    # within a fraction of its work limit, but no finer than 1e-12; 1 if it takes no tolerance.
+    finest: float  # smallest tolerance that the method claims to meet; 1 if it takes no tolerance
+    # The tolerance if none is requested: the smallest one that the method meets in ordinary scenes
+    # within a fraction of its work limit, but not below 1e-12; 1 if the method takes no tolerance.
     default: float
     solve: Integrator  # called with checked times on one side of 0, in order away from 0
-    gives_rows: bool = True  # else omega at the end alone, from a prepared solver
-    # The order of the global error in the step size, if it is fixed, else 0; and the right-hand
-    # sides per step, if their number is fixed, else 0.
+    gives_rows: bool = True  # False: omega at the end alone, from a prepared solver
+    # `order` is the order of the global error in the step size, or 0 if the order varies.
+    # `evaluations` is the number of right-hand sides per step, or 0 if that number varies.
     order: int = 0
     evaluations: int = 0
     any_scale: bool = False  # rescales the scene itself, or forms no products in binary64
@@ -66,7 +69,11 @@ def _no_rows(*given: object) -> Trajectory:
 
 
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
-    """Return a solver from a module of `pyharness.methods`, imported when it is first used."""
+    """Return a solver of scenes from a module of `pyharness.methods`, imported at its first call.
+
+    `room` is the name of the module, and `name` is the name of a function in it. The function is
+    the solver itself, or returns the solver if it is called with `arguments`.
+    """
 
     def solve(*given: Any) -> Trajectory:
         solver = getattr(importlib.import_module(f"pyharness.methods.{room}"), name)
@@ -175,7 +182,7 @@ REGISTRY = {
 METHODS = {name: method for name, method in REGISTRY.items() if method.gives_rows}
 FIXED_STEP = tuple(name for name, method in REGISTRY.items() if method.is_fixed_step)
 GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
-# The methods of SciPy, by our names, with SciPy's names.
+# SciPy's name of each of its methods, by the name in this registry.
 SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}
 
 
@@ -189,16 +196,17 @@ def requested_tolerance(method: str, tolerance: Number | None) -> float:
 
 
 def check_attitude(method: str) -> None:
-    """Raise InputError if a method can't propagate the attitude."""
+    """Raise InputError if the method with this name can't propagate the attitude."""
     if not REGISTRY[method].attitude:
         able = ", ".join(each.name for each in REGISTRY.values() if each.attitude)
         raise InputError(f"method {method} carries no attitude; allowed: {able}")
 
 
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
-    """Raise InputError for a torque about the axes of space that the method can't take.
+    """Raise InputError if the scene has a torque about the axes of space that can't be taken.
 
-    Raise it too if such a torque acts and `attitude` is false.
+    The reason is that the method can't take such a torque, or that `attitude` is false: the
+    attitude is then not computed, although the torque depends on it.
     """
     if not scene.torque.in_space:
         return

@@ -45,10 +45,12 @@ def trajectory_report(
     form: str = "quaternion",
     word: str | None = None,
 ) -> Report:
-    """Return the report of one trajectory; `listing` is None for a method that is no program.
+    """Return the report of one trajectory of a scene, with a table of its rows and a picture.
 
-    `word` is the arithmetic of a program that did not run in binary64. An attitude is shown as
-    `form`, a name in `model.attitude.FORMS`.
+    `method` is the name of the method or program, and `title` is the line under the scene's
+    heading. `listing` is the program's listing, or None for a method. `word` is the arithmetic of a
+    program that did not run in binary64. An attitude is shown as `form`, a name in
+    `model.attitude.FORMS`.
     """
     columns = [*_TIMES, *_OMEGA]
     parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]
@@ -109,7 +111,11 @@ def _shown(attitude: Array, form: str) -> Array:
 
 
 def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
-    """Draw the components of omega over time; a note says why they end before the last time."""
+    """Draw the components of omega over time, and the attitude if the trajectory has one.
+
+    `numbers` is the table that is saved with the picture. If the trajectory ends before the last
+    requested time, a note in the title gives the reason.
+    """
     from matplotlib.figure import Figure
 
     has_attitude = trajectory.attitude is not None and len(trajectory.time) > 0
@@ -136,14 +142,17 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
 
 
 def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
-    """Mark the last point of a trajectory, at the edge of the frame if the point is outside."""
+    """Mark the last value of component `row` (0 to 2) of omega in the diagram `axes`.
+
+    A value outside the limits of the diagram is marked at its edge.
+    """
     bottom, top = axes.get_ylim()
     axes.plot(trajectory.time[-1:], np.clip(trajectory.omega[-1:, row], bottom, top), **_END)
     axes.set_ylim(bottom, top)
 
 
 def plan_report(scene: Scene, plan: "Plan") -> Report:
-    """Return the report of the plan for a scene."""
+    """Return the report of the plan for a scene, with a table of its decisions."""
     table = Table(
         words("part computed why"),
         [[each.part, "yes" if each.kept else "no", each.why] for each in plan.decisions],

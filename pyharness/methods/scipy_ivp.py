@@ -2,8 +2,9 @@
 
 SciPy controls the local error of each step, whereas a tolerance here limits the error at the
 requested times. A preliminary integration with few digits supplies three quantities that connect
-the two: the largest omega, to which both are relative; the phase of the motion, over which local
-errors add up; and the error amplification.
+the local error with the error at the requested times. They are the largest omega, to which both
+errors are relative; the phase of the motion, over which local errors add up; and the error
+amplification.
 """
 
 import math
@@ -25,18 +26,19 @@ from pyharness.scenes.rescaled import omega_by_torque
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
-# Largest error at the end over the local error: this much in a motion of a few radians, and, from
-# the next table, this much more for each radian times the error amplification. Both were measured
-# on random scenes other than those of the checks, and increased by half.
+# Largest error at the end over the local error. The first table applies to a motion of a few
+# radians. The second table is added for each radian, multiplied by the error amplification. Both
+# were measured on random scenes other than those of the checks, and increased by half.
 _SUM = {"DOP853": 30.0, "RK45": 90.0, "Radau": 30.0, "LSODA": 90.0}
 _SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 1.2}
 # Likewise for each radian by which the body rotates, if its attitude is requested: an error of
 # omega rotates the attitude until the end.
 _SUM_A_TURN = {"DOP853": 5.5, "RK45": 2.5, "Radau": 0.5, "LSODA": 55.0}
-# The local tolerance makes up for an error amplification up to this one. A larger one multiplies
-# the tolerance, as it does with every method.
+# The local tolerance makes up for an error amplification up to this value. A larger amplification
+# multiplies the tolerance, as it does with every method.
 _SENSITIVE = 1e3
-# Intermediate output comes from a polynomial in each step, whose error is not controlled.
+# Factor on the bound of the error if there is intermediate output: it comes from a polynomial in
+# each step, whose error is not controlled.
 _ROWS = 4.0
 # Longest step in radians of a wave. A method that samples a fast wave always at the same phase
 # takes it for a constant torque, however small its error estimates are.
@@ -78,22 +80,27 @@ class _Ahead(NamedTuple):
 
 
 def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
-    """Return the bound of a SciPy method's error at the end, in units of its local error.
+    """Return the bound of a SciPy method's error at the end over its local error in each step.
 
-    `radians`, `growth` and `turned` are those of `_Ahead`.
+    `name` is SciPy's name of the method. `radians` is the phase of the motion and of its waves,
+    `growth` is the error amplification until the end, and `turned` is the angle (rad) by which the
+    body rotates if its attitude is requested.
     """
     found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
     return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)
 
 
 def finest_tolerance(name: str, scene: Scene, time: float) -> float:
-    """Return the smallest tolerance that a method of SciPy can meet from 0 to `time` (s)."""
+    """Return the smallest tolerance that a method of SciPy can meet from 0 to `time` (s).
+
+    `name` is SciPy's name of the method.
+    """
     ahead = _Run(scene, time, name).ahead()
     return _FINEST_STEP * steps_sum(name, *ahead[1:])
 
 
 def scipy_method(name: str) -> Integrator:
-    """Return a solver by a method of `solve_ivp`, which calls the scene's right-hand side."""
+    """Return the function that solves a scene by the method `name` of SciPy's `solve_ivp`."""
 
     def solve(
         scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
@@ -159,12 +166,16 @@ def scipy_method(name: str) -> Integrator:
 
 
 def state_of(scene: Scene) -> tuple[float, ...]:
-    """Return omega at time 0, followed by the attitude if the scene has one."""
+    """Return omega (rad/s) at time 0, followed by the initial quaternion if the scene has one."""
     return (*scene.omega, *(scene.attitude or ()))
 
 
 def turning(slopes: RightHandSide) -> RightHandSide:
-    """Return the right-hand side of omega and attitude q, from `slopes` and q' = q (0, omega)/2."""
+    """Return the right-hand side of the equations of omega and attitude together.
+
+    `slopes` is the right-hand side of omega alone. The attitude is a quaternion q, scalar first,
+    with q' = q (0, omega)/2, where the product is Hamilton's product.
+    """
 
     def both(time: float, state: Sequence[float]) -> list[float]:
         x, y, z, a, b, c, d = state
@@ -182,7 +193,11 @@ def turning(slopes: RightHandSide) -> RightHandSide:
 def _rows_of(
     times: Sequence[float], rows: Array, evaluations: int, steps: int, ended: str
 ) -> Trajectory:
-    """Return a trajectory from rows of omega, or of omega and attitude."""
+    """Return a trajectory from rows of omega, shape (n, 3), or of omega and attitude, (n, 7).
+
+    `evaluations` is the number of right-hand sides, and `ended` states how the integration ended.
+    The attitudes are normalised.
+    """
     found = rows_trajectory(times, rows[:, :3], evaluations, steps, ended)
     if rows.shape[1] == 3:
         return found
@@ -191,11 +206,15 @@ def _rows_of(
 
 
 class _NoNumberError(Exception):
-    """An exception that SciPy's linear algebra met a number that is not finite."""
+    """An exception which reports that SciPy's linear algebra met a number that is not finite."""
 
 
 class _Run:
-    """The calls of `solve_ivp` for one scene and time, with a count of all right-hand sides."""
+    """The integrations of one scene from 0 to `end` (s) by `solve_ivp`, with one work limit.
+
+    `name` is SciPy's name of the method, and `effort` is a factor on the work limit. An instance
+    counts the right-hand sides of all its integrations.
+    """
 
     def __init__(self, scene: Scene, end: float, name: str, effort: float = 1.0) -> None:
         self.scene, self.end, self.effort = scene, end, effort
@@ -211,7 +230,7 @@ class _Run:
             self.most //= _RADAU_SHARE
 
     def carry_attitude(self) -> None:
-        """Add the attitude to the unknowns, if the scene has one, for the main integration."""
+        """Add the scene's attitude, if there is one, to the unknowns of the main integration."""
         if self.scene.attitude is not None:
             self.start = state_of(self.scene)
             self.slopes = turning(self.slopes)
@@ -224,7 +243,12 @@ class _Run:
         times: Sequence[float] | None = None,
         longest: float = math.inf,
     ) -> Any:
-        """Return the result of `solve_ivp` at `times`, or with dense output if there are none."""
+        """Return SciPy's result object for one integration by the method `name`.
+
+        `relative` and `absolute` are the tolerances `rtol` and `atol`, and `longest` is the longest
+        step allowed (s). The result contains the solution at `times` (s), or dense output if
+        `times` is None. Its times are in units of `self.unit`.
+        """
         from scipy.integrate import solve_ivp
 
         def phase_left(time: float, omega: Sequence[float]) -> float:
@@ -283,9 +307,10 @@ class _Run:
     def ahead(self) -> _Ahead:
         """Integrate with few digits, and return the quantities that set the local tolerance.
 
-        The integration is repeated until the scale of its own tolerance fits the solution. If omega
-        grows without bound, the scale is the larger of the initial omega and the omega that torque
-        alone would give. The other quantities are then unknown and get their least values.
+        The integration is repeated until its absolute tolerance, a fraction of the largest omega
+        that was expected, fits the solution. If omega grows without bound, the largest omega is
+        replaced by the larger of the expected one and the omega that torque alone would give. The
+        phase and the error amplification are then unknown and get their least values.
         """
         scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()
         if scale == 0.0:
@@ -317,7 +342,10 @@ class _Run:
 
 
 def _pushes(scene: Scene) -> list[tuple[float, float]]:
-    """Return the largest torque over moment (1/s2) and the frequency (rad/s) of each wave."""
+    """Return for each wave of the torque its largest amplitude over moment and its frequency.
+
+    The first number of a pair is in 1/s2, the second in rad/s.
+    """
     moments = scene.moments or (1.0, 1.0, 1.0)
     return [
         (max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True)), abs(frequency))
@@ -326,7 +354,11 @@ def _pushes(scene: Scene) -> list[tuple[float, float]]:
 
 
 def _turned(scene: Scene, span: float, largest: float) -> float:
-    """Return the radians of all waves, counted as far as each can change an omega of `largest`."""
+    """Return the sum of the phases (rad) of all waves of the torque over the time `span` (s).
+
+    A wave counts at most with the ratio of the omega that it can add to `largest`, the largest
+    omega (rad/s). A wave that hardly changes omega therefore hardly counts.
+    """
     found = 0.0
     for push, frequency in _pushes(scene):
         found += min(frequency * span, push * span / largest if largest > 0.0 else 0.0)

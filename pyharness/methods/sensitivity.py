@@ -12,21 +12,25 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import ROUNDING
 from pyharness.scenes.rescaled import rescaling_factor, scaled
 
-# Rounding times growth beyond this fraction of the tolerance makes a result sensitive. The fraction
-# leaves a factor of three for the norm and for the number of perturbations that were propagated.
+# A result is sensitive if the unit roundoff times the error amplification exceeds this fraction of
+# the tolerance. The fraction leaves a factor of three for the norm and for the number of
+# perturbations that were propagated.
 _SHARE = 0.3
 # Relative error of a closed form in addition to an amplified rounding error: the bound that
 # `tests/methods/test_closed_form.py` checks.
 _CLOSED_FORM_ERROR = 16.0 * ROUNDING
-# The series supplies only the growth: it needs few digits, and a twentieth of a second at most.
+# The Taylor series supplies only the error amplification. Therefore it needs few digits, and a
+# twentieth of a second at most.
 _COARSE = 1e-3
 _LITTLE_WORK = 5e-3
 
 
 def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
-    """Return whether rounding times a known growth exceeds a fraction of the tolerance (relative).
+    """Return whether amplified rounding errors are too large for the relative tolerance.
 
-    `noise` is the rounding error of the torque, in roundings of omega.
+    This is the case if the unit roundoff times `growth`, the error amplification, exceeds a
+    fraction of the tolerance. `noise` increases the product: it is the rounding error of the torque
+    over the rounding error of omega. If `growth` is None, the result is False.
     """
     return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
 
@@ -38,12 +42,12 @@ def torque_noise(
     steps: float = math.inf,
     scale: float | None = None,
 ) -> float:
-    """Return the rounding error of torques that nearly cancel, in roundings of omega.
+    """Return the rounding error of torques that nearly cancel, over the rounding error of omega.
 
-    It is the omega that the terms of the torque law would give one by one until `t_end` (s), over
-    the largest omega, `scale` (rad/s). It is 0 if the terms do not cancel. The terms are rounded in
-    each of `steps` steps. Without `scale` the largest omega is taken to be the larger of the
-    initial one, `omega0` (rad/s), and the one that the whole torque gives.
+    It is estimated by the sum of the omegas that the terms of the torque law would give one by one
+    until `t_end` (s), over the largest omega, `scale` (rad/s). It is 0 if the terms do not cancel.
+    The terms are rounded in each of `steps` steps. If `scale` is None, the largest omega is taken
+    to be the larger of the initial one, `omega0` (rad/s), and the one that the whole torque gives.
     """
     if not (scene.torque.sines or scene.torque.cosines):
         return 0.0
@@ -57,11 +61,12 @@ def torque_noise(
 def closed_form_estimate(
     scene: Scene, omega0: Triple, t_end: float, noise: float = 0.0
 ) -> tuple[float | None, float | None]:
-    """Return the error and the growth of a closed form from `omega0` (rad/s) at `t_end` (s).
+    """Return the estimated error of a closed form at `t_end` (s), and its error amplification.
 
-    The error of omega is relative to the largest omega until then. With an attitude the error
-    includes the error of the angle (rad). Both are None if there is no closed form. `noise` is the
-    rounding error of the torque, in roundings of omega.
+    The motion begins with `omega0` (rad/s). The error of omega is relative to the largest omega
+    from 0 to `t_end`. For a scene with an attitude the estimate includes the error of the
+    attitude's angle (rad). Both results are None if there is no closed form. `noise` is the
+    rounding error of the torque over the rounding error of omega, as `torque_noise` returns it.
     """
     growth: float | None = 1.0
     # A sphere does not amplify perturbations.
@@ -78,11 +83,13 @@ def closed_form_estimate(
 
 
 def motion_growth(scene: Scene, t_end: float) -> float | None:
-    """Return the error amplification of a motion until `t_end` (s), whatever method solves it.
+    """Return the error amplification of a scene's motion from time 0 to `t_end` (s).
+
+    It is a property of the motion and does not depend on the method that solves the scene.
 
     It is the largest norm of the state-transition matrices, the derivatives of omega at the end
     with respect to omega at any earlier time. It comes from a closed form if there is one, else
-    from the Taylor series. It is None if neither can determine it.
+    from the Taylor series. The result is None if neither of the two can determine it.
     """
     if closed_form(scene):
         _, growth = closed_form_estimate(scene, scene.omega, t_end)

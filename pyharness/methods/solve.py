@@ -118,7 +118,7 @@ def solve(
     effort = checked_effort(effort)
     values, turned = _ascending(times)
     below = [t for t in values if t < 0.0]
-    # On either side in order away from 0.
+    # The times on either side of 0, in order away from 0.
     sides = (below[::-1], values[len(below) :])
     marches = [_march(chosen, scene, each, tolerance, effort) for each in sides if each]
     if below:
@@ -134,10 +134,10 @@ def solve(
 def finest(method: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method of the registry can meet from 0 to `time` (s).
 
-    For most methods it is the tolerance that the method claims to meet. The methods of `solve_ivp`
-    accept no local tolerance below some 2e-14. Their smallest tolerance is larger than the claimed
-    one if many local errors add up or if the motion amplifies them. Raise InputError if too many
-    steps would be needed to determine it.
+    For most methods it is the tolerance that the method claims to meet (`Method.finest`). The
+    methods of SciPy's `solve_ivp` accept no local tolerance below some 2e-14. Their smallest
+    tolerance is larger than the claimed one if many local errors add up or if the motion amplifies
+    them. Raise InputError if too many steps would be needed to determine the smallest tolerance.
     """
     claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:
@@ -150,7 +150,11 @@ def finest(method: str, scene: Scene, time: float) -> float:
 def by_plan(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Solve a scene by the method that the plan chooses for output at `times`."""
+    """Return the trajectory at `times` (s) by the method that the plan chooses for the scene.
+
+    If this method refuses the scene, the plan's `fallback` solves it. `tolerance` is relative,
+    and `effort` is a factor on the work limit.
+    """
     chosen = plan(scene, "auto", tolerance, rows=True)
     method = METHODS[chosen.method]
     try:
@@ -169,7 +173,12 @@ def by_plan(
 def _march(
     chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float
 ) -> Trajectory:
-    """Solve at times on one side of 0, in units in which the method can form its products."""
+    """Return the trajectory by the method `chosen` at times on one side of 0.
+
+    The scene is solved in units of time in which products of two components of omega neither
+    overflow nor underflow. The trajectory is in the scene's own units. `effort` is a factor on the
+    work limit.
+    """
     if not chosen.is_fixed_step and not is_ordinary(scene):
         # The step is not used, but in other units it might not be finite.
         scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
@@ -193,7 +202,11 @@ def _rows(found: Trajectory) -> tuple[str, ...]:
 
 
 def _joined(before: Trajectory, after: Trajectory) -> Trajectory:
-    """Return the rows of two integrations from 0, backward and forward, as one trajectory."""
+    """Return the rows of two integrations from time 0 as one trajectory.
+
+    `before` is the integration backward, with its rows in ascending order of time, and `after` is
+    the integration forward.
+    """
     both = before, after
     rows: dict[str, Any] = {
         name: np.concatenate([getattr(x, name) for x in both]) for name in _rows(after)

@@ -47,7 +47,7 @@ CODES = {
 }
 PREPARED = ("auto", *(name for name in CODES if name not in ("sphere", RK4_OR_TAYLOR)))
 
-_FEW_WAVES = 16  # so few waves take less time than releasing the GIL
+_FEW_WAVES = 16  # fewer waves than this take less time than releasing the GIL
 
 
 class Solver(LastCall, BoundKernel):
@@ -92,7 +92,11 @@ class Solver(LastCall, BoundKernel):
     # The base class binds a kernel to its data in C. A call goes from the interpreter into the
     # kernel without Python code in between, which would take as long as an easy solution.
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
-        """Pack the data that all calls share; users call `prepare` instead."""
+        """Pack the data that all calls share; users call `prepare` instead.
+
+        `chosen` is the plan, which contains the scene. `tolerance` is relative, `asked` is the name
+        of the requested method, and `effort` is a factor on the work limit of a call.
+        """
         kernel = extension().solve_packed
         packed = packed_scene(chosen.scene, _code(chosen), tolerance, effort)
         packed_with_gil = None
@@ -113,10 +117,11 @@ class Solver(LastCall, BoundKernel):
 
         Call it as ``solver.many(omega0, t_end, threads=1, out=None)``. `omega0` (rad/s) has shape
         (n, 3), `t_end` (s) is a number or has shape (n,). A call returns omega, shape (n, 3), which
-        is `out` if that is given, and the statuses, int8, as in `Ensemble`. Each result depends
-        only on its own initial omega and time, not on the number of rows, their order or the
-        threads. It meets the same tolerance as a call of the solver, but its rounding errors
-        differ, even for a single row. Any other argument is refused with an InputError.
+        is `out` if that is given, and an array of statuses, int8, with the values that `Ensemble`
+        documents. Each result depends only on its own initial omega and time, not on the number of
+        rows, their order or the threads. A result meets the same tolerance as a call of the solver,
+        but its rounding errors differ, even for a single row. Any other argument is refused with an
+        InputError.
         """
         from pyharness._many import ManyStarts
 
@@ -127,7 +132,10 @@ class Solver(LastCall, BoundKernel):
 
     @property
     def method(self) -> str:
-        """Return the method of this thread's last call if the kernel chose it, else the plan's."""
+        """Return the name of the method that solved this thread's last call.
+
+        It is the plan's method, unless the kernel chose another method.
+        """
         steps = self._counted()
         if not steps:
             return self.plan.method
@@ -155,7 +163,11 @@ class Solver(LastCall, BoundKernel):
 
 
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
-    """Convert arguments that the C code can't read directly; raise InputError for invalid ones."""
+    """Convert arguments of a call that the C function can't read directly.
+
+    Return the three numbers of `omega0` (rad/s) and the time (s). Raise InputError for an argument
+    that is not allowed, such as an `out` into which three floats can't be written.
+    """
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     if out is not None and (found := no_buffer(out)):
         raise InputError(f"out: {found}; allowed: a writable array of three float64 side by side")
@@ -163,7 +175,7 @@ def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
 
 
 def no_buffer(out: object) -> str:
-    """Return the reason why `out` can't be written to, or an empty text if it can."""
+    """Return a description of `out` if it can't receive three floats, else an empty text."""
     if not isinstance(out, np.ndarray):
         try:
             return reprlib.repr(out)
@@ -178,7 +190,7 @@ def no_buffer(out: object) -> str:
 
 
 def _code(chosen: Plan) -> int:
-    """Return the kernel's code of the method that the plan chose."""
+    """Return the integer that the kernel uses for the method of the plan `chosen`."""
     if chosen.closed_form == "sphere":
         return CODES["sphere"]
     if chosen.method == "closed-form":

@@ -16,13 +16,14 @@ from pyharness.model.trajectory import Trajectory
 def taylor(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Solve a scene by Taylor series, each of which counts as one evaluation.
+    """Return the trajectory of a scene at `times` (s) by Taylor series.
 
-    The attitude is computed too if the scene has one. `steps` counts the steps of the last
-    integration, `evaluations` the steps of all integrations: another one follows if the error of
-    the first is too large. Under a torque about the axes of space there are at least two
-    integrations, the later ones with a finer local tolerance. Their difference then gives the
-    error, and the growth is unknown.
+    The attitude is computed too if the scene has one. Another integration follows if the error of
+    the first is too large. In the trajectory, `steps` counts the steps of the last integration, and
+    `evaluations` counts the steps of all integrations, since each step takes one Taylor series.
+    Under a torque about the axes of space there are at least two integrations, the later ones with
+    a smaller local tolerance. The difference between integrations then gives the error, and the
+    error amplification (`growth`) is unknown. `effort` is a factor on the work limit.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     # The attitude at time 0, and then a column for each time.

@@ -1,6 +1,7 @@
 """Checks of arrays for many bodies: shape, type, values and number of rows.
 
-All functions that take such arrays share these error messages.
+All functions that take arrays for many bodies call these checks, and therefore have the same error
+messages.
 """
 
 from collections.abc import Callable, Mapping
@@ -15,7 +16,7 @@ from pyharness.model.values import integer, number
 
 _MOST_THREADS = 1024
 _REAL = "iuf"
-# An elementwise test, and the allowed values in words.
+# A test that is applied to each number of an array, and the allowed numbers in words.
 Rule = tuple[Callable[[Array], NDArray[np.bool_]], str]
 
 ABOVE_ZERO: Rule = (
@@ -26,11 +27,11 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 
 
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
-    """Return an array with one row of `shape` per body, or with one row that all bodies share.
+    """Return user values as a float array with one row per body, or one row that all bodies share.
 
-    A letter in `shape` means any length. Raise InputError, prefixed with `where`, for another shape
-    or an entry that is not a real number. With a `rule`, raise it for the first number that breaks
-    the rule.
+    `shape` is the shape of one row, in which a letter means any length. If `values` is a single
+    row, the result has one row. Raise InputError, with `where` in front of the message, for another
+    shape, for an element that is not a real number, and for a number that fails the test of `rule`.
     """
     found = numbers_of(where, values)
     own = found.shape[-len(shape) :] if shape else ()
@@ -45,8 +46,9 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
 
 
 def numbers_of(where: str, values: object) -> Array:
-    """Return a float64 array of any shape; raise InputError if an entry is not a real number.
+    """Return user values as a float64 array, of whatever shape the values have.
 
+    Raise InputError, with `where` in front of the message, if an element is not a real number.
     Fractions, decimals, and integers beyond 64 bits are accepted as real numbers.
     """
     try:
@@ -68,15 +70,20 @@ def numbers_of(where: str, values: object) -> Array:
 
 
 def waves_of(where: str, values: object) -> Array:
-    """Return torque waves, shape (n, k, 4): for each wave three amplitudes and a frequency."""
+    """Return user values as an array of k torque waves for each of n bodies, shape (n, k, 4).
+
+    A wave consists of three amplitudes and a frequency (rad/s). n is 1 if all bodies share the
+    waves. `where` is put in front of the message of an InputError.
+    """
     found = numbers_of(where, values)
     return rows_of(where, found, "k", 4) if found.size else np.empty((1, 0, 4))
 
 
 def count_bodies(rows: Mapping[str, Array]) -> int:
-    """Return the number of bodies; raise InputError for an array with another number of rows.
+    """Return the number of bodies of several arrays, given by name, with one row per body each.
 
-    An array may also have a single row, which all bodies share.
+    An array may also have a single row, which all bodies share. Raise InputError if the arrays
+    disagree about the number of bodies.
     """
     counts = {len(each) for each in rows.values()}
     n = 0 if 0 in counts else max(counts, default=1)
@@ -87,7 +94,7 @@ def count_bodies(rows: Mapping[str, Array]) -> int:
 
 
 def check_rows(name: str, array: Array, n: int) -> None:
-    """Raise InputError if an array has neither one row nor one row per body."""
+    """Raise InputError unless the array called `name` has one row, or `n` rows, one per body."""
     if len(array) not in (1, n):
         raise InputError(
             f"{name}: {len(array)} rows; allowed: 1, or as many as there are bodies, {n}"
@@ -95,14 +102,15 @@ def check_rows(name: str, array: Array, n: int) -> None:
 
 
 def row_of(array: Array, i: int) -> Any:
-    """Return the row of body `i`, or the single row that all bodies share."""
+    """Return the row of `array` for body `i` (from 0), or the single row that all bodies share."""
     return array[0 if len(array) == 1 else i]
 
 
 def only_one(given: Mapping[str, object]) -> str:
     """Return the name of the one argument that is not None, or an empty string if all are None.
 
-    Raise InputError if several are not None.
+    `given` maps the names of alternative arguments to their values. Raise InputError if several
+    values are not None.
     """
     names = [name for name, value in given.items() if value is not None]
     if len(names) > 1:
@@ -111,7 +119,7 @@ def only_one(given: Mapping[str, object]) -> str:
 
 
 def threads_of(threads: object) -> int:
-    """Return a number of threads; raise InputError unless it is an integer from 1 to 1024."""
+    """Return the argument `threads`; raise InputError unless it is an integer from 1 to 1024."""
     found = integer("threads", threads)
     if not 1 <= found <= _MOST_THREADS:
         raise InputError(f"threads is {found}; allowed: 1 to {_MOST_THREADS}")
@@ -119,7 +127,11 @@ def threads_of(threads: object) -> int:
 
 
 def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
-    """Return `array` if a kernel can write to it; raise InputError if not."""
+    """Return the user's output array unchanged if a kernel can write its results to it.
+
+    The array must have `shape` and the NumPy type character `kind`, and be writable and contiguous.
+    Raise InputError, with `where` in front of the message, for any other value.
+    """
     right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype.char == kind
     if not (right and array.flags.c_contiguous and array.flags.writeable and array.flags.aligned):
         raise InputError(
@@ -129,7 +141,7 @@ def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
 
 
 def spread(rows: Array, n: int) -> Array:
-    """Return a contiguous array with one row for each of n bodies."""
+    """Return a contiguous array with one row for each of n bodies; a single row is repeated."""
     if len(rows) == n:
         return rows
     return np.ascontiguousarray(np.broadcast_to(rows, (n, *rows.shape[1:])))

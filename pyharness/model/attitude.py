@@ -23,9 +23,10 @@ _ROUNDED = 2.0**-51  # deviation of a norm from 1 that normalisation can not red
 
 
 def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
-    """Return the normalised quaternion and its original norm.
+    """Return four numbers as a normalised quaternion, and the norm that they had before.
 
-    Raise InputError, prefixed with `where`, unless `values` are four finite numbers, not all 0.
+    Raise InputError, with `where` in front of the message, unless `values` are four finite numbers,
+    not all 0.
     """
     allowed = "allowed: four finite numbers, scalar first, not all 0"
     given = [finite(where, each) for each in number_list(where, values, allowed)]
@@ -44,10 +45,11 @@ def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
 
 
 def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
-    """Return the attitude after successive rotations (degrees) about the body axes of `sequence`.
+    """Return the attitude that three successive rotations about body axes lead to.
 
-    Raise InputError, prefixed with `where`, unless `angles_deg` are three finite numbers and
-    `sequence` is one of `SEQUENCES`.
+    `angles_deg` are the angles in degrees. `sequence` names the axes, as in "3-1-3". Raise
+    InputError, with `where` in front of the message, unless `angles_deg` are three finite numbers
+    and `sequence` is one of `SEQUENCES`.
     """
     if not isinstance(sequence, str) or sequence not in SEQUENCES:
         name = sequence if isinstance(sequence, str) else kind_of(sequence)
@@ -62,7 +64,7 @@ def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
 
 
 def product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Return Hamilton's product of two quaternions."""
+    """Return Hamilton's product p q of two quaternions, scalar first."""
     a, b, c, d = p
     e, f, g, h = q
     return (
@@ -74,11 +76,13 @@ def product(p: Quaternion, q: Quaternion) -> Quaternion:
 
 
 def angles(attitude: Array, sequence: str) -> Array:
-    """Return the angles (degrees) of attitudes about the axes of a sequence, shape (n, 3).
+    """Return n attitudes as angles (degrees) of three successive rotations, shape (n, 3).
 
-    The shape of `attitude` is (n, 4). The angles are computed by arc tangents of half angles, which
-    keep their digits at the poles. At a pole only the sum or the difference of the first and last
-    angle is determined; the last angle is then set to 0.
+    `attitude` is an array of n quaternions, shape (n, 4). `sequence` names the body axes of the
+    rotations, and is one of `SEQUENCES`. The angles are computed by arc tangents of half angles,
+    which keep their digits at the poles. A pole is an attitude at which the axes of the first and
+    the last rotation are parallel in space. There only the sum or the difference of the first and
+    last angle is determined; the last angle is then set to 0.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":
@@ -100,7 +104,10 @@ def angles(attitude: Array, sequence: str) -> Array:
 
 
 def matrices(attitude: Array) -> Array:
-    """Return the rotation matrices, shape (n, 3, 3), that take vectors from body to space."""
+    """Return n attitudes, quaternions of shape (n, 4), as rotation matrices, shape (n, 3, 3).
+
+    A matrix transforms a vector from the body axes to the axes of space.
+    """
     w, x, y, z = attitude.T
     rows = [
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
@@ -111,7 +118,11 @@ def matrices(attitude: Array) -> Array:
 
 
 def angle_between(attitude: Array, other: Array) -> Array:
-    """Return the angles (rad) between attitudes, shape (n,); quaternion signs do not matter."""
+    """Return the angle (rad) of the rotation between each pair of attitudes, shape (n,).
+
+    `attitude` and `other` are arrays of quaternions, shape (n, 4). Opposite quaternions are the
+    same attitude.
+    """
     a, b, c, d = attitude.T
     e, f, g, h = other.T
     vector = np.array([

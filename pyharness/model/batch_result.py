@@ -1,4 +1,4 @@
-"""The result of a batch of bodies, common to solvers and programs."""
+"""The result type of a batch of bodies, which solvers and compiled programs share."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ class BatchResult:
     omega : ndarray, shape (n, ..., 3)
         Angular velocity about the body axes, rad/s; NaN for a body without result.
     status : ndarray of int8, shape (n,)
-        A code of `pyharness.model.codes.Statuses` for each body.
+        How the computation of each body ended, as an integer of `pyharness.model.codes.Statuses`.
     """
 
     omega: Array
@@ -31,10 +31,10 @@ class BatchResult:
 
     @property
     def ended(self) -> NDArray[np.str_]:
-        """The status of each body in words: complete, sensitive, stopped, overflow, refused, ..."""
+        """The status of each body as text, shape (n,), as in complete, stopped or overflow."""
         return np.array(ENDS)[self.status]
 
     @property
     def has_result(self) -> NDArray[np.bool_]:
-        """Whether each body has all of its results, as a boolean array."""
+        """Whether each body has all of its results: boolean array, shape (n,)."""
         return np.isin(self.status, _RESULTS)

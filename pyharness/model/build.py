@@ -18,9 +18,10 @@ OPTIONAL = {
 
 @dataclass(frozen=True)
 class Build:
-    """Versions, compiler and flags of an installation.
+    """The versions, the Fortran compiler and the compiler flags of one installation.
 
-    `compiler`, `flags` and `extension` are None if the extension is not built.
+    `extension` is the path of the compiled extension. It is None, like `compiler` and `flags`, if
+    the extension is not built. `numpy` and `scipy` are None if the package is missing.
     """
 
     version: str
@@ -57,7 +58,11 @@ def build() -> Build:
 
 
 def machine(packages: Iterable[str]) -> dict[str, str]:
-    """Return processor, number of cores, and versions of those `packages` that are installed."""
+    """Return a description of this machine: processor, number of cores, and installed packages.
+
+    The result maps "processor", "cores", and the name of each installed package among `packages` to
+    text; for a package the text is its version.
+    """
     found = {"processor": _processor(), "cores": str(os.cpu_count())}
     return found | {name: text for name in packages if (text := _version(name)) is not None}
 
@@ -85,7 +90,7 @@ def _version(package: str) -> str | None:
 
 
 def doctor_report(build: Build) -> Report:
-    """Return the report of the verb `doctor`: the build, and the optional packages missing."""
+    """Return the report of the verb `doctor`: the build, and the state of each optional package."""
     rows = {
         "pyharness": build.version,
         "extension": build.extension or "not built: 'make compare', or 'pip install .'",

@@ -1,11 +1,12 @@
-"""Codes and constants that Python and the Fortran kernels share.
+"""Integers and other constants that Python and the Fortran kernels share.
 
-The script fortran/make_codes.py writes each class as a Fortran module.
+The script fortran/make_codes.py writes each class as a Fortran module, so that both languages have
+the same values.
 """
 
 
 class Statuses:
-    """Codes for how a computation ended, counted from 0."""
+    """The integers by which a kernel reports how a computation ended, counted from 0."""
 
     COMPLETE = 0  # all rows are results
     STOPPED = 1  # the Lipschitz test ended the run
@@ -13,11 +14,14 @@ class Statuses:
     REFUSED = 3  # the method does not apply to these coefficients
     GAVE_UP = 4  # work limit exceeded, or no digit of the phase is left
     INTERRUPTED = 5  # by the user; a Python exception is set
-    SENSITIVE = 6  # all rows are results, but rounding times growth exceeds the tolerance
+    SENSITIVE = 6  # all rows are results, but the amplified rounding error exceeds the tolerance
 
 
 class Methods:
-    """Codes of the methods in the kernel of a prepared solver."""
+    """The integers that select a method in the kernel of a prepared solver.
+
+    A prepared solver solves one scene by one method, for many initial conditions.
+    """
 
     CLOSED_FORM = 1  # for scenes without torque
     SPHERE = 2
@@ -28,12 +32,12 @@ class Methods:
     QUICK = 7  # Runge-Kutta, for results of few digits
     QUICK_OR_TAYLOR = 8  # whichever needs fewer operations
     CLOSED_FORM_OR_TAYLOR = 9  # the series if the closed form ends as REFUSED
-    GAUSS = 10  # Gauss collocation; the code is GAUSS plus the number of stages, 1 to 8
+    GAUSS = 10  # Gauss collocation; GAUSS plus the number of stages, 1 to 8
     SPACE_TORQUE = 19  # the series for a torque about the axes of space, with attitude
 
 
 class Places:
-    """Offsets of the entries in the packed array of a prepared solver, from 0."""
+    """Indices, from 0, of the quantities in the array that a prepared solver gives its kernel."""
 
     METHOD = 0
     TOLERANCE = 1  # relative, of the methods that take one
@@ -51,21 +55,21 @@ class Places:
 
 
 class Series:
-    """Limits of order and local tolerance in the Taylor series."""
+    """Limits of the order and of the local tolerance of the Taylor method."""
 
     LEAST_ORDER = 12
     MOST_ORDER = 24
-    LEAST_LOCAL_TOLERANCE = 1e-19  # of omega: last terms of a step, well below rounding
-    SLACK = 16.0  # a step is shortened if its last terms exceed this many local tolerances
+    LEAST_LOCAL_TOLERANCE = 1e-19  # relative to omega: size of the last Taylor terms of a step
+    SLACK = 16.0  # a step is shortened if its last Taylor terms exceed this many local tolerances
 
 
 class Waves:
-    """Limits of our sine in binary128 (`wide_functions.f90`)."""
+    """The limit of our sine function in binary128 (`wide_functions.f90`)."""
 
     ANGLE_BITS = 60  # an angle must be below 2 to this power, rad; else its sine is NaN
 
 
 class Blocks:
-    """Number of bodies that the compiled programs of the appendix process side by side."""
+    """The number of bodies that the compiled programs of the appendix process in parallel lanes."""
 
-    LANE_COUNT = 32  # enough registers that some can proceed while others wait
+    LANE_COUNT = 32  # enough that some registers can proceed while others wait

@@ -1,9 +1,10 @@
 """Diagonalisation of symmetric 3 x 3 matrices in integers, with high relative accuracy.
 
 A method in binary64 computes every eigenvalue with an error of some 1e-16 of the largest one. A
-small eigenvalue then has few correct digits or none. The entries of a matrix are binary64 numbers,
-and therefore integer multiples of one unit. This gives a lower bound of the smallest eigenvalue,
-which determines how many more bits the arithmetic uses.
+small eigenvalue then has few correct digits or none. The elements of a matrix are binary64 numbers,
+and therefore integer multiples of one unit. Hence the determinant of a
+regular matrix has a lower bound, and so has its smallest eigenvalue. The bound determines how many
+bits the integers need.
 """
 
 import math
@@ -24,7 +25,7 @@ _MOST_ROTATIONS = 500
 
 @dataclass(frozen=True)
 class Diagonal:
-    """The eigenvalues of a matrix and its orthonormal eigenvectors.
+    """The eigenvalues of a symmetric 3 x 3 matrix and its orthonormal eigenvectors.
 
     Attributes
     ----------
@@ -32,7 +33,7 @@ class Diagonal:
         The eigenvalues, each with a relative error of at most 2**-100. An eigenvalue that can not
         be told from 0, because of rounding, is 0: the matrix is singular.
     vectors : tuple of three tuples of three Fractions
-        `vectors[k]` belongs to `values[k]`.
+        `vectors[k]` is the eigenvector of the eigenvalue `values[k]`.
     """
 
     values: Row
@@ -40,9 +41,9 @@ class Diagonal:
 
 
 def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
-    """Return the eigenvalues and eigenvectors of a symmetric matrix of finite numbers.
+    """Return the eigenvalues and eigenvectors of a symmetric 3 x 3 matrix of finite floats.
 
-    The method is Jacobi's. A diagonal matrix is returned unchanged, its entries in the same order.
+    The method is Jacobi's. The eigenvalues of a diagonal matrix are its diagonal, in its order.
     """
     exponent = min((_last_bit(x) for row in matrix for x in row if x), default=0)
     whole = [[_in_unit(x, exponent) for x in row] for row in matrix]
@@ -67,7 +68,11 @@ def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
 
 
 def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: int) -> None:
-    """Rotate so that entry p, q vanishes, by the smaller of the two angles (Rutishauser 1966)."""
+    """Rotate the matrix `a` and its vectors in place, so that element p, q of the matrix vanishes.
+
+    The rotation is by the smaller of the two possible angles (Rutishauser 1966). The integers in
+    `vectors` are components in units of 2**-bits.
+    """
     r = 3 - p - q
     gap, twice = a[q][q] - a[p][p], 2 * a[p][q]
     root = math.isqrt(gap * gap + twice * twice)
@@ -88,7 +93,7 @@ def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: 
 
 
 def _last_bit(x: float) -> int:
-    """Return the exponent of the lowest nonzero bit of a number that is not 0."""
+    """Return the exponent e of the lowest nonzero bit, 2**e, of a finite number that is not 0."""
     numerator, denominator = x.as_integer_ratio()
     if denominator > 1:
         return 1 - denominator.bit_length()

@@ -1,6 +1,6 @@
-"""Name and version of the distribution; its name differs from the name of the import."""
+"""Name and version of the installable distribution, which is not called `pyharness`."""
 
-# The package index has another package with the name of our import.
+# On the package index, the name `pyharness` belongs to another package.
 DISTRIBUTION = "rigid-body-harness"
 
 
@@ -12,5 +12,5 @@ def version() -> str:
 
 
 def install_command(extra: str) -> str:
-    """Return the pip command that installs the packages of an optional extra."""
+    """Return the pip command that installs the optional packages of `extra`, as in ``plots``."""
     return f"pip install '{DISTRIBUTION}[{extra}]'"

@@ -1,7 +1,7 @@
 """Work limits, and the option `effort` that raises them.
 
-A limit counts work, for example steps times waves, and is chosen so that a method stops after some
-ten seconds. The option `effort` is a factor on all limits.
+A limit counts work, for example steps times torque waves, and is chosen so that a method stops
+after some ten seconds. The option `effort` is a factor on all limits.
 """
 
 import math
@@ -31,16 +31,23 @@ _MOST_STEPS_OF_ALL = 1e9
 
 
 class Integrator(Protocol):
-    """A function that integrates a scene and returns rows at times that move away from 0."""
+    """The type of a function that integrates a scene and returns a trajectory at requested times.
+
+    The times (s) are on one side of 0, in order away from 0. `tolerance` is relative to the largest
+    |omega|. `effort` is the factor on the work limit.
+    """
 
     def __call__(
         self, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, /
     ) -> Trajectory:
-        """Return the trajectory of `scene` at `times`, or raise InputError."""
+        """Return the trajectory of `scene` at `times` (s), or raise InputError."""
 
 
 def checked_effort(effort: Number) -> float:
-    """Return `effort` as a float; raise InputError unless it is a finite number above 0."""
+    """Return the factor on the work limits as a float.
+
+    Raise InputError unless `effort` is a finite number above 0.
+    """
     value = number("effort", effort)
     if not 0.0 < value < math.inf:
         raise InputError(f"effort: {value:g}; allowed: a finite number above 0")
@@ -50,15 +57,20 @@ def checked_effort(effort: Number) -> float:
 def advice(instead: str, effort: float, needed: float | None = None) -> str:
     """Return the last part of a message about an exceeded work limit: what the user can do.
 
-    `instead` is the remedy that needs no more work. `effort` is the present factor on the limit,
-    and `needed` the estimated factor that the work takes, if there is an estimate.
+    `instead` is a remedy that keeps within the limit, as in "take fewer steps". `effort` is the
+    present factor on the limit, and `needed` is an estimate of the factor that the computation
+    takes, or None if there is no estimate.
     """
     factor = suggested(effort, needed)
     return f"{instead}, or allow more work: --effort {factor} (effort={factor} in Python)"
 
 
 def suggested(effort: float, needed: float | None = None) -> str:
-    """Return an effort that should suffice, rounded up to two digits."""
+    """Return, as text, a factor on the work limit that should suffice, rounded up to two digits.
+
+    `effort` is the present factor, which did not suffice. `needed` is an estimate of the factor
+    that the computation takes; without one, the result is ten times `effort`.
+    """
     factor = max(_SLACK * needed, effort) if needed else _UNFORESEEN * effort
     factor = min(1e300, factor)
     digit = 10.0 ** (math.floor(math.log10(factor)) - 1)
@@ -72,7 +84,11 @@ def waves(scene: Scene) -> int:
 
 
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
-    """Raise InputError if the run of a program exceeds its work limit."""
+    """Raise InputError if the run of a program on one scene would exceed its work limit.
+
+    `program` is a name for the message. `implementation` selects the limit, as in "fortran" or
+    "binary128". `effort` is the factor on the limit.
+    """
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)
     most, a_wave = _LIMITS[implementation]
@@ -86,7 +102,11 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
 
 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
-    """Raise InputError if the run of a program on many bodies exceeds the work limit."""
+    """Raise InputError if the run of a compiled program on many bodies would exceed the work limit.
+
+    `program` is a name for the message, `bodies` the number of bodies, and `effort` the factor on
+    the limit.
+    """
     cost = 1.0 + _LIMITS["fortran"][1] * waves(scene)
     needed = bodies * scene.steps * cost / _MOST_STEPS_OF_ALL
     factor = checked_effort(effort)

@@ -2,14 +2,14 @@
 
 from collections.abc import Iterable
 
-# The most characters of a message. A longer one quotes long input, and is shortened.
+# The most characters of a message. A longer message quotes long input, and is shortened.
 _LONGEST = 900
 
 
 class InputError(ValueError):
     """An error in the user's input; exit status 2 on the command line.
 
-    The message is one line of printable characters, whatever it quotes.
+    The message is one line of printable characters, even if it quotes other text.
 
     Parameters
     ----------
@@ -36,10 +36,13 @@ class InputError(ValueError):
 
 
 class TimedError(InputError):
-    """An InputError whose message contains a time (s), in the time unit of the solved scene."""
+    """An InputError whose message contains a time (s), as when a method reached its work limit.
+
+    The time is in the unit of the scene that was solved, which may have rescaled time.
+    """
 
     def __init__(self, message: str, time: float) -> None:
-        """Insert the time in place of ``{time}`` in the message."""
+        """Store the message, with `time` (s) in place of the text ``{time}``."""
         super().__init__(message.replace("{time}", f"{time:.6g}"))
         self.time = time
         self._message = message
@@ -49,12 +52,15 @@ class TimedError(InputError):
         return type(self), (self._message, self.time)
 
     def slower(self, factor: float) -> "TimedError":
-        """Return the error with its time multiplied by `factor`, for a scene with rescaled time."""
+        """Return the same error with its time multiplied by `factor`.
+
+        The factor converts from the rescaled time of the solved scene to the user's time.
+        """
         return TimedError(self._message, self.time * factor)
 
 
 class NotBuiltError(RuntimeError):
-    """The compiled extension is missing; exit status 3 on the command line.
+    """The error that the compiled extension is missing; exit status 3 on the command line.
 
     Examples
     --------
@@ -69,7 +75,7 @@ class NotBuiltError(RuntimeError):
 
 
 def printable(text: str, kept: str = "") -> str:
-    r"""Return a text with control and other unprintable characters as escape sequences.
+    r"""Return `text` with its control and other unprintable characters as escape sequences.
 
     The characters in `kept`, for example ``"\n\t"``, stay as they are.
     """
@@ -81,7 +87,10 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def kind_of(value: object) -> str:
-    """Return the kind of a value in words, alike for values from TOML and from Python."""
+    """Return the kind of a value in words, as in "a list", for an error message.
+
+    A value from a TOML file and the corresponding Python or NumPy value have the same kind.
+    """
     kinds = {
         "text": (str, bytes, bytearray), "true or false": (bool,), "a whole number": (int,),
         "a number": (float,), "a complex number": (complex,), "a list": (list, tuple),
@@ -90,7 +99,7 @@ def kind_of(value: object) -> str:
     for name, types in kinds.items():
         if isinstance(value, types):
             return name
-    # NumPy is not imported for this. An array counts as a list, whose entries have kinds.
+    # NumPy is not imported for this. An array counts as a list.
     dtype_kind = getattr(getattr(value, "dtype", None), "kind", None)
     if isinstance(dtype_kind, str):
         if getattr(value, "shape", ()) != ():
@@ -102,10 +111,10 @@ def kind_of(value: object) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return the error for a name that is not allowed, with the closest allowed name.
+    """Return the InputError for a name that is not allowed, which suggests the closest allowed one.
 
-    `what` is the thing that the name should denote, as in "case". `where` is the place of the name,
-    as in "--fix".
+    `what` is the kind of thing that `name` should denote, as in "case". `where` is put in front of
+    the message, and is the option or key with the name, as in "--fix".
     """
     import difflib
 

@@ -1,4 +1,4 @@
-"""The compiled extension, and the status codes that it shares with Python."""
+"""The compiled extension, and the status numbers that it shares with Python."""
 
 from types import ModuleType
 from typing import Any
@@ -18,7 +18,7 @@ ENDS = tuple(name.lower().replace("_", " ") for name in vars(Statuses) if name.i
 
 
 def extension() -> ModuleType:
-    """Return the compiled extension; raise NotBuiltError if it is missing."""
+    """Return the compiled extension, a module; raise NotBuiltError if it is missing."""
     try:
         from pyharness import _kernels
     except ImportError as error:
@@ -31,7 +31,11 @@ def extension() -> ModuleType:
 
 
 def columns(waves: tuple[Wave, ...], kind: type = float) -> NDArray[Any]:
-    """Return amplitudes and frequencies of waves in the form of the kernels, shape (4, n)."""
+    """Return n torque waves as an array for the kernels, shape (4, n), in Fortran order.
+
+    A column consists of the three amplitudes of a wave and its frequency (rad/s). `kind` is the
+    type of the numbers.
+    """
     columns: NDArray[Any] = np.empty((4, len(waves)), dtype=kind, order="F")
     for index, (amplitude, frequency) in enumerate(waves):
         columns[:3, index] = amplitude

@@ -1,4 +1,7 @@
-"""Facts from the TOML files in `pyharness/data`; each file is read once and names its source."""
+"""Facts about the thesis from the TOML files in `pyharness/data`.
+
+Each file is read once, and names the source of its facts.
+"""
 
 import tomllib
 from functools import cache
@@ -17,9 +20,10 @@ def facts(name: str) -> dict[str, Any]:
 
 
 def shipped(name: str) -> Path:
-    """Return a project folder that is no package: ``docs``, ``fortran/original`` or ``web``.
+    """Return the path of a project folder without Python code, as in ``fortran/original``.
 
-    An installed package contains all of these but ``docs``. A checkout has them beside the package.
+    `name` is ``docs``, ``web`` or a folder in ``fortran``. An installed package contains all of
+    these but ``docs``. A checkout has them beside the package.
     """
     installed = _FOLDER / name
     return installed if installed.exists() else _PACKAGE.parent / name

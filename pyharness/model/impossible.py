@@ -11,7 +11,7 @@ _BETWEEN = ("copy", "dataclasses", "pyharness.model.scene", "pyharness.model.sce
 class ImpossibleBodyWarning(UserWarning):
     """The warning that the moments of a body break the triangle inequality.
 
-    The largest moment exceeds the sum of the others. The results are computed anyway.
+    The largest moment exceeds the sum of the other two. The results are computed anyway.
 
     Examples
     --------
@@ -31,9 +31,10 @@ class _Body(Protocol):
 
 
 def warn_of_impossible(body: _Body) -> None:
-    """Warn if user code creates an impossible body, and attribute the warning to its line.
+    """Warn if user code creates a body whose moments break the triangle inequality.
 
-    Scenes that the package itself creates cause no warning.
+    The warning names the line of the user's code. Scenes that the package itself creates cause no
+    warning.
     """
     frame, level = sys._getframe(), 1
     while frame.f_back is not None and frame.f_globals.get("__name__") in _BETWEEN:

@@ -1,4 +1,4 @@
-"""Principal moments and axes of full inertia matrices."""
+"""Principal moments and principal axes of full inertia matrices."""
 
 import math
 from dataclasses import dataclass
@@ -15,15 +15,15 @@ from pyharness.model.values import Triple, number_list, three
 
 Exact = tuple[Fraction, Fraction, Fraction]
 
-_ALIKE = 1e-12  # of the largest entry: allowed difference of two entries that should be equal
-# Of the largest moment: the most by which rounding of the matrix may change any other moment.
+_ALIKE = 1e-12  # allowed difference of two elements that should be equal, relative to the largest
+# The most by which rounding of the matrix may change a moment, relative to the largest moment.
 _ROUNDED = Fraction(1, 1 << 50)
 _KEPT = 256  # number of matrices whose principal frames are cached
 
 
 @dataclass(frozen=True, eq=False)
 class PrincipalFrame:
-    """The principal moments of a body and the corresponding axes.
+    """The principal moments of one body and the principal axes that they belong to.
 
     Attributes
     ----------
@@ -32,9 +32,9 @@ class PrincipalFrame:
     axes : ndarray, shape (3, 3)
         The axes in columns, rounded to nearest. They form a right-handed frame, the one nearest to
         the body's own axes.
-    exact_moments, exact_axes
-        Moments and axes to some 38 digits. Each axis is a tuple of its components about the body's
-        own axes.
+    exact_moments, exact_axes : tuples of Fractions
+        Moments (kg m2) and axes to some 38 digits. Each axis is a tuple of its components about
+        the body's own axes.
     """
 
     moments: Triple
@@ -53,7 +53,11 @@ class PrincipalFrame:
 
 
 def checked_inertia(where: str, values: object) -> Matrix:
-    """Return a symmetric matrix with moments above 0; raise InputError for anything else."""
+    """Return a user's inertia matrix (kg m2), made exactly symmetric.
+
+    Raise InputError, with `where` in front of the message, unless `values` are three rows of three
+    finite numbers, symmetric up to rounding, with positive principal moments.
+    """
     allowed = "allowed: three rows of three finite numbers, kg m2"
     given = [three(where, row) for row in number_list(where, values, allowed)]
     if len(given) != 3:
@@ -80,10 +84,10 @@ def checked_inertia(where: str, values: object) -> Matrix:
 
 @lru_cache(maxsize=_KEPT)
 def principal_frame(inertia: Matrix) -> PrincipalFrame:
-    """Return the principal moments and axes of a symmetric matrix.
+    """Return the principal moments and axes of a symmetric inertia matrix (kg m2).
 
-    The moments are not sorted. Every moment is accurate to its last digit, however small it is
-    relative to the others.
+    The moments are not sorted, because their axes are in the order of the nearest body axes. Every
+    moment is accurate to its last digit, however small it is relative to the others.
     """
     found = diagonalised(inertia)
     order: list[int] = []
@@ -106,19 +110,20 @@ def principal_frame(inertia: Matrix) -> PrincipalFrame:
 
 
 def principal_axes(inertia: Matrix) -> tuple[Triple, Array]:
-    """Return the principal moments (kg m2) and the axes, as columns of a (3, 3) array.
+    """Return the principal moments (kg m2) of an inertia matrix, and its principal axes.
 
-    The axes form a right-handed frame, the one nearest to the body's own axes.
+    The axes are the columns of a (3, 3) array. They form a right-handed frame, the one nearest to
+    the body's own axes.
     """
     found = principal_frame(inertia)
     return found.moments, found.axes.copy()
 
 
 def breaks_triangle(inertia: Matrix) -> bool:
-    """Return whether the largest principal moment exceeds the sum of the others.
+    """Return whether the largest principal moment exceeds the sum of the other two.
 
-    For a flat body the two are equal. An excess that the rounding of the matrix may have caused
-    does not count.
+    In a flat body the largest moment equals this sum. An excess that the rounding of the matrix may
+    have caused does not count.
     """
     low, middle, high = sorted(principal_frame(inertia).exact_moments)
     return high - low - middle > _ROUNDED * high
@@ -129,13 +134,13 @@ def _turned(axis: Exact) -> Exact:
 
 
 def _determinant(axes: list[Exact]) -> float:
-    """Return the determinant of orthonormal axes, in floats because only its sign is needed."""
+    """Return the determinant of three orthonormal axes, as a float since its sign is enough."""
     (a, b, c), (d, e, f), (g, h, k) = ([float(x) for x in axis] for axis in axes)
     return a * (e * k - f * h) - b * (d * k - f * g) + c * (d * h - e * g)
 
 
 def nearest_float(value: Fraction) -> float:
-    """Return the nearest float, or an infinity for a value beyond the range of floats."""
+    """Return the float nearest to a fraction, or an infinity beyond the range of floats."""
     try:
         return float(value)
     except OverflowError:

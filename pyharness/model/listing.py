@@ -1,4 +1,8 @@
-"""Listings: programs with a selection of their defects, readings and conjectures active."""
+"""Listings: programs of the thesis with a choice of their defects, readings and conjectures.
+
+A defect is a mistake of the printed program, and a reading an interpretation of a doubtful card. A
+conjecture is an assumption about a statement for which no card exists.
+"""
 
 from collections.abc import Iterable, Set
 from dataclasses import dataclass
@@ -14,14 +18,14 @@ _FIELDS = {"defect": "defects", "reading": "readings", "conjecture": "conjecture
 
 @dataclass(frozen=True)
 class Listing:
-    """A program as printed, as corrected, or with any other selection of its defects.
+    """A program of the thesis as printed, as corrected, or with any other choice of its defects.
 
     Attributes
     ----------
     program : {"two-term", "four-term", "runge-kutta"}
         The name of the program.
     defects : frozenset of str
-        The active defects.
+        The active defects, which are mistakes of the printed program that are not corrected.
     readings : frozenset of str
         The active readings. An active reading interprets an original statement in the way that the
         edition does not adopt. A corrected program has no readings, since no reading changes a
@@ -60,7 +64,7 @@ class Listing:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Sort the names by kind, and raise InputError for one that the program does not have."""
+        """Sort the given names by kind; raise InputError for a name that the program lacks."""
         _check_program(self.program)
         given = {field: _names(field, getattr(self, field)) for field in _FIELDS.values()}
         for kind in ("reading", "conjecture"):
@@ -76,7 +80,11 @@ class Listing:
 
     @property
     def label(self) -> str:
-        """The kind of listing: `original`, `corrected` or `custom`."""
+        """The kind of listing, as text: `original`, `corrected` or `custom`.
+
+        It is `corrected` if no name is active, and `original` if the names that `switches` returns
+        are active, with any readings.
+        """
         if not self.active:
             return "corrected"
         return (
@@ -90,21 +98,27 @@ class Listing:
 
     @property
     def flags(self) -> int:
-        """The active names as the bit mask that the Fortran programs read."""
+        """The active names as an integer, the bit mask that the Fortran programs read."""
         return sum(1 << entry["flag"] for entry in flagged() if entry["id"] in self.active)
 
     def has(self, name: str) -> bool:
-        """Return whether the defect, reading or conjecture `name` is active."""
+        """Return whether the defect, reading or conjecture with this name is active."""
         return name in self.active
 
 
 def flagged() -> list[dict[str, Any]]:
-    """Return the entries of the apparatus with a flag: defects, readings and conjectures."""
+    """Return the entries of the apparatus that have a flag, which is a bit of `Listing.flags`.
+
+    They are the defects, readings and conjectures. Each entry is a table of `apparatus.toml`.
+    """
     return [entry for entry in facts("apparatus")["entry"] if "flag" in entry]
 
 
 def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
-    """Return the names of a kind (`defect`, `reading`, `conjecture`) in one program or in all."""
+    """Return the names of all defects, of all readings or of all conjectures.
+
+    `kind` is "defect", "reading" or "conjecture". With `program`, only its names are returned.
+    """
     return tuple(
         entry["id"]
         for entry in flagged()
@@ -113,14 +127,17 @@ def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
 
 
 def switchable(program: str | None = None) -> tuple[str, ...]:
-    """Return the names of every kind that can be corrected or kept, defects first."""
+    """Return the names of all defects, readings and conjectures, which --fix and --keep accept.
+
+    The defects come first. With `program`, only its names are returned.
+    """
     return tuple(name for kind in _FIELDS for name in names_of(kind, program))
 
 
 def switches(program: str) -> tuple[str, ...]:
-    """Return the names active in the original program: its defects and some conjectures.
+    """Return the names that are active in the original program: its defects and some conjectures.
 
-    These are the conjectures that the apparatus marks as `in_original`.
+    A conjecture is active in the original if the apparatus marks it as `in_original`.
     """
     return tuple(
         entry["id"]
@@ -131,12 +148,15 @@ def switches(program: str) -> tuple[str, ...]:
 
 
 def original(program: str, readings: Iterable[str] = ()) -> Listing:
-    """Return the original program, with all its defects and its own conjectures active."""
+    """Return the listing of the original program, with all its defects active.
+
+    Its own conjectures are active too, and so are the names in `readings`.
+    """
     return Listing(program, frozenset(switches(program)), frozenset(readings))
 
 
 def corrected(program: str) -> Listing:
-    """Return the corrected program, which no reading or conjecture changes."""
+    """Return the listing of the corrected program, in which no name is active."""
     return Listing(program, frozenset())
 
 
@@ -158,15 +178,15 @@ def subset(
         The listing to start from. The default is `corrected` if `keep` has names and `fix` has no
         names, else `original`.
     fix, keep : iterable of str
-        The defects, readings and conjectures to correct, and those to keep.
+        The names (defects, readings or conjectures) to correct, and the names to keep active.
     readings : iterable of str
-        The readings to activate, which are not the adopted ones. A corrected statement has its
-        intended form under every reading. If the base is `corrected`, only `keep` therefore
+        The readings to activate; an active reading replaces the adopted one. A corrected statement
+        has its intended form under every reading. If the base is `corrected`, only `keep` therefore
         activates a reading.
     conjectures : iterable of str, optional
-        The assumptions of the original where no card exists, or ``none`` for no assumption. The
-        default is the conjectures of `original`. If the base is `corrected`, only `keep` activates
-        a conjecture.
+        The assumptions to make where no card exists, or ``none`` for no assumption. The default is
+        the conjectures of the listing that `original` returns. If the base is `corrected`, only
+        `keep` activates a conjecture.
 
     Returns
     -------
@@ -217,7 +237,7 @@ def subset(
 
 
 def checked_listing(listing: object) -> Listing:
-    """Return `listing`; raise InputError if it is not a Listing."""
+    """Return the argument `listing`; raise InputError if it is not a Listing."""
     if isinstance(listing, Listing):
         return listing
     raise InputError(f"listing is {kind_of(listing)}; it must be a Listing, as subset makes one")

@@ -1,4 +1,4 @@
-"""Work on many bodies, divided into pieces for threads."""
+"""Computations for many bodies, divided into pieces that threads process."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -19,9 +19,10 @@ def share(
     threads: int,
     given_up: NDArray[np.int32],
 ) -> None:
-    """Call `work` for each piece, in at most `threads` threads.
+    """Call `work` for each piece, a range of bodies, in at most `threads` threads.
 
-    An exception, for example after Ctrl-C, sets `given_up`, which the kernels poll.
+    `given_up` is an array of one number, 0, which the kernels poll. An exception, for example after
+    Ctrl-C, sets it to 1, so that the kernels in all threads end.
     """
     if threads == 1 or len(pieces) < 2:
         # The work is done in this thread and in no other, because Python delivers signals here.
@@ -41,10 +42,11 @@ def share(
 
 
 def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, threads: int) -> None:
-    """Call `work` for pieces of n bodies, in at most `threads` threads.
+    """Divide n bodies into pieces, and call `work` for each piece in at most `threads` threads.
 
-    `work` takes a piece and an array of one number, which is not 0 once the user has interrupted.
-    All pieces have nearly the same size, so that no thread waits long for another.
+    `work` takes a piece, which is a slice of the bodies, and an array of one number. The number
+    becomes 1 after an interrupt by the user, and the work should then end. All pieces have nearly
+    the same size, so that no thread waits long for another.
     """
     if not n:
         return

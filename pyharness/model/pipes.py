@@ -1,4 +1,4 @@
-"""Reading and writing of files that may be pipes or devices, with a limit on waiting."""
+"""Reading and writing of files that may be pipes or devices, with a limit on the waiting time."""
 
 import errno
 import os
@@ -15,19 +15,19 @@ _PIECE = 1 << 20
 def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) -> bytes:
     """Return the content of a file that a user named.
 
-    All such files are read by this function. The file may be a regular file, or a pipe (among them
-    ``/dev/stdin``) with a writer.
+    All files that users name are read by this function. The file may be a regular file, or a pipe
+    (among them ``/dev/stdin``) with a writer.
 
     Parameters
     ----------
     path : path
         Path of the file.
     where : str
-        Start of a message, as in ``scene file 'brick.toml'``.
+        Start of an error message, as in ``scene file 'brick.toml'``.
     limit : int
         Largest size of the content, in bytes.
     what : str
-        Kind of file that is expected, for a message, as in ``a TOML file``.
+        Kind of file that is expected, for an error message, as in ``a TOML file``.
 
     Raises
     ------
@@ -46,7 +46,10 @@ def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) 
 
 
 def _read(path: str, limit: int) -> bytes:
-    """Return a file's content, at most `limit` + 1 bytes; raise OSError if it can't be read."""
+    """Return a file's content, at most `limit` + 1 bytes; raise OSError if it can't be read.
+
+    The additional byte shows that the file is larger than `limit`.
+    """
     # Without O_NONBLOCK, opening a pipe waits for a writer.
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
     try:
@@ -69,12 +72,18 @@ def _read(path: str, limit: int) -> bytes:
 
 
 def _is_quiet(handle: int) -> bool:
-    """Return whether a character device is a terminal or the null device."""
+    """Return whether an open character device, the file descriptor `handle`, may be read.
+
+    A terminal and the null device may be read.
+    """
     return os.isatty(handle) or os.fstat(handle).st_rdev == os.stat(os.devnull).st_rdev
 
 
 def write_waiting(path: str, content: bytes) -> None:
-    """Write to a device, or to a pipe once it has a reader; raise OSError if it gets no reader."""
+    """Write `content` to a device, or to a pipe once the pipe has a reader.
+
+    Raise OSError if the pipe has no reader within `PATIENCE` seconds.
+    """
     end = time.monotonic() + PATIENCE
     while True:
         try:

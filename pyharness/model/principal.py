@@ -1,4 +1,4 @@
-"""Transformation of a scene to the principal axes of its body, and of the results back."""
+"""Transformation of a scene to the principal axes of its body, and of its results back."""
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -17,23 +17,26 @@ from pyharness.model.waves import exact_law
 class PrincipalScene(Scene):
     """A scene about principal axes, whose moments are known in double-double precision.
 
-    A, B, C are computed from the moments in that precision. If two moments are nearly equal, their
-    rounding errors in double precision would be a large part of their difference. `moments_low` is
-    the exact moments minus `moments` (kg m2).
+    A, B, C of equations 13-15 are computed from the moments in double-double precision, because
+    rounding errors of nearly equal moments would be a large part of their difference. `moments_low`
+    is the exact moments minus `moments` (kg m2).
     """
 
     moments_low: Triple = (0.0, 0.0, 0.0)
 
     @property
     def exact_moments(self) -> Exact:
-        """The principal moments in double-double precision (kg m2)."""
+        """The principal moments (kg m2), as fractions with double-double precision."""
         pairs = zip(self.moments or (), self.moments_low, strict=True)
         first, second, third = (Fraction(high) + Fraction(low) for high, low in pairs)
         return first, second, third
 
     @cached_property
     def euler_coefficients(self) -> Triple:
-        """The coefficients A, B, C of equations 13-15, without unit, each rounded once."""
+        """The coefficients A, B, C of equations 13-15, without unit.
+
+        Each coefficient is computed exactly from the moments, and then rounded once.
+        """
         i1, i2, i3 = self.exact_moments
         exact = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
         a, b, c = map(nearest_float, exact)
@@ -41,7 +44,7 @@ class PrincipalScene(Scene):
 
 
 def principal(scene: Scene) -> tuple[Scene, Array]:
-    """Return a scene about the principal axes of its body, and these axes.
+    """Return a scene about the principal axes of its body, and the axes themselves.
 
     Parameters
     ----------
@@ -107,7 +110,11 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
 
 
 def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
-    """Return a trajectory about principal axes, transformed back to the body's own axes."""
+    """Return a trajectory about principal axes, transformed back to the body's own axes.
+
+    `found` is the trajectory of the scene that `principal` returns, and `axes` the array of
+    principal axes, shape (3, 3), that `principal` returns with it.
+    """
     attitude = found.attitude
     if attitude is not None:
         w, x, y, z = _quaternion(axes)

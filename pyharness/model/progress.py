@@ -3,8 +3,12 @@
 from collections.abc import Callable
 
 Progress = Callable[[int, int, str], None]
-"""Called with the number of completed parts, the number of all parts, and the current part."""
+"""A function with three arguments: the numbers of completed and of all parts, the current part."""
 
 
 def no_progress(done: int, total: int, what: str) -> None:
-    """Report nothing; the default of every computation."""
+    """Report nothing; this is the default of every computation that can report its progress.
+
+    `done` is the number of completed parts, `total` the number of all parts, and `what` the name of
+    the current part.
+    """

@@ -1,4 +1,4 @@
-"""Records for JSON of a scene, a listing, the end of a run and the installation."""
+"""Dictionaries for JSON output: of a scene, a listing, the end of a run and the installation."""
 
 from dataclasses import asdict
 from typing import Any
@@ -11,7 +11,10 @@ from pyharness.model.trajectory import Trajectory
 
 
 def scene_record(scene: Scene) -> dict[str, Any]:
-    """Return the record of a scene: the form of the scene file, with the number of its case."""
+    """Return a scene as a dictionary for JSON.
+
+    It has the tables and keys of a scene file, and in addition the number of the case in Table 1.
+    """
     body, values = body_of(scene)
     return {
         "name": scene.name,
@@ -38,7 +41,10 @@ def _wave(wave: Wave) -> dict[str, Any]:
 
 
 def listing_record(listing: Listing) -> dict[str, Any]:
-    """Return the record of a listing: its label, active defects, readings and conjectures."""
+    """Return a listing as a dictionary for JSON.
+
+    It has the label of the listing and its active defects, readings and conjectures.
+    """
     return {
         "label": listing.label,
         "defects": sorted(listing.defects),
@@ -48,7 +54,11 @@ def listing_record(listing: Listing) -> dict[str, Any]:
 
 
 def ending_record(trajectory: Trajectory) -> dict[str, Any]:
-    """Return the record of how a run ended: steps, evaluations, stop and ending."""
+    """Return how a run ended, as a dictionary for JSON.
+
+    It has the number of steps, the number of evaluated right-hand sides, the point at which the
+    Lipschitz test stopped the run (or None), and the status, as in "complete".
+    """
     stop = trajectory.stop
     return {
         "steps": trajectory.steps,
@@ -59,10 +69,14 @@ def ending_record(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def estimate_record(trajectory: Trajectory) -> dict[str, float | None]:
-    """Return a method's own estimates of error, growth and digits; null where unknown."""
+    """Return a method's own estimates of its accuracy, as a dictionary for JSON.
+
+    It has the relative error, the error amplification ("growth") and the number of correct decimal
+    digits. A value that is not known is None.
+    """
     return {name: getattr(trajectory, name) for name in ("error", "growth", "digits")}
 
 
 def build_record() -> dict[str, Any]:
-    """Return the record of how this installation was built."""
+    """Return the versions, compiler and flags of this installation, as a dictionary for JSON."""
     return asdict(build())

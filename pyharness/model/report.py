@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 
 
 def exact(value: Any) -> str:
-    """Return a value in full: a float round-trips, and None becomes an empty text."""
+    """Return a value as text in full, for CSV.
+
+    A float has so many digits that it round-trips, and None becomes an empty text.
+    """
     if isinstance(value, float):
         return float.__repr__(value)  # the repr of a NumPy float names its type
     if value is None:
@@ -24,12 +27,12 @@ def exact(value: Any) -> str:
 
 
 def plain(value: Any) -> str:
-    """Return a word or a whole number as text; a dash for None."""
+    """Return a word or a whole number as text; None becomes a dash."""
     return "-" if value is None else str(value)
 
 
 def short(x: float | None) -> str:
-    """Return a number to two digits in a few characters, as in 1.2e-3; a dash for None."""
+    """Return the number x as text with two digits, as in 1.2e-3; None becomes a dash."""
     if x is None:
         return "-"
     if math.isnan(x) or math.isinf(x) or x == 0:
@@ -39,47 +42,53 @@ def short(x: float | None) -> str:
 
 
 def digits(form: str, scale: float = 1.0) -> Callable[[float | None], str]:
-    """Return a function that formats `scale` times a number by `form`, as in ``.3g``.
+    """Return a function that formats `scale` times a number.
 
-    The function returns a dash for None.
+    `form` is the format specification, as in ``.3g``. The function returns a dash for None.
     """
     return lambda x: "-" if x is None else f"{scale * x:{form}}"
 
 
 def counted(number: int, what: str) -> str:
-    """Return a number with its noun, as in 1 step, 2 steps."""
+    """Return a number with the noun `what`, in the plural if needed, as in 1 step, 2 steps."""
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 class Column(NamedTuple):
-    """A column of a table: `head` is for people, `name` for numbers in full."""
+    """A column of a table: its heads, its unit, and the functions that format its values.
+
+    `head` and `write` are used in formatted output, `name` and `full` in CSV.
+    """
 
     head: str
     write: Callable[[Any], str] = plain
     left: bool = False  # words are aligned left, numbers right
-    unit: str = ""  # of the values, which `write` may scale
-    name: str = ""  # `head` if empty
+    unit: str = ""  # of the values in full; `write` may scale them
+    name: str = ""  # head in CSV; if empty, `head`
     full: Callable[[Any], str] = exact
     fit: str = ""  # "wrap" or "cut": treatment of a last column that is too wide
 
 
 def words(heads: str) -> list[Column]:
-    """Return columns of words, which are aligned left, by their heads."""
+    """Return a left-aligned column of words for each head; `heads` are separated by blanks."""
     return [Column(head, left=True) for head in heads.split()]
 
 
 class Table(NamedTuple):
-    """Columns, and rows with a value for each column; `rows` may be an array (rows, columns)."""
+    """A table of a report: its columns, and its rows with a value for each column.
+
+    `rows` may be an array, shape (number of rows, number of columns).
+    """
 
     columns: Sequence[Column]
     rows: "Sequence[Sequence[Any]] | Array"
 
     def written(self) -> list[list[str]]:
-        """Return the heads and all cells, formatted for people."""
+        """Return the heads and all rows as text, with formatted numbers."""
         return self._cells([(each.head, each.write) for each in self.columns])
 
     def in_full(self) -> list[list[str]]:
-        """Return the heads and all cells, with numbers in full."""
+        """Return the heads and all rows as text, with numbers in full, for CSV."""
         return self._cells([(each.name or each.head, each.full) for each in self.columns])
 
     def _cells(self, columns: list[tuple[str, Callable[[Any], str]]]) -> list[list[str]]:
@@ -89,18 +98,18 @@ class Table(NamedTuple):
 
 
 def numbers(names: str, rows: Sequence[Sequence[Any]]) -> Table:
-    """Return a table for CSV only, with columns of these names."""
+    """Return a table for CSV only; `names` are its heads, separated by blanks."""
     return Table([Column(name) for name in names.split()], rows)
 
 
 class Line(str):
-    """A line that is not wrapped, however long it is."""
+    """A line of a report that is not wrapped, however long it is."""
 
     __slots__ = ()
 
 
 class Field(NamedTuple):
-    """A paragraph that follows its label on the same line."""
+    """A paragraph of a report, printed after its label on the same line."""
 
     label: str
     text: str
@@ -111,10 +120,10 @@ Section = Sequence[str | Field | Table]
 
 
 class Picture:
-    """A figure, the table of its numbers, and the paragraphs of its title."""
+    """A picture: a matplotlib figure, the table of its numbers, and the paragraphs of its title."""
 
     def __init__(self, figure: "Figure", numbers: Table, title: Sequence[str] = ()) -> None:
-        """Store the figure, its numbers and its title."""
+        """Store the figure, the table of its numbers and its title."""
         self.figure, self.numbers, self.title = figure, numbers, title
 
 

@@ -1,4 +1,4 @@
-"""Scenes: body, torque law, initial conditions, step size and steps, each checked once."""
+"""Scenes: a body, a torque law, initial conditions and steps; every value is checked once."""
 
 import itertools
 import math
@@ -32,7 +32,8 @@ Wave = tuple[Triple, float]  # amplitude per axis, frequency in rad/s
 # Accepted forms of the waves of a law: pairs of three amplitudes and a frequency.
 Waves = Iterable[tuple[Numbers, Number]]
 
-# The size of a result row in binary64 with IER, once in the kernel and once in the trajectory.
+# The bytes of a result row (eight binary64 numbers and the error code IER), which is stored twice:
+# in the kernel and in the trajectory.
 _BYTES_PER_STEP = 2 * (8 * 8 + 4)
 # The compiled programs count steps and right-hand sides, at most five per step, in 32 bits.
 _COUNTABLE_STEPS = 400_000_000
@@ -101,7 +102,7 @@ class TorqueLaw:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the values and convert them to floats."""
+        """Check the values and convert them to floats; raise InputError for an invalid value."""
         for name in ("constant", "rate"):
             object.__setattr__(self, name, three(f"[torque] {name}", getattr(self, name)))
         for name in ("sines", "cosines"):
@@ -111,22 +112,28 @@ class TorqueLaw:
 
     @property
     def varies(self) -> bool:
-        """Whether N depends on time."""
+        """Whether the torque N depends on time."""
         waves = self.sines + self.cosines
         return any(self.rate) or any(any(amplitude) for amplitude, _ in waves)
 
     @property
     def is_zero(self) -> bool:
-        """Whether N is zero at all times."""
+        """Whether the torque N is zero at all times."""
         return not (self.varies or any(self.constant))
 
     @property
     def in_space(self) -> bool:
-        """Whether a torque acts about the axes of space, so that omega depends on the attitude."""
+        """Whether the torque is not zero and is about the axes of space.
+
+        Then omega depends on the attitude.
+        """
         return self.frame == "space" and not self.is_zero
 
     def at(self, time: float) -> Triple:
-        """Return N at `time` (s), with the terms added in the order of the definition."""
+        """Return the three components of the torque N at `time` (s).
+
+        The terms are added in the order of the definition, so that rounding is always the same.
+        """
         torque = list(self.constant)
         if self.varies:
             for axis in range(3):
@@ -140,7 +147,7 @@ class TorqueLaw:
 
 @dataclass(frozen=True)
 class Scene:
-    """A problem: a body, its torque, its initial conditions, and the steps of a program.
+    """A problem to solve: a body, its torque, its initial conditions, and the steps of a program.
 
     Exactly one of `moments`, `coefficients` and `inertia` is required. Three numbers may be a list,
     a tuple or an array; the fields are plain tuples of floats.
@@ -287,7 +294,7 @@ class Scene:
 
     @property
     def exact_moments(self) -> "Exact | None":
-        """The exact principal moments (kg m2), or None if only coefficients are known.
+        """The principal moments (kg m2) as exact fractions, or None if only A, B, C are known.
 
         A full inertia matrix raises InputError.
         """
@@ -303,12 +310,12 @@ class Scene:
 
     @property
     def moments_low(self) -> Triple:
-        """The exact minus the rounded moments (kg m2): 0, since the moments are floats."""
+        """The exact principal moments minus `moments` (kg m2): 0, since users give floats."""
         return 0.0, 0.0, 0.0
 
     @property
     def is_impossible(self) -> bool:
-        """Whether the moments break the triangle inequality, so that no body has them."""
+        """Whether no body can have the moments, as the largest exceeds the sum of the other two."""
         if self.inertia is not None:
             from pyharness.model.inertia import breaks_triangle
 
@@ -322,19 +329,22 @@ class Scene:
     def body_torque(self) -> TorqueLaw:
         """The torque law about the axes of the body.
 
-        A torque about the axes of space raises InputError. Code that needs a torque about the body
-        axes therefore reads the law from this property.
+        A torque about the axes of space raises InputError. Therefore code that can not treat such a
+        torque reads the law from this property, and not from `torque`.
         """
         if self.torque.in_space:
             raise InputError(SPACE_TORQUE)
         return self.torque
 
     def times(self) -> list[float]:
-        """Return the true times of the results, n h for n = 1 ... steps (s)."""
+        """Return the times (s) of a program's results, which are multiples of the step size.
+
+        They are n times the step size, for n from 1 to the number of steps.
+        """
         return [n * self.step_size for n in range(1, self.steps + 1)]
 
     def normalized_torque(self, time: float) -> Triple:
-        """Return the torque over moment, M = N / I, at `time` (1/s2)."""
+        """Return M = N / I at `time` (s), the torque components over the moments (1/s2)."""
         first, second, third = self.body_torque.at(time)
         if self.moments is None:
             return first, second, third
@@ -343,7 +353,7 @@ class Scene:
     def right_hand_side(self) -> Callable[[float, Sequence[float]], list[float]]:
         """Return the right-hand side f(t, omega) of equations 16-18.
 
-        The function f returns three plain floats (rad/s2).
+        The arguments of f are a time (s) and omega (rad/s). It returns three plain floats (rad/s2).
         """
         a, b, c = self.euler_coefficients
         if self.body_torque.varies:
@@ -364,7 +374,7 @@ class Scene:
 
 
 def most_steps() -> int:
-    """Return the largest number of steps whose rows fit in half of this machine's memory."""
+    """Return the largest number of steps of a run whose results fit in half of the memory."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return min(memory // 2 // _BYTES_PER_STEP, _COUNTABLE_STEPS)
 
@@ -378,7 +388,7 @@ def _size(steps: int, limit: int) -> str:
 
 
 def checked_scene(scene: object, any_axes: bool = False, any_torque: bool = False) -> Scene:
-    """Return `scene`; raise InputError if it is not a Scene, or not one that the caller accepts.
+    """Return the argument `scene`; raise InputError unless it is a Scene that the caller accepts.
 
     With `any_axes` the scene may have a full inertia matrix. With `any_torque` its torque may be
     about the axes of space.

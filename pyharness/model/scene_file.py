@@ -1,4 +1,4 @@
-"""Scenes of the cases of Table 1, and scenes in TOML files of the form in the README."""
+"""Scenes of the cases of Table 1 of the thesis, and scenes in TOML files that users write."""
 
 import os
 import tomllib
@@ -30,7 +30,7 @@ def case_numbers() -> list[int]:
 
 
 def case_scene(number: SupportsIndex) -> Scene:
-    """Return the scene of a case of Table 1.
+    """Return the scene of a case of Table 1 of the thesis.
 
     Parameters
     ----------
@@ -103,7 +103,11 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
-    """Return the scene of a file's content; raise InputError, prefixed with `where`, if invalid."""
+    """Return the scene that the content of a scene file describes.
+
+    `default_name` is the name of the scene if the file has no ``name``. Raise InputError, with
+    `where` in front of the message, if the content is invalid.
+    """
     data = toml_of(content, where)
     try:
         return scene_of(data, default_name)
@@ -112,20 +116,27 @@ def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
 
 
 def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
-    """Return the data of a user's TOML file; raise InputError, prefixed with `where`, if none."""
+    """Return the data of a user's TOML file as a dictionary.
+
+    Raise InputError, with `where` in front of the message, if it can't be read or is not TOML.
+    """
     return toml_of(read_file(path, where), where)
 
 
 def read_file(path: str | os.PathLike[str], where: str) -> bytes:
-    """Return the bytes of a user's TOML file; raise InputError, prefixed with `where`, on failure.
+    """Return the bytes of a user's TOML file.
 
-    A caller that needs the bytes twice has to keep them, because a pipe can be read only once.
+    Raise InputError, with `where` in front of the message, if the file can't be read. A caller that
+    needs the bytes twice has to keep them, because a pipe can be read only once.
     """
     return read_input(path, where, _LARGEST_FILE, "a TOML file")
 
 
 def toml_of(content: bytes, where: str) -> dict[str, Any]:
-    """Return the data in TOML text; raise InputError, prefixed with `where`, if invalid."""
+    """Return the data in the content of a TOML file as a dictionary.
+
+    Raise InputError, with `where` in front of the message, if the content is not TOML.
+    """
     try:
         return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError:
@@ -137,9 +148,10 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
 
 
 def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
-    """Return a scene as the text of a file that `read_scene` reads back bit for bit.
+    """Return a scene as the text of a scene file, from which `read_scene` restores the scene.
 
-    `comments` are lines at the head of the text.
+    The restored numbers are bit-for-bit identical. Masses, forces and the number of the case have
+    no place in a scene file. `comments` are lines at the head of the text.
     """
     import json
 
@@ -163,7 +175,10 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
 
 
 def body_of(scene: Scene) -> tuple[str, list[Any]]:
-    """Return the key under which a scene file specifies the body, and the value."""
+    """Return the key with which a scene file specifies the body of a scene, and its value.
+
+    The key is "moments" (kg m2), "coefficients" or "inertia" (kg m2).
+    """
     if scene.inertia is not None:
         return "inertia", [list(row) for row in scene.inertia]
     if scene.moments is not None:
@@ -172,7 +187,10 @@ def body_of(scene: Scene) -> tuple[str, list[Any]]:
 
 
 def scene_of(data: dict[str, Any], default_name: str) -> Scene:
-    """Return the scene that the data of a file describe; raise InputError if they are invalid."""
+    """Return the scene that the data of a scene file describe; raise InputError if invalid.
+
+    `default_name` is the name of the scene if the data have no ``name``.
+    """
     check_written_schema(data, "scene file")
     check_keys(data, ("schema", "name", *_TABLES), "top level")
     tables: dict[str, dict[str, Any]] = {}
@@ -224,13 +242,17 @@ def _waves(where: str, entries: object) -> list[tuple[Any, Any]]:
 
 
 def check_written_schema(data: dict[str, Any], kind: str) -> None:
-    """Raise InputError for another schema in a file that people write; it may have no number."""
+    """Raise InputError if a file that people write has a schema that this version does not read.
+
+    `data` are the data of the file, in which the number of the schema may be missing. `kind` is the
+    kind of the file, a key of `SCHEMAS`.
+    """
     given = data.get("schema", SCHEMAS[kind])
     check_schema("top level", kind, given, "write it in that form, or take a version that reads it")
 
 
 def check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> None:
-    """Raise InputError for a key that is not allowed."""
+    """Raise InputError, with `where` in front of the message, for a key that is not allowed."""
     for key in table:
         if key not in allowed:
             raise unknown("key", key, allowed, where)

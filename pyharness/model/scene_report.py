@@ -1,4 +1,4 @@
-"""Lines of reports about a scene and about the end of a run."""
+"""Lines of reports that describe a scene, and how a run ended."""
 
 import math
 from collections.abc import Sequence
@@ -9,9 +9,9 @@ from pyharness.model.trajectory import Trajectory
 
 
 def heading(scene: Scene) -> list[str]:
-    """Return lines about a scene: name, body, torque, initial omega, steps, and attitude.
+    """Return lines that describe a scene: name, body, torque, initial omega, steps, attitude.
 
-    A further line says if no rigid body has these moments.
+    If no rigid body can have the moments, a further line says so.
     """
     if scene.inertia is not None:
         body = f"I = {', '.join(map(_tuple, scene.inertia))} kg m2"
@@ -52,7 +52,7 @@ def _tuple(values: Sequence[float]) -> str:
 
 
 def ending(trajectory: Trajectory) -> str:
-    """Return a line about how a run ended."""
+    """Return a line about how a run ended: its status, and the numbers of steps and evaluations."""
     steps = counted(trajectory.steps, "step")
     counts = f"{steps}, {counted(trajectory.evaluations, 'right-hand side')}"
     if trajectory.stop is not None:
@@ -69,7 +69,10 @@ def ending(trajectory: Trajectory) -> str:
 
 
 def sensitive(growth: float | None, digits: float | None) -> str:
-    """Return a phrase for a result whose amplified rounding error exceeds the tolerance."""
+    """Return a phrase that describes a result whose amplified rounding error exceeds the tolerance.
+
+    `growth` is the error amplification, and `digits` the number of decimal digits that are left.
+    """
     left = counted(math.floor(digits or 0.0), "digit")
     return f"sensitive: rounding errors are amplified by {short(growth)}; {left} left"
 

@@ -35,7 +35,7 @@ def check_schema(where: str, kind: str, found: object, remedy: str) -> None:
         The number of the file's schema; None if it has no number. In a file that people write the
         number may be missing; the caller then passes the number in `SCHEMAS`.
     remedy : str
-        What the user can do.
+        What the user can do, the last part of the message.
 
     Raises
     ------

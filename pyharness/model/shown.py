@@ -1,4 +1,4 @@
-"""Short representations of results of any size."""
+"""Short text representations of results, however large their arrays are."""
 
 import textwrap
 from dataclasses import fields, is_dataclass
@@ -11,9 +11,9 @@ _LONGEST = 60  # most characters of one value
 
 
 def short_repr(result: Any) -> str:
-    """Return a dataclass as text of at most ten lines, with arrays by type and shape.
+    """Return a result, which is a dataclass instance, as text of at most ten lines.
 
-    Fields that are None are left out.
+    An array is represented by its type and shape. Fields that are None are left out.
     """
     shown = [
         f"{each.name}={_short(value)}"
@@ -29,7 +29,7 @@ def short_repr(result: Any) -> str:
 
 
 def _short(value: Any) -> str:
-    """Return one value as text on one line."""
+    """Return the value of one field as text on one line."""
     if isinstance(value, np.ndarray):
         return f"<{value.dtype} {value.shape}>"
     if isinstance(value, (tuple, list)) and value and is_dataclass(value[0]):

@@ -30,11 +30,13 @@ class Stop:
     Attributes
     ----------
     step : int
-        The number of the step, from 1. Its row is the last one of the trajectory.
+        The number of the step, from 1. Its row is the last row of the trajectory.
     variable : str
-        The variable that failed the test: `U1` ... `V3`, or `U`, `UV` for the norms.
+        The variable that failed the test: `U1` to `U3` (omega), `V1` to `V3` (translational
+        velocity), or a norm: `U` (of omega), `UV` (of omega and velocity together).
     quotient : float
-        Change of K over change of U (1/s); infinite if U did not change.
+        Change of the slope K between two stages of the step, over the change of the variable U
+        (1/s). It is infinite if U did not change.
 
     Examples
     --------
@@ -56,13 +58,13 @@ class Trajectory:
     Attributes
     ----------
     time : ndarray, shape (n,)
-        True time, s.
+        True time of each row, s.
     recorded_time : ndarray, shape (n,)
         The TIME that the program writes to TAPE5, s; for methods the same as `time`.
     omega : ndarray, shape (n, 3)
         Angular velocity about the body axes, rad/s.
     velocity : ndarray, shape (n, 3), or None
-        Velocity along the body axes, m/s.
+        Translational velocity along the body axes, m/s. None if it was not computed.
     steps, evaluations : int
         Steps taken, and right-hand sides evaluated.
     ended : {"complete", "sensitive", "stopped", "overflow"}
@@ -70,7 +72,7 @@ class Trajectory:
         not finite. Sensitive means that all rows are present, but the amplified rounding error
         exceeds the tolerance.
     stop : Stop or None
-        The point at which the Lipschitz test ended the run; None if it did not.
+        The point at which the Lipschitz test ended the run; None if the test did not end it.
     ier : ndarray of int, shape (n,), or None
         The error code IER as the collocation programs print it.
     error : float or None
@@ -86,7 +88,7 @@ class Trajectory:
     moments : tuple of three floats, or None
         Principal moments of the body, kg m2; None if it has only coefficients.
     axes : ndarray, shape (3, 3), or None
-        The axes of these moments, in columns; None if they are the body's own axes.
+        The principal axes, in columns; None if they are the body's own axes.
     exact : ndarray of object, shape (n, 8), or None
         Rows of a program that ran with another word length: `time`, `recorded_time`, `omega` and
         `velocity` as numbers of that word. The other arrays hold the nearest floats. None for
@@ -203,12 +205,18 @@ class Trajectory:
 
 
 def turned_to_space(attitude: Array, vectors: Array) -> Array:
-    """Transform vectors of the body, shape (n, 3), to components about the axes of space."""
+    """Transform n vectors from components about the body axes to components about axes of space.
+
+    `attitude` are n quaternions, shape (n, 4). `vectors` and the result have the shape (n, 3).
+    """
     scalar, vector = attitude[:, :1], attitude[:, 1:]
     twice = 2.0 * np.cross(vector, vectors)
     return vectors + scalar * twice + np.cross(vector, twice)
 
 
 def digits_left(error: float | None) -> float | None:
-    """Return the number of decimal digits that a relative error leaves, 0 to 15.95 (binary64)."""
+    """Return the number of correct decimal digits of a number with a given relative error.
+
+    It is from 0 to 15.95, the digits of binary64, and None if `error` is None.
+    """
     return None if error is None else max(0.0, -math.log10(max(error, ROUNDING)))

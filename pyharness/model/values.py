@@ -22,9 +22,9 @@ _THREE_FLOATS = [float, float, float]
 
 
 def number(where: str, value: object) -> float:
-    """Return a real number as a float; raise InputError, prefixed with `where`, for anything else.
+    """Return a user's real number as a float; infinities and NaN are accepted.
 
-    Infinities and NaN are accepted.
+    Raise InputError, with `where` in front of the message, for any other value.
     """
     found = converted(value)
     if isinstance(found, float):
@@ -35,7 +35,7 @@ def number(where: str, value: object) -> float:
 
 
 def converted(value: object) -> float | str:
-    """Return a real number as a float, or the kind of any other value in words."""
+    """Return a real number as a float; for any other value return its kind in words, a string."""
     if type(value) is float:
         return value
     if is_no_number(value):
@@ -51,9 +51,9 @@ def converted(value: object) -> float | str:
 
 
 def is_no_number(value: object) -> bool:
-    """Return whether a value is no real number, although float() may accept it.
+    """Return whether a value must be rejected as a real number, although float() may accept it.
 
-    Such values are text, booleans, arrays, and complex numbers of NumPy.
+    The values to reject are text, booleans, arrays, and complex numbers of NumPy.
     """
     if isinstance(value, (bool, str, bytes, bytearray, memoryview)):
         return True
@@ -62,7 +62,10 @@ def is_no_number(value: object) -> bool:
 
 
 def three(where: str, values: object) -> Triple:
-    """Return three finite numbers; raise InputError, prefixed with `where`, for anything else."""
+    """Return three finite numbers of a user as a tuple of floats.
+
+    Raise InputError, with `where` in front of the message, for any other value.
+    """
     found = three_floats(where, values)
     for each in found:
         if not math.isfinite(each):
@@ -71,7 +74,10 @@ def three(where: str, values: object) -> Triple:
 
 
 def three_floats(where: str, values: object) -> Triple:
-    """Return three floats, finite or not; raise InputError, prefixed with `where`, if invalid."""
+    """Return three numbers of a user, finite or not, as a tuple of floats.
+
+    Raise InputError, with `where` in front of the message, for any other value.
+    """
     if type(values) is tuple and [type(each) for each in values] == _THREE_FLOATS:
         return values
     allowed = "allowed: three numbers"
@@ -84,7 +90,10 @@ def three_floats(where: str, values: object) -> Triple:
 
 
 def finite(where: str, value: object) -> float:
-    """Return a finite number; raise InputError, prefixed with `where`, for anything else."""
+    """Return a finite number of a user as a float.
+
+    Raise InputError, with `where` in front of the message, for any other value.
+    """
     found = number(where, value)
     if not math.isfinite(found):
         raise _not_finite(where, found)
@@ -96,7 +105,11 @@ def _not_finite(where: str, value: float) -> InputError:
 
 
 def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
-    """Return an iterator over ordered values; raise InputError for text, a set or a mapping."""
+    """Return an iterator over a user's list, tuple, array or other ordered values.
+
+    The values themselves are not checked. Raise InputError for text, a set, a mapping or a single
+    value. Its message begins with `where` and ends with `allowed`.
+    """
     if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):
         try:
             return iter(values)  # type: ignore[call-overload, no-any-return]
@@ -106,7 +119,10 @@ def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
 
 
 def integer(where: str, value: object) -> int:
-    """Return a whole number; raise InputError, prefixed with `where`, for anything else."""
+    """Return a whole number of a user as an int.
+
+    Raise InputError, with `where` in front of the message, for any other value.
+    """
     if not is_no_number(value):
         try:
             return operator.index(value)  # type: ignore[arg-type]
@@ -116,16 +132,20 @@ def integer(where: str, value: object) -> int:
 
 
 def boolean(where: str, value: object) -> bool:
-    """Return True or False; raise InputError, prefixed with `where`, for anything else."""
+    """Return a user's value that is True or False, also that of NumPy, as a bool.
+
+    Raise InputError, with `where` in front of the message, for any other value.
+    """
     if isinstance(value, bool) or kind_of(value) == "true or false":
         return bool(value)
     raise InputError(f"{where} is {kind_of(value)}; allowed: True or False")
 
 
 def tolerance_of(value: object, finest: float) -> float:
-    """Return a tolerance as a float; raise InputError if it is no number.
+    """Return a user's tolerance as a float; raise InputError if it is no number.
 
-    The range of the tolerance is not checked. The message names `finest` as its lower end.
+    The range of the tolerance is not checked here. The message names `finest`, the smallest
+    tolerance that the caller allows.
     """
     found = converted(value)
     if isinstance(found, float):

@@ -1,9 +1,9 @@
 """Exact sums of the waves of a torque law that have the same frequency.
 
 A wave is a sine or cosine term of the law. Each amplitude is divided by a moment, and each quotient
-is rounded. If two waves nearly cancel, their rounding errors remain. For example, amplitudes that
-differ by 1e-10 would leave six digits of the torque. An exact sum before the division leaves all
-digits, and fewer waves take less work.
+is rounded. If two waves nearly cancel, their rounding errors remain. For example, opposite waves
+whose amplitudes differ by 1e-10 would leave six digits of the torque. An exact sum before the
+division leaves all digits, and fewer waves take less work.
 """
 
 import math
@@ -28,7 +28,10 @@ _ZERO = (Fraction(0), Fraction(0), Fraction(0))
 
 @dataclass(frozen=True)
 class ExactLaw:
-    """A torque law with one wave per frequency, in exact numbers."""
+    """A torque law with at most one sine and one cosine per frequency, in exact fractions.
+
+    The attributes have the meanings and units of the attributes of `TorqueLaw`.
+    """
 
     constant: Exact
     rate: Exact
@@ -37,7 +40,7 @@ class ExactLaw:
     frame: str
 
     def turned(self, turn: Callable[[Exact], Exact]) -> "ExactLaw":
-        """Return the law with `turn` applied to every vector."""
+        """Return the law with `turn`, a rotation, applied to every vector of three components."""
 
         def waves(each: tuple[ExactWave, ...]) -> tuple[ExactWave, ...]:
             return tuple((turn(amplitude), frequency) for amplitude, frequency in each)
@@ -47,9 +50,9 @@ class ExactLaw:
         )
 
     def rounded(self) -> TorqueLaw:
-        """Return the law in floats, each number rounded once.
+        """Return the law as a TorqueLaw in floats, each number rounded once.
 
-        Raise InputError if a sum of amplitudes is beyond the range of floats.
+        Raise InputError if a number is beyond the range of floats.
         """
 
         def waves(each: tuple[ExactWave, ...]) -> tuple[Wave, ...]:
@@ -65,16 +68,17 @@ class ExactLaw:
 
 
 def merged(law: TorqueLaw) -> TorqueLaw:
-    """Return the law with one wave per frequency, or the same object if there is nothing to merge.
+    """Return a torque law with at most one sine and one cosine per frequency.
 
-    Sines of opposite frequencies are merged with opposite signs, cosines with the same sign. A
-    cosine of frequency 0 is added to the constant, and a sine of frequency 0 is dropped.
+    If there is nothing to merge, the result is the argument itself. Sines of opposite frequencies
+    are merged with opposite signs, cosines with the same sign. A cosine of frequency 0 is added to
+    the constant, and a sine of frequency 0 is dropped.
     """
     return exact_law(law).rounded() if is_mergeable(law) else law
 
 
 def is_mergeable(law: TorqueLaw) -> bool:
-    """Return whether a law has a wave of frequency 0, or two sines or cosines of one frequency."""
+    """Return whether a law has a wave of frequency 0, two sines of one frequency or two cosines."""
     for waves in (law.sines, law.cosines):
         # A wave without amplitude does not count.
         counts = Counter(abs(frequency) for amplitude, frequency in waves if any(amplitude))
@@ -84,7 +88,7 @@ def is_mergeable(law: TorqueLaw) -> bool:
 
 
 def exact_law(law: TorqueLaw) -> ExactLaw:
-    """Return a torque law with one wave per frequency, in exact numbers."""
+    """Return a torque law in exact fractions, with waves of equal frequency merged."""
     constant = _exact(law.constant)
     cosines = _summed(law.cosines, even=True)
     # A cosine of frequency 0 is 1 at all times, whereas a sine is 0.
@@ -101,7 +105,11 @@ def exact_law(law: TorqueLaw) -> ExactLaw:
 
 
 def _summed(waves: Iterable[Wave], even: bool) -> list[ExactWave]:
-    """Return one wave per frequency, without waves of zero amplitude; `even` means cosines."""
+    """Return the sums of waves of equal frequency, without sums of zero amplitude.
+
+    All `waves` are cosines if `even` is true, otherwise sines. A sine of negative frequency is
+    added as the opposite of a sine of positive frequency.
+    """
     found: dict[float, tuple[float, Exact]] = {}
     for amplitude, frequency in waves:
         exact = _exact(amplitude)
@@ -133,13 +141,13 @@ def _rounded(values: Exact) -> Triple:
 
 
 def with_merged_waves(scene: Scene) -> Scene:
-    """Return the scene with one wave per frequency in its torque."""
+    """Return the scene with at most one sine and one cosine per frequency in its torque."""
     law = merged(scene.torque)
     return scene if law is scene.torque else replace(scene, torque=law)
 
 
 def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Array, Array, Array]:
-    """Return the constants and waves of many torque laws, each law with one wave per frequency.
+    """Return the constants, sines and cosines of many torque laws, with merged waves in each law.
 
     The shapes are (m, 3), (m, k, 4) and (m, l, 4). In each array m is the number of laws, or 1 if
     all laws share one row. Each law becomes the law that `merged` returns for it. A wave that was
@@ -176,7 +184,10 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
 
 
 def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
-    """Return for each law whether `is_mergeable` holds, shape (m,)."""
+    """Return for each torque law whether `is_mergeable` holds, a boolean array of shape (m,).
+
+    `sines` and `cosines` are arrays of m laws (or of one), as in `with_merged_rows`.
+    """
     found = np.zeros(1, bool)
     for waves in (sines, cosines):
         if waves.size:
@@ -199,9 +210,10 @@ def _waves_of(rows: Array) -> list[Wave]:
 
 
 def _without_empty(waves: Array) -> Array:
-    """Return an array of waves without the columns in which no law has a wave.
+    """Return an array of waves, shape (m, k, 4), without columns in which no law has a wave.
 
-    A column with a frequency that is not finite is kept, so that only its own law is refused.
+    A column is one of the k places for a wave. A column with a frequency that is not finite is
+    kept, so that only its own law is refused.
     """
     is_one = waves[..., :3].any(axis=-1) | ~np.isfinite(waves[..., 3])
     return np.ascontiguousarray(waves[:, is_one.any(axis=0)])

@@ -1,8 +1,9 @@
 """The text of the edition: every card of the three decks, and how the scan shows it.
 
 A line of the scan is a card number, a dash and the text of the card; blanks are ignored. The tables
-in `data/cards` hold the decks, the pages of the scan in its order, and the lines of the twins that
-correspond to each card. An entry is an entry of the critical apparatus (`data/apparatus.toml`).
+in `data/cards` hold the decks, the pages of the scan in its order, and, for each card, the lines of
+the Python twin that correspond to it. An entry is an entry of the critical apparatus
+(`data/apparatus.toml`), which records and explains a deviation.
 """
 
 import re
@@ -22,7 +23,11 @@ _PORT = "fortran/original"
 
 
 class Difference(NamedTuple):
-    """A passage that the scan shows in other characters than ours, and the entry that says why."""
+    """A passage of a card that the scan shows in other characters than our text.
+
+    `ours` and `scans` are the characters in our text and in the scan, without blanks. `entry` is
+    the identifier of the apparatus entry that explains the difference.
+    """
 
     ours: str
     scans: str
@@ -30,7 +35,7 @@ class Difference(NamedTuple):
 
 
 class Place(NamedTuple):
-    """A line of a source file."""
+    """A line of a source file: the file's name, the line number from 1, and the text."""
 
     file: str
     line: int
@@ -43,18 +48,19 @@ class Card(NamedTuple):
     Attributes
     ----------
     program : str
-        One of `PROGRAMS`.
+        Name of the program, one of `PROGRAMS`.
     number : int
-        100, 110, 120, ...
+        Card number: 100, 110, 120, ...
     text : str
         Columns 1 to 72 as we read them.
     differences : tuple of Difference
         The passages that the scan shows otherwise, from left to right. Each is the first occurrence
         of its characters after the previous one; blanks are ignored.
     printed : tuple of (str, str) or None
-        The number that the scan shows if it is not `number`, and the entry that says why.
+        The card number that the scan shows if it is not `number`, and the identifier of the
+        apparatus entry that says why.
     lost : str or None
-        The entry of a card that is missing from the scan.
+        If the card is missing from the scan, the identifier of the apparatus entry that says so.
     """
 
     program: str
@@ -66,17 +72,17 @@ class Card(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Return the program and the number of the card, as in ``two-term:1660``."""
+        """Return the name of the card: program and card number, as in ``two-term:1660``."""
         return f"{self.program}:{self.number}"
 
     @property
     def statement(self) -> str:
-        """Return the text with single blanks."""
+        """Return the text of the card with each run of blanks reduced to one blank."""
         return " ".join(self.text.split())
 
     @property
     def is_comment(self) -> bool:
-        """Return whether column 1 has a C."""
+        """Return whether the card is a comment, which has a C in column 1."""
         return self.text.startswith("C")
 
     @property
@@ -86,7 +92,7 @@ class Card(NamedTuple):
 
     @property
     def scan(self) -> str | None:
-        """Return the line of the scan without blanks; None if the scan has no such line."""
+        """Return the card's line in the scan, without blanks; None if the scan lacks the card."""
         if self.lost:
             return None
         number = self.printed[0] if self.printed else str(self.number)
@@ -94,7 +100,10 @@ class Card(NamedTuple):
         return f"{number}-{''.join(shown)}"
 
     def passages(self) -> Iterator[tuple[str, Difference | None]]:
-        """Yield the text in passages, each with the difference that the scan shows, or None."""
+        """Yield the card's text in passages, each with its difference from the scan.
+
+        The difference is None for a passage that the scan shows as it is.
+        """
         return passages(self.text, self.differences)
 
     @property
@@ -113,7 +122,10 @@ class Card(NamedTuple):
 
 
 class Deck:
-    """The cards of a program by number, and their lines in its Fortran port and its Python twin."""
+    """The cards of a program by card number, and the source lines that correspond to each card.
+
+    The source lines are those of the program's Fortran port and of its Python twin.
+    """
 
     def __init__(self, program: str) -> None:
         """Read the program's table of cards."""
@@ -133,7 +145,7 @@ class Deck:
 
     @cached_property
     def executable(self) -> frozenset[int]:
-        """Return the cards of executable statements, which are not comments or specifications."""
+        """Return the numbers of the cards that are not comments or specification statements."""
         found, computes = set(), False
         for card in self.cards.values():
             if not card.continues:
@@ -144,22 +156,22 @@ class Deck:
 
     @cached_property
     def absent(self) -> dict[int, str]:
-        """Return the executable cards without a statement in the port, each with the reason."""
+        """Return the reason, by card number, why the Fortran port leaves out an executable card."""
         return {n: why for cards, why in self._places["absent"] for n in numbers(cards)}
 
     @cached_property
     def otherwise(self) -> dict[int, str]:
-        """Return the cards whose statement is different in the port, each with the reason."""
+        """Return the reason, by card number, why a statement differs in the Fortran port."""
         return {n: why for cards, why in self._places["otherwise"] for n in numbers(cards)}
 
     @cached_property
     def port(self) -> dict[int, list[Place]]:
-        """Return the lines of the Fortran port by card, from the card numbers in its margin."""
+        """Return the lines of the Fortran port by card number, as its margin names the cards."""
         return _by_card((cards, place) for place, cards in margin(self.program))
 
     @cached_property
     def twin(self) -> dict[int, list[Place]]:
-        """Return the lines of the Python twin by card."""
+        """Return the lines of the Python twin by card number."""
         places = self._places["twin"]
         return _by_card((cards, _line_of(file, text)) for cards, file, text in places)
 
@@ -171,7 +183,7 @@ def deck(program: str) -> Deck:
 
 
 def numbers(ranges: str) -> list[int]:
-    """Return the card numbers of a text such as ``750-770, 800``."""
+    """Return the card numbers that a text names: ``750-770, 800`` is 750, 760, 770 and 800."""
     found: list[int] = []
     for each in ranges.split(",") if ranges else ():
         first, _, last = each.strip().partition("-")
@@ -180,7 +192,10 @@ def numbers(ranges: str) -> list[int]:
 
 
 def find(program: str, number: int) -> Card:
-    """Return a card; raise InputError, which names the nearest cards, if there is no such card."""
+    """Return the card of a program's deck that has the card number `number`.
+
+    Raise InputError, which names the nearest cards, if there is no such card.
+    """
     cards = deck(program).cards
     if number not in cards:
         near = sorted(cards, key=lambda each: abs(each - number))[:2]
@@ -190,7 +205,7 @@ def find(program: str, number: int) -> Card:
 
 
 def chosen(asked: Iterable[str]) -> list[Card]:
-    """Return the requested cards; all cards if nothing is requested.
+    """Return the cards that `asked` names; all cards of the three decks if `asked` is empty.
 
     Parameters
     ----------
@@ -201,7 +216,7 @@ def chosen(asked: Iterable[str]) -> list[Card]:
     Raises
     ------
     InputError
-        If a request is no program, card or range, or is a range without cards.
+        If an item of `asked` is no program, card or range, or is a range without cards.
     """
     found: dict[Card, None] = {}
     for each in list(asked) or PROGRAMS:
@@ -210,7 +225,10 @@ def chosen(asked: Iterable[str]) -> list[Card]:
 
 
 def parallels(card: Card) -> list[Card]:
-    """Return the cards of other decks with the same text; none for a comment or a blank card."""
+    """Return the cards of the two other decks that have the same text as `card`.
+
+    Blanks are ignored. The list is empty for a comment or a blank card.
+    """
     if card.is_comment or not card.text[6:].strip():
         return []
     return [
@@ -265,7 +283,10 @@ def _cards_of(asked: str) -> list[Card]:
 
 
 def margin(program: str) -> Iterator[tuple[Place, str]]:
-    """Yield the lines of the Fortran port that name cards in the margin, and those cards."""
+    """Yield each line of the Fortran port that names cards in its margin, and their numbers.
+
+    The numbers are a text such as ``750-770, 800``.
+    """
     file = f"{program.replace('-', '_')}.fypp"
     for number, text in enumerate(_lines(shipped(_PORT) / file), 1):
         if match := _MARGIN.match(text):
@@ -275,9 +296,11 @@ def margin(program: str) -> Iterator[tuple[Place, str]]:
 def passages(
     text: str, differences: Iterable[Difference]
 ) -> Iterator[tuple[str, Difference | None]]:
-    """Yield a text in passages, each with the difference that the scan shows there, or None.
+    """Yield the text of a card in passages, each with its difference from the scan.
 
-    Raise ValueError if the text does not contain the characters of a difference in their order.
+    `differences` are in the order of the text. The difference is None for a passage that the scan
+    shows as it is. Raise ValueError if the text does not contain the differing characters in this
+    order.
     """
     # Blanks are ignored; these are the indices of all other characters.
     places = [n for n, letter in enumerate(text) if not letter.isspace()]

@@ -9,20 +9,23 @@ from pyharness.original.equations import initial_torque
 
 
 def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
-    """Yield every subset of the names, the empty one first."""
+    """Yield every subset of `names`, the empty one first."""
     for bits in range(2 ** len(names)):
         yield frozenset(name for i, name in enumerate(names) if bits >> i & 1)
 
 
 def all_listings(program: str) -> Iterator[Listing]:
-    """Yield the listings of a program with every subset of defects and every choice of readings."""
+    """Yield every listing of a program: each subset of its switches with each of its readings.
+
+    The switches are the names active in the original program: its defects and some conjectures.
+    """
     for readings in subsets(names_of("reading", program)):
         for defects in subsets(switches(program)):
             yield Listing(program, defects, readings)
 
 
 def all_cells() -> Iterator[tuple[Listing, int]]:
-    """Yield every listing of every program with every case.
+    """Yield every listing of every program with the number of every case of Table 1.
 
     For a case with an initial torque, each listing is also yielded with the conjecture
     `initial-torque`.
@@ -37,7 +40,7 @@ def all_cells() -> Iterator[tuple[Listing, int]]:
 
 
 def cell_name(listing: Listing, case: int) -> str:
-    """Return the name of a cell, as in ``two-term/case-3/dt-accumulates+torque-held``."""
+    """Return a name for a listing and a case: ``two-term/case-3/dt-accumulates+torque-held``."""
     return f"{listing.program}/case-{case}/{listing_name(listing)}"
 
 

@@ -1,4 +1,4 @@
-"""The collation: checks of the scan against the cards, and of the cards against the apparatus."""
+"""The collation: checks that the scan, our text of the cards and the critical apparatus agree."""
 
 import difflib
 import re
@@ -12,10 +12,10 @@ HEADING = "APPENDIX AND PROGRAMS"
 
 
 def expected_lines() -> list[tuple[str, str]]:
-    """Return every line that the appendix should have, without blanks, with its name.
+    """Return every line that the scan's appendix should have, as pairs of text and name.
 
-    The name is a card's name, ``furniture`` for a line that an editor added, or ``phantom`` for
-    text that belongs to no card at its place.
+    The text has no blanks. The name is a card's name, as in ``two-term:1660``, ``furniture`` for a
+    line that an editor added, or ``phantom`` for text that belongs to no card at its place.
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -31,7 +31,9 @@ def expected_lines() -> list[tuple[str, str]]:
 
 
 def unexplained(scan: str) -> list[str]:
-    """Return one sentence for each line in which a scan and the tables disagree.
+    """Return one sentence for each line in which a scan and our tables of cards disagree.
+
+    `scan` is the text of the whole scan of the thesis. The list is empty if all lines agree.
 
     Raises
     ------
@@ -59,7 +61,12 @@ def unexplained(scan: str) -> list[str]:
 
 
 def undeclared() -> list[str]:
-    """Return one sentence for each disagreement between the cards and the apparatus entries."""
+    """Return one sentence for each disagreement between the cards and the critical apparatus.
+
+    Each deviation of the scan that a card records must be declared by the entry of the apparatus
+    that the card names, and each declared deviation must be recorded. A card that is missing from
+    the scan must name an entry of the kind ``missing text``.
+    """
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):
         for each in card.differences:

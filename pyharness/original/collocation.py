@@ -1,9 +1,10 @@
 """Collocation as in IV.2, with up to five terms: one interval, and a run of the two programs.
 
-Every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). Its derivative equals the
-right-hand side at as many points as there are terms (eq. 36). The right-hand side depends on the
-unknowns themselves. A first estimate therefore takes it as constant, and one correction evaluates
-it at the points.
+Every unknown is approximated by a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). Its derivative
+equals the right-hand side at as many collocation points as there are terms after x(0) (eq. 36). The
+right-hand side depends on the unknowns themselves. A first estimate of the polynomials therefore
+takes the right-hand side as constant. One correction then evaluates the right-hand side at the
+collocation points, with the unknowns of that estimate.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,7 +17,10 @@ from pyharness.original.equations import Record, Vector, all_finite, initial_tor
 from pyharness.original.linear_solver import leqt1f
 
 Rates = Callable[[int, Vector], list[float]]
-"""The right-hand sides of all unknowns at point k; point 0 is the start of the interval."""
+"""A function of k and the unknowns that returns the right-hand sides of all unknowns.
+
+k is the number of a collocation point, or 0 for the start of the interval.
+"""
 
 
 def march(
@@ -25,10 +29,12 @@ def march(
     points_of: Callable[[float], list[float]],
     rates: Callable[[Sequence[Vector], int, Vector], list[float]],
 ) -> Trajectory:
-    """Run a collocation program; `points_of` returns the collocation points for a DT (s).
+    """Run a collocation program on a scene.
 
-    `rates` takes the torques at the start and at all points, the index k of a point, and the
-    unknowns there. It returns their right-hand sides.
+    `points_of` returns the collocation points (s from the start of the interval) for DT, the step
+    (s) as the program computes it. `rates` returns the right-hand sides of the unknowns. It takes
+    the torques over the moments (1/s2) at the start and at all collocation points, the number k of
+    a collocation point (0 for the start), and the unknowns there.
     """
     h = scene.step_size
     dt = h
@@ -60,9 +66,12 @@ def march(
 def interval(
     start: Vector, points: Sequence[float], end: float, rates: Rates
 ) -> tuple[list[float], int]:
-    """Advance all unknowns to `end`; return them, and IER of the second solution.
+    """Advance all unknowns by one interval; return them, and an error code.
 
-    The collocation points and `end` are in seconds from the start of the interval.
+    `start` has the unknowns at the start of the interval. The collocation points `points` and the
+    time `end` of the result are in seconds from there. `rates` returns the right-hand sides. The
+    error code is IER of the linear solver LEQT1F for the correction, its second solution in the
+    interval. The programs print this code.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))
@@ -72,13 +81,20 @@ def interval(
 
 
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
-    """Return each unknown's coefficients c1, c2, ... that give the derivatives `rates`, and IER."""
+    """Return the coefficients c1, c2, ... of each unknown's polynomial, and the error code IER.
+
+    With these coefficients the polynomials have the derivatives `rates` at the collocation points
+    `points` (s), one row of derivatives for each point. IER is the code of LEQT1F.
+    """
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(collocation_matrix(points), by_unknown)
 
 
 def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
-    """Return the derivatives of t, t**2, ... at the points, one row for each point (eq. 36)."""
+    """Return the derivatives of t, t**2, ... at the collocation points (eq. 36).
+
+    The matrix has a row for each point (s) and a column for each power of t.
+    """
     return [
         [1.0, 2.0 * t, 3.0 * (t * t), 4.0 * (t * t * t), 5.0 * (t * t * t * t)][: len(points)]
         for t in points
@@ -86,7 +102,11 @@ def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
 
 
 def values(start: Vector, coefficients: Sequence[Vector], t: float) -> list[float]:
-    """Return x(0) + c1 t + c2 t**2 + ... of every unknown, with the terms added in this order."""
+    """Return every unknown's polynomial x(0) + c1 t + c2 t**2 + ... at the time `t` (s).
+
+    `start` has x(0) of each unknown, and `coefficients` its c1, c2, ... The terms are added in this
+    order, because the rounding errors depend on it.
+    """
     t2 = t * t
     powers = [t, t2, t2 * t, t2 * t2, t2 * t2 * t]
     result = []

@@ -38,7 +38,11 @@ def read_rows(
 ) -> Trajectory:  # fmt: skip
     """Return the output of a compiled program as a trajectory.
 
-    `rows` has shape (n, 8), and `ier` has at least n values.
+    `rows` has shape (n, 8): true time and recorded TIME (s), omega (rad/s) and translational
+    velocity (m/s). `ier` has at least n error codes of the linear solver. `evaluations` counts the
+    right-hand sides. `ended` says how the run ended. `stop_variable` is the number from 1 in
+    `STOP_VARIABLES` of the variable that failed the stop test, or 0. `stop_quotient` is its
+    quotient (1/s).
     """
     n = len(rows)
     is_stopped = stop_variable > 0
@@ -56,7 +60,10 @@ def read_rows(
 
 
 class Arguments(NamedTuple):
-    """The arguments of the compiled `run_program`, in its order."""
+    """The arguments of the extension's function `run_program`, in the order of its signature.
+
+    `body` is the moments (kg m2) if `by_moments`, else the coefficients A, B and C.
+    """
 
     program: int
     flags: int
@@ -81,7 +88,11 @@ class Arguments(NamedTuple):
 def program_arguments(
     scene: Scene, listing: Listing, lipschitz: float, may_stop: bool, velocity: bool
 ) -> Arguments:
-    """Return the arguments of the compiled `run_program` for a scene and a listing."""
+    """Return the arguments of the extension's function `run_program` for a scene and a listing.
+
+    `lipschitz` is the constant of the stop test (1/s), and `may_stop` says whether the test may end
+    the run. `velocity` says whether the translational velocity is requested.
+    """
     first = initial_torque(scene) if listing.has("initial-torque") else None
     if first is None and listing.has("initial-torque"):
         conjectures = listing.conjectures - {"initial-torque"}
@@ -110,5 +121,9 @@ def program_arguments(
 
 
 def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:
-    """Return whether a run needs the velocity because the stop test may read it."""
+    """Return whether a run needs the translational velocity because the stop test reads it.
+
+    The stop test reads it only with the defect `lipschitz-tests-velocity`, and if the test may end
+    the run (`may_stop`).
+    """
     return may_stop and listing.has("lipschitz-tests-velocity")

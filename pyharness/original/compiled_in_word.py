@@ -23,10 +23,11 @@ from pyharness.original.word import Word
 def run(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the compiled program of a listing in a word, as `in_word.run` runs its twin.
+    """Run the compiled program of a listing in a word, which is a floating-point format.
 
-    Raise InputError if the extension's compiler does not support the word, or if angles are too
-    large for the extension's sine. Raise NotBuiltError if the extension is not built.
+    The parameters and the result are those of `in_word.run`, which runs the Python twin. Raise
+    InputError if the extension's compiler does not support the word, or if angles of the torque's
+    waves are too large for the extension's sine. Raise NotBuiltError if the extension is not built.
     """
     if word.p > 53:
         _check_angles(scene)
@@ -63,7 +64,10 @@ def run(
 
 
 def compiled_words() -> tuple[str, ...]:
-    """Return the names of the words that the extension supports; none if it is not built."""
+    """Return the names of the words, or floating-point formats, that the extension supports.
+
+    The tuple is empty if the extension is not built.
+    """
     try:
         from pyharness import _build
     except ImportError:

@@ -1,7 +1,7 @@
 """The collation of the decks with each other and with sections II to V, operation by operation.
 
-`data/cards/collation.toml` lists the operations of the programs. Whether the decks agree on an
-operation is computed from their statements.
+A deck is the cards of a program. `data/cards/collation.toml` lists the operations of the programs.
+Whether the decks agree on an operation is computed from their statements.
 """
 
 import re
@@ -15,12 +15,12 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 
 
 class Row(NamedTuple):
-    """A row of the table: one operation of the programs.
+    """A row of the collation table: one operation of the programs, and who agrees on it.
 
     Attributes
     ----------
     what : str
-        What the cards do.
+        The operation: what its cards do.
     cards : dict of str to str
         The cards of each deck that has the operation, as in ``750-770, 800``.
     decks : str
@@ -28,13 +28,15 @@ class Row(NamedTuple):
         statements differ only in names, ``order`` if they differ only in names and order, else
         ``differ``. ``-`` if no deck has the operation.
     thesis : str
-        ``agrees`` or ``differs``; ``silent`` if the thesis does not mention the operation.
+        Whether the text of the thesis ``agrees`` with the decks or ``differs``; ``silent`` if it
+        does not mention the operation.
     text, says : str
-        The place in the thesis, and its statement; both empty if the thesis is silent.
+        The place in the thesis, and the statement made there; both are empty if the thesis is
+        silent.
     entries : tuple of str
-        The entries of the apparatus that explain a disagreement.
+        The identifiers of the apparatus entries that explain a disagreement.
     reason : str
-        Another explanation of a disagreement.
+        An explanation of a disagreement that is not in the apparatus.
     """
 
     what: str
@@ -54,12 +56,16 @@ class Row(NamedTuple):
 
 
 def rows() -> list[Row]:
-    """Return the rows of the table, in the order of the decks."""
+    """Return the rows of the collation table, in the order of the decks."""
     return [_row(each) for each in facts("cards/collation")["row"]]
 
 
 def faults(found: list[Row]) -> list[str]:
-    """Return one sentence for each mistake of the table and each unexplained disagreement."""
+    """Return one sentence for each mistake or unexplained disagreement in the collation table.
+
+    `found` is the rows of the table. A mistake is an apparatus entry that is unknown, unused or
+    names no card of its row, or a card that is in no row, in two rows, or unknown.
+    """
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}
     for row in found:
@@ -86,7 +92,10 @@ def faults(found: list[Row]) -> list[str]:
 
 
 def statements(program: str, cards: str) -> list[str]:
-    """Return the statements of cards without blanks and labels; comments are left out."""
+    """Return the statements on some cards of a program, without blanks, labels and comments.
+
+    `cards` names the cards, as in ``750-770, 800``.
+    """
     found: list[str] = []
     for number in numbers(cards):
         card = deck(program).cards[number]
@@ -111,7 +120,10 @@ def _row(given: dict[str, Any]) -> Row:
 
 
 def _decks(given: dict[str, Any]) -> str:
-    """Return how the statements of the decks that have an operation differ, as in `Row.decks`."""
+    """Return whether the decks that have an operation agree, in the terms of `Row.decks`.
+
+    `given` is the operation's row in `data/cards/collation.toml`.
+    """
     found = {program: statements(program, cards) for program, cards in given["cards"].items()}
     if not found:
         return "-"
@@ -138,13 +150,13 @@ def _same(found: dict[str, list[str]]) -> bool:
 
 
 def _renamed(statement: str, names: str) -> str:
-    """Return a statement with names replaced by pairs such as ``A=A1 B=B1``."""
+    """Return a statement with names replaced: `names` is pairs of old and new, ``A=A1 B=B1``."""
     changes = dict(each.split("=") for each in names.split())
     return re.sub(r"[A-Z][A-Z0-9]*", lambda name: changes.get(name[0], name[0]), statement)
 
 
 def _names_a_card(entry: dict[str, Any], row: Row) -> bool:
-    """Return whether an entry names a card of the row, or no card at all."""
+    """Return whether an entry of the apparatus names a card of the row, or no card at all."""
     return not entry["cards"] or any(
         set(numbers(entry["cards"].get(program, ""))) & set(numbers(cards))
         for program, cards in row.cards.items()

@@ -1,8 +1,9 @@
 """Decks: the cards of a program as fixed-form FORTRAN, and their runs with a Fortran compiler.
 
-This is a third, independent way from the cards to the results. It shares the card table with the
-edition, and nothing with the Fortran port and the twin. The compiler reads the author's own
-statements and a separate version of LEQT1F (`data/cards/leqt1f.f`).
+This is a third, independent way from the cards to the results, besides the Fortran port and the
+Python twin. It shares the table of cards with the edition, and no code with the port and the twin.
+The compiler reads the author's own statements and a separate version of LEQT1F, the linear solver
+(`data/cards/leqt1f.f`).
 """
 
 import re
@@ -23,7 +24,7 @@ from pyharness.original.cards import deck, numbers
 
 DIALECTS = ("1982", "gfortran", "ftn")
 SYSTEMS = ("nos", "nosbe")
-MODELS = (3, 5)  # terms of the models that V.2 used in Case 6, whose programs are not printed
+MODELS = (3, 5)  # terms of the models that V.2 used in Case 6; the thesis has no decks of them
 COMPILER = "gfortran"
 # REAL is binary64, variables are 0 until they are set, and no operations are fused.
 FLAGS = (
@@ -35,7 +36,7 @@ _MARK = "+"
 
 
 class Run(NamedTuple):
-    """The output of a compiled deck.
+    """The output of a compiled deck: the contents of its two files, TAPE5 and TAPE6.
 
     Attributes
     ----------
@@ -60,18 +61,19 @@ def deck_text(
     Parameters
     ----------
     listing : Listing
-        The program, its defects and readings.
+        The program, its active defects and readings.
     scene : Scene, optional
         A case of Table 1, which is set by the deck's own assignment cards and DO limit. By default
-        it is the printed case: Case 2 with 300 steps in the collocation decks, Case 5 with 100
-        steps in the Runge-Kutta deck.
+        it is the case on the published cards: Case 2 with 300 steps in the collocation decks,
+        Case 5 with 100 steps in the Runge-Kutta deck.
     dialect : {"1982", "gfortran", "ftn"}
-        "1982" is the text itself. "ftn", for the compiler for which the decks were written, adds
-        only the torque of Case 7. "gfortran" adds that torque and what a modern compiler needs.
+        "1982" is the text of the cards itself. "ftn", for the compiler for which the decks were
+        written, adds only the torque of Case 7. "gfortran" adds the torque of Case 7 and the
+        changes that a modern compiler needs.
         Column 73 marks each card that a dialect adds or replaces.
     terms : int, optional
-        Number of terms, 3 or 5, of a model that is not printed. Its deck is derived from the
-        four-term deck, and is a conjecture.
+        Number of terms, 3 or 5, of a collocation model whose deck the thesis does not print. The
+        deck is derived from the four-term deck, and is a conjecture.
 
     Raises
     ------
@@ -104,9 +106,9 @@ def deck_text(
 
 
 def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
-    """Return a batch job that compiles and runs a deck with FTN.
+    """Return the text of a batch job that compiles and runs a deck with FTN, CDC's compiler.
 
-    The job includes our LEQT1F if the deck calls it.
+    The job includes our version of LEQT1F, the linear solver, if the deck calls LEQT1F.
 
     Parameters
     ----------
@@ -136,7 +138,10 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
 def _is_made(
     alteration: Mapping[str, Any], listing: Listing, dialect: str, case: int | None
 ) -> bool:
-    """Return whether all conditions of an alteration hold for the listing, dialect and case."""
+    """Return whether all conditions of an alteration of cards hold for a listing and a dialect.
+
+    `case` is the number of the case of Table 1, or None for the case on the published cards.
+    """
     named = alteration.get
     return (
         named("program") == listing.program
@@ -161,17 +166,18 @@ def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
 
 
 def model_cards(terms: int) -> dict[int, str]:
-    """Return the cards of a collocation deck with `terms` terms, modelled on the four-term deck.
+    """Return the text of each card, by new card number, of a collocation deck with `terms` terms.
 
-    The cards are a conjecture: V.2 used the three- and five-term models in Case 6, but they are not
-    printed. With n terms the points are k/(n+1) of the interval. All cards are renumbered.
+    The cards are modelled on the four-term deck. They are a conjecture, because V.2 used the three-
+    and five-term models in Case 6, but the thesis does not print their decks. With n terms the
+    collocation points are k/(n+1) of the interval, k = 1 to n.
     """
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
     end = f"T{terms + 1}"
 
     def made(start: str, last: str, new: list[str]) -> None:
-        """Replace the cards from the text `start` to the text `last` by new ones."""
+        """Replace the cards from the one with text `start` to the one with text `last` by `new`."""
         first = next(n for n, each in enumerate(text) if each.strip() == start)
         after = next(n for n in range(first, len(text)) if text[n].strip() == last)
         text[first : after + 1] = [f"      {each}" for each in new]
@@ -267,24 +273,24 @@ def _literal(value: float) -> str:
 
 
 def solver_cards() -> int:
-    """Return the number of cards of our LEQT1F, without comments."""
+    """Return the number of cards in our version of LEQT1F, without comments."""
     return sum(not line.startswith("C") for line in _SOLVER.read_text().splitlines())
 
 
 def compiler() -> str | None:
-    """Return the path of the Fortran compiler; None if it is not installed."""
+    """Return the path of the Fortran compiler gfortran; None if it is not installed."""
     return shutil.which(COMPILER)
 
 
 def run_deck(text: str, folder: Path | None = None) -> Run:
-    """Compile a deck in the dialect `gfortran` and run it.
+    """Compile a deck in the dialect `gfortran`, run it, and return what it wrote.
 
     Parameters
     ----------
     text : str
-        The deck.
+        The deck, as `deck_text` returns it.
     folder : Path, optional
-        A folder that keeps the compiled solver, as in `solver_object`. By default each call
+        A folder that keeps the compiled solver LEQT1F, as in `solver_object`. By default each call
         compiles the solver again.
 
     Raises
@@ -302,7 +308,7 @@ def run_deck(text: str, folder: Path | None = None) -> Run:
 
 
 def solver_object(folder: Path) -> Path:
-    """Return the path of the compiled LEQT1F in a folder; compile it if it is missing."""
+    """Return the path of the compiled solver LEQT1F in `folder`; compile it if it is missing."""
     found = folder / "leqt1f.o"
     if not found.exists():
         _command([COMPILER, *FLAGS, "-c", str(_SOLVER), "-o", str(found)], folder)
@@ -316,7 +322,10 @@ def _command(words: list[str], folder: Path) -> None:
 
 
 def _records(path: Path) -> np.ndarray:
-    """Return the records of an unformatted file: 7 numbers each, between two record lengths."""
+    """Return the records of the unformatted file TAPE5 as an array of shape (n, 7).
+
+    Each record is 7 numbers between two copies of the record's length.
+    """
     record = np.dtype([("begin", "i4"), ("values", "f8", 7), ("end", "i4")])
     return np.fromfile(path, dtype=record)["values"]
 

@@ -1,4 +1,4 @@
-"""Right-hand sides, and the record of a run, which the three twins share."""
+"""Right-hand sides, and the record of a run, which the Python twins of all programs share."""
 
 from collections.abc import Sequence
 
@@ -14,13 +14,21 @@ Vector = Sequence[float]
 
 
 def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
-    """Return F, G, H of equations 16-18 (rad/s2) at the angular velocity `u` (rad/s)."""
+    """Return F, G, H of equations 16-18, the rates of change of omega (rad/s2).
+
+    `coefficients` is A, B, C of Euler's equations, `m` the torque over the moment of inertia about
+    each axis (1/s2), and `u` the angular velocity omega (rad/s).
+    """
     a, b, c = coefficients
     return [m[0] + a * u[1] * u[2], m[1] + b * u[0] * u[2], m[2] + c * u[0] * u[1]]
 
 
 def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
-    """Return F/m - omega x V in body axes (m/s2)."""
+    """Return F/m - omega x V, the rate of change of the translational velocity (m/s2).
+
+    `acceleration` is the force over the mass F/m (m/s2), `u` the angular velocity omega (rad/s) and
+    `v` the velocity V (m/s), all along the body axes.
+    """
     return [
         acceleration[0] + v[1] * u[2] - v[2] * u[1],
         acceleration[1] + v[2] * u[0] - v[0] * u[2],
@@ -29,18 +37,20 @@ def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
 
 
 def accelerations(scene: Scene, listing: Listing) -> list[float]:
-    """Return the force over the mass along each axis (m/s2).
+    """Return the force over the mass along each body axis (m/s2).
 
-    Without the defect `three-masses` the first mass is used for all axes.
+    With the defect `three-masses` in `listing`, each axis has its own mass. Without the defect the
+    first mass is used for all axes.
     """
     masses = scene.masses if listing.has("three-masses") else scene.masses[:1] * 3
     return [force / mass for force, mass in zip(scene.forces, masses, strict=True)]
 
 
 def initial_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque of a case in Table 1 over the moments (1/s2); None if it has none.
+    """Return the initial torque of a scene over its moments (1/s2), or None.
 
-    Under the conjecture `initial-torque` this torque acts over the first step.
+    It is None if the scene has no moments or is not a case of Table 1 with an initial torque. Under
+    the conjecture `initial-torque` this torque acts over the first step.
     """
     given = card_torque(scene)
     if given is None or scene.moments is None:
@@ -49,28 +59,38 @@ def initial_torque(scene: Scene) -> Vector | None:
 
 
 def card_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque of a case in Table 1 (N m); None if it has none."""
+    """Return the initial torque (N m) that the thesis gives for a scene's case of Table 1.
+
+    It is None if the scene is no such case, or if its case has no initial torque.
+    """
     given = {each["case"]: each["torque"] for each in facts("printer")["initial_torque"]}
     return given.get(scene.case)
 
 
 def all_finite(values: Vector) -> bool:
-    """Return whether no value is NaN or infinite."""
+    """Return whether all values are finite: none is NaN or infinite."""
     return all(map(is_finite, values))
 
 
 class Record:
-    """The rows of a run, collected step by step, from which a trajectory is made."""
+    """The rows of a twin's run, collected step by step, from which a trajectory is made."""
 
     def __init__(self, scene: Scene, evaluations_per_step: int) -> None:
-        """Start with no rows; each step evaluates `evaluations_per_step` right-hand sides."""
+        """Start without rows.
+
+        `evaluations_per_step` is how often a step evaluates the right-hand sides.
+        """
         self._step_size = scene.step_size
         self._per_step = evaluations_per_step
         self._rows: list[list[float]] = []
         self._ier: list[int] = []
 
     def add(self, recorded_time: float, omega: Vector, velocity: Vector, ier: int = 0) -> None:
-        """Add the row of the next step."""
+        """Add the row of the next step.
+
+        `recorded_time` is TIME (s) as the program computes it. `ier` is the error code of the
+        linear solver in that step.
+        """
         true_time = (len(self._rows) + 1) * self._step_size
         self._rows.append([true_time, recorded_time, *omega, *velocity])
         self._ier.append(ier)
@@ -78,9 +98,11 @@ class Record:
     def trajectory(
         self, ended: str = "complete", stop: Stop | None = None, prints_ier: bool = True
     ) -> Trajectory:
-        """Return the trajectory of all rows.
+        """Return the trajectory of all rows that were added.
 
-        A step that overflows counts among the evaluations, but has no row.
+        `ended` says how the run ended, and `stop` what the stop test found if the test ended it.
+        `prints_ier` says whether the program prints IER, so that the trajectory has it. A step that
+        overflows counts among the evaluations, but has no row.
         """
         given = np.array(self._rows).reshape(-1, 8)
         rows = given.astype(np.float64)

@@ -1,4 +1,4 @@
-"""Runs of a program's twin in a word, which is a floating-point format of `word.py`."""
+"""Runs of a program's Python twin in a word, which is a floating-point format of `word.py`."""
 
 import copy
 import importlib
@@ -17,10 +17,10 @@ Of = TypeVar("Of", Scene, TorqueLaw)
 def run(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the twin of a listing's program in a word; the parameters are those of `run_program`.
+    """Run the Python twin of a listing's program in a word, which is a floating-point format.
 
-    The arguments are not checked. The trajectory has the nearest floats, and in `exact` the numbers
-    of the word themselves.
+    The other parameters are those of `run_program`; no argument is checked. The trajectory has the
+    floats that are nearest to the results, and in `exact` the results as numbers of the word.
     """
     twin = importlib.import_module(f"pyharness.original.{listing.program.replace('-', '_')}")
     found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)
@@ -30,7 +30,10 @@ def run(
 
 
 def scene_in(scene: Scene, word: Word) -> Scene:
-    """Return a checked scene with all its numbers, except counts, converted to a word."""
+    """Return a copy of `scene` with all its numbers, except counts, converted to a word.
+
+    The scene must have been checked, because the copy is not.
+    """
     law = scene.torque
 
     def those(values: Any) -> Any:
@@ -52,7 +55,10 @@ def scene_in(scene: Scene, word: Word) -> Scene:
 
 
 def _with(frozen: Of, **fields: Any) -> Of:
-    """Return a copy with other fields, without the checks, which would convert them to floats."""
+    """Return a copy of a frozen dataclass with the values `fields` in place of its own.
+
+    The checks of the dataclass are skipped, because they would convert the values to floats.
+    """
     changed = copy.copy(frozen)
     vars(changed).update(fields)
     return changed

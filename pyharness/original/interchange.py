@@ -1,4 +1,4 @@
-"""Conversions of numbers of a word of IEEE 754 to bytes of its interchange format, and back.
+"""Conversions between numbers of an IEEE 754 word and the bytes of its interchange format.
 
 The bytes are in this machine's order, as the compiled programs take and return them.
 """
@@ -18,12 +18,15 @@ _BITS = {24: 32, 53: 64, 113: 128}
 
 
 def n_bytes(word: Word) -> int:
-    """Return the number of bytes of a number; its word is binary32, binary64 or binary128."""
+    """Return how many bytes a number of `word` has; `word` is binary32, binary64 or binary128."""
     return _BITS[word.p] // 8
 
 
 def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
-    """Return numbers of a word as bytes, shape (n_bytes(word), *shape), in column-major order."""
+    """Return numbers of a word as an array of bytes, in column-major order.
+
+    `shape` is the shape of the array of numbers. The result has the shape (n_bytes(word), *shape).
+    """
     size = n_bytes(word)
     written = b"".join(_pattern(each).to_bytes(size, sys.byteorder) for each in numbers)
     # A copy, because memory that NumPy allocates is aligned for any number.
@@ -31,7 +34,10 @@ def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
 
 
 def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
-    """Return the numbers of an array whose first axis runs over the bytes of a number."""
+    """Return the numbers of `word` that `given`, an array made by `to_bytes`, represents.
+
+    The first axis of `given` runs over the bytes of a number. The result has the other axes.
+    """
     size = n_bytes(word)
     written = given.tobytes(order="F")
     found = np.empty(len(written) // size, dtype=object)
@@ -42,7 +48,7 @@ def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
 
 
 def _pattern(x: Number) -> int:
-    """Return the sign, the biased exponent and the fraction of a number as one integer."""
+    """Return the bits of a number in its interchange format (sign, exponent, fraction)."""
     p = x.word.p
     places, most = p - 1, (1 << _BITS[p] - p) - 1
     if x.m:

@@ -1,6 +1,6 @@
 """A replacement for LEQT1F of the IMSL library, which solves A X = B for several right-hand sides.
 
-It computes LU factors in Crout's order, with implicit row scaling and partial pivoting.
+This solver computes LU factors in Crout's order, with implicit row scaling and partial pivoting.
 """
 
 SINGULAR = 129
@@ -9,10 +9,11 @@ SINGULAR = 129
 def leqt1f(
     matrix: list[list[float]], right_hand_sides: list[list[float]]
 ) -> tuple[list[list[float]], int]:
-    """Return the solution x of A x = b for every b, and IER; A and every b stay unchanged.
+    """Return the solutions x of A x = b for all right-hand sides b, and the error code IER.
 
-    If A is algorithmically singular, IER is `SINGULAR`, and every b is returned as it is. Otherwise
-    IER is 0.
+    `matrix` is the rows of A, and `right_hand_sides` is a list of vectors b; both stay unchanged.
+    If A is algorithmically singular, IER is `SINGULAR`, and every b is returned instead of its x.
+    Otherwise IER is 0.
     """
     factors = [list(row) for row in matrix]
     pivots = _factor(factors)
@@ -22,7 +23,11 @@ def leqt1f(
 
 
 def _factor(a: list[list[float]]) -> list[int] | None:
-    """Overwrite `a` by its factors; return the row exchanged at each column, None if singular."""
+    """Overwrite `a`, the rows of a matrix, by its LU factors, and return the pivot rows.
+
+    They are, for each column, the index of the row that was exchanged with the row of the diagonal.
+    The result is None if the matrix is singular.
+    """
     n = len(a)
     pivots = []
     scale = []
@@ -39,7 +44,8 @@ def _factor(a: list[list[float]]) -> list[int] | None:
                 total = total - row[k] * a[k][j]
             row[j] = total
 
-        # Elements on and below the diagonal are candidates for the pivot; of equal ones the first.
+        # Elements on and below the diagonal are candidates for the pivot. The first one is taken if
+        # several have the same scaled magnitude.
         biggest = 0.0
         pivot = j
         for i in range(j, n):
@@ -60,7 +66,10 @@ def _factor(a: list[list[float]]) -> list[int] | None:
 
 
 def _substitute(a: list[list[float]], pivots: list[int], b: list[float]) -> list[float]:
-    """Return the solution by forward substitution in L, then backward substitution in U."""
+    """Return the solution for the right-hand side `b`, by forward and backward substitution.
+
+    `a` is the LU factors and `pivots` the row exchanges that `_factor` made.
+    """
     n = len(a)
     x = list(b)
     for i, row in enumerate(a):

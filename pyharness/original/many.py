@@ -46,11 +46,12 @@ class ProgramEnsemble(BatchResult):
     omega : ndarray, shape (n, m, 3)
         Angular velocity about the body axes, rad/s.
     status : ndarray of int8, shape (n,)
-        The code COMPLETE, STOPPED or OVERFLOW of `pyharness.model.codes.Statuses` for each body.
+        How the run of each body ended: the integer COMPLETE, STOPPED or OVERFLOW of
+        `pyharness.model.codes.Statuses`.
     at : ndarray of int, shape (m,)
-        The steps of these rows, counted from 1.
+        The steps to which the m rows belong, counted from 1.
     velocity : ndarray, shape (n, m, 3), or None
-        Velocity along the body axes, m/s.
+        Translational velocity along the body axes, m/s; None if it was not requested.
     recorded_time : ndarray, shape (m,), or (n, m) where the step sizes differ
         The TIME that the program writes to TAPE5, s. A single row for all bodies has NaN at a step
         that no body reached.
@@ -60,10 +61,11 @@ class ProgramEnsemble(BatchResult):
         The variable by which the stop test ended a run: 1-3 for U1-U3, 4-6 for V1-V3, 7 for the
         norm of U, 8 for the norm of U and V; 0 if the test did not end the run.
     stop_quotient : ndarray, shape (n,)
-        The change of K over the change of U (1/s) if the stop test ended a run, infinite if U did
-        not change; NaN if the test did not end the run.
+        If the stop test ended a run, the change of the right-hand sides K over the change of the
+        unknowns U (1/s), infinite if U did not change. NaN if the test did not end the run.
     ier : ndarray of int32, shape (n, m), or None
-        IER as the collocation programs print it; None for the Runge-Kutta program.
+        The error code IER of the linear solver, as the collocation programs print it; None for the
+        Runge-Kutta program.
     """
 
     at: NDArray[np.int32]
@@ -99,7 +101,7 @@ def run_many(
     Parameters
     ----------
     scene : Scene
-        The scene that supplies what no array supplies.
+        The scene that supplies every value for which no array is specified.
     listing : Listing
         The program, its active defects and readings.
     omega0, moments, coefficients, torque_constant : array_like, shape (n, 3) or (3,), optional
@@ -111,7 +113,7 @@ def run_many(
     may_stop : bool
         Whether the stop test, which only the Runge-Kutta program has, may end runs.
     velocity : bool
-        Whether to return the velocities.
+        Whether to return the translational velocities.
     at : sequence of int, optional
         The steps whose rows are returned, counted from 1, in any order; by default the last step.
     threads : int
@@ -194,7 +196,11 @@ def _run(
     scene: Scene, listing: Listing, by_moments: bool, inputs: dict[str, Array], n: int,
     wanted: NDArray[np.int32], may_stop: bool, velocity: bool, threads: int,
 ) -> ProgramEnsemble:  # fmt: skip
-    """Run the program with checked arguments."""
+    """Run the program of `run_many` for n bodies, with arguments that have been checked.
+
+    `by_moments` says whether ``inputs["body"]`` has moments or coefficients. `wanted` is the steps
+    whose rows are returned.
+    """
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
     body, omega, constant, first, step_size, lipschitz = (
@@ -244,7 +250,11 @@ def _run(
 
 
 def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
-    """Yield the bodies of each kernel call: all of them for one thread, else some whole blocks."""
+    """Yield the range of bodies for each call of the kernel.
+
+    One thread takes all n bodies in one call. For several threads the calls are shorter, and each
+    but the last has a multiple of the number of bodies that the kernel processes side by side.
+    """
     size = n
     if threads > 1:
         fair = -(-n // (_PIECES * threads))
@@ -255,7 +265,7 @@ def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
 
 
 def _check_ends(step_size: Array, steps: int) -> None:
-    """Raise InputError if a step size times the number of steps is not finite."""
+    """Raise InputError if a body's step size (s) times the number of steps is not finite."""
     with np.errstate(over="ignore"):
         ends = np.isfinite(step_size * steps)
     if not ends.all():
@@ -266,7 +276,10 @@ def _check_ends(step_size: Array, steps: int) -> None:
 
 
 def _steps(at: Sequence[SupportsIndex] | None, steps: int) -> NDArray[np.int32]:
-    """Return the requested steps; raise InputError if one of them is out of range."""
+    """Return the steps `at` whose rows were requested; by default only the last of `steps` steps.
+
+    Raise InputError if a requested step is not from 1 to `steps`.
+    """
     if at is None:
         return np.array([steps], dtype=np.int32)
     found = [integer("at", each) for each in number_list("at", at, "allowed: a list of steps")]

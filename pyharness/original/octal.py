@@ -1,8 +1,8 @@
-"""CDC words in octal, and the results of CDC instructions on them.
+"""Numbers of a CDC machine, written in octal, and the results of CDC instructions on them.
 
-A word has 60 bits: an exponent field of 12, of which 11 are used, and a coefficient of 48. All bits
-of a negative word are complemented. The exponent is the field minus 2000 (octal), plus one if that
-difference is below zero.
+A CDC word has 60 bits: an exponent field of 12 bits, of which the lower 11 hold the exponent, and a
+coefficient of 48 bits. All 60 bits of a negative number are complemented. The exponent is the field
+minus 2000 (octal), plus one if the field is below 2000.
 """
 
 import math
@@ -25,9 +25,11 @@ _INSTRUCTIONS = tuple(
 
 
 def from_octal(text: str) -> Pair:
-    """Return the number that a word represents; all bits zero, or all one, represent zero.
+    """Return the number m 2**e that a CDC word represents, as the pair (m, e).
 
-    Raise InputError if the text is not 20 octal digits, or if the coefficient is not normalised.
+    `text` is the 60-bit word as 20 octal digits; blanks are ignored. A word whose bits are all zero
+    or all one is zero. For zero, infinity and nan, m is 0 and e is the value as a float. Raise
+    InputError if the text is not 20 octal digits, or if the coefficient is not normalised.
     """
     digits = "".join(text.split()) if isinstance(text, str) else ""
     if not _WORD.fullmatch(digits):
@@ -47,7 +49,10 @@ def from_octal(text: str) -> Pair:
 
 
 def to_octal(number: Pair) -> str:
-    """Return the word of a number with 48 bits, in groups of four octal digits."""
+    """Return the CDC word of a number, as 20 octal digits in groups of four.
+
+    `number` is a pair (m, e) as `from_octal` returns it, with a coefficient m of 48 bits.
+    """
     m, e = number
     if m:
         return _written(m < 0, e, abs(m))
@@ -58,10 +63,11 @@ def to_octal(number: Pair) -> str:
 
 
 def operated(name: str, x: str, y: str) -> str:
-    """Return the result of a CDC instruction on the words `x` and `y`, all in octal.
+    """Return the result of a CDC instruction on the CDC words `x` and `y`, all in octal.
 
-    A sum without NX is not normalised. Raise InputError if the instruction is unknown, or if `x` or
-    `y` is not a word.
+    `name` is an operation of two registers: F (truncating) or R (rounding), X, and an operator, as
+    in ``FX*``. A sum or difference is normalised only with NX, as in ``RX+ NX``. Raise InputError
+    if the instruction is unknown, or if `x` or `y` is not a CDC word.
     """
     if name not in _INSTRUCTIONS:
         raise unknown("instruction", name, _INSTRUCTIONS)

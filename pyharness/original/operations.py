@@ -1,8 +1,9 @@
-"""Counts of the floating-point operations of a step, made on the cards themselves.
+"""Counts of the floating-point operations of a program's step, made on the cards themselves.
 
 The statements of a deck are interpreted as the author wrote them, on numbers that count the
-operations applied to them. LEQT1F is our own, because its source is not published. `T**2` is one
-multiplication, `T**3` and `T**4` are two. Subscripts, jumps, ABS and WRITE are not counted.
+operations applied to them. The linear solver LEQT1F is our own version, because the original source
+is not published. `T**2` counts as one multiplication, `T**3` and `T**4` count as two. Subscripts,
+jumps, ABS and WRITE are not counted.
 """
 
 import re
@@ -23,14 +24,15 @@ _TARGET = re.compile(r"(\w+?)(?:\(([\w,]+)\))?=(.*)")
 
 
 class Count(NamedTuple):
-    """The number of additions, multiplications and divisions of a step.
+    """The number of additions, subtractions, multiplications and divisions of a step.
 
     Attributes
     ----------
     written : int
-        All operations that the cards perform.
+        The number of all operations that the cards perform.
     once : int
-        Distinct operations: one that repeats an earlier operation of the same step is not counted.
+        The number of distinct operations. An operation that repeats an earlier one of the same step
+        on the same operands is not counted.
     """
 
     written: int
@@ -38,7 +40,7 @@ class Count(NamedTuple):
 
 
 class _Counter:
-    """A counter of operations, which keeps the result of each distinct operation."""
+    """A counter of the operations of a step, which keeps the result of each distinct operation."""
 
     def __init__(self) -> None:
         self.written = 0
@@ -64,7 +66,11 @@ def _value(x: Any) -> float:
 
 
 class _Number:
-    """A value that counts its operations; its object identity tells how it was computed."""
+    """A floating-point value whose operations are counted by its counter.
+
+    The same operation on the same operands returns the same object, so that the identity of the
+    object tells how the value was computed.
+    """
 
     def __init__(self, counter: _Counter, value: float) -> None:
         self.counter, self.value = counter, value
@@ -120,7 +126,10 @@ class _Array(defaultdict[tuple[int, ...], Any]):
 
 
 def operations_per_step(listing: Listing) -> Count:
-    """Return the operation counts of a program's first step, in the case that its deck prints."""
+    """Return the operation counts of a program's first step.
+
+    The step is the first one of the case on the published cards of the program's deck.
+    """
     statements = list(_statements(deck_text(listing)))
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))
     label = _DO.match(statements[begin][1])
@@ -138,7 +147,10 @@ def operations_per_step(listing: Listing) -> Count:
 
 
 def _moved(value: Any, counter: _Counter) -> Any:
-    """Return a value from before the step with its numbers attached to the step's counter."""
+    """Return a value that was computed before the step, attached to the counter of the step.
+
+    `value` is a number or an array of numbers; anything else is returned unchanged.
+    """
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}
         return _Array(lambda: _Number(counter, 0.0), moved)
@@ -146,7 +158,7 @@ def _moved(value: Any, counter: _Counter) -> Any:
 
 
 def _statements(text: str) -> Iterator[tuple[str, str]]:
-    """Return the label and the text, without blanks, of every statement of a deck."""
+    """Return the label and the text of every statement of a deck, both without blanks."""
     found: list[list[str]] = []
     for line in text.splitlines():
         label, goes_on, rest = line[:5].strip(), line[5], "".join(line[6:72].split())

@@ -2,8 +2,8 @@
 
 The page is what appeared on paper, without the first character of each record, which is the
 carriage control. That character is always a blank (`data/printer.toml` has the FORMATs, and marks
-what is conjecture). A library writes the FORMATs. Two cases are treated here: zero, and values that
-are not finite.
+what is conjecture). The library `fortranformat` writes the values by the FORMATs. Two kinds of
+value are treated here: zero, and values that are not finite.
 """
 
 import math
@@ -29,10 +29,11 @@ _PLACES = re.compile(r"F\d+\.(\d+)")
 
 
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
-    """Return the page of a program, written by its FORMATs, without trailing blanks.
+    """Return the text that `program` prints for its run, written by the program's FORMATs.
 
-    The header has the scene's torques and moments; the scene must have moments. One line for each
-    row follows. If the stop test ended the run, the last line is the row of that step.
+    The header has the scene's moments and torques; the scene must have moments. One line for each
+    row of `trajectory`, the run's results, follows. If the stop test ended the run, the last line
+    is the row of the step that failed the test. Lines have no trailing blanks.
     """
     formats = formats_of(program)
     assert scene.moments is not None
@@ -48,7 +49,11 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
 
 
 def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
-    """Return omega and velocity; for another word, as floats that print like its numbers."""
+    """Return omega (rad/s) and velocity (m/s) of each row of a trajectory, as six floats.
+
+    If the run had another arithmetic than binary64, its numbers are rounded to the decimals of
+    `form`, the FORMAT of the rows, so that the floats print like those numbers.
+    """
     if trajectory.exact is None:
         assert trajectory.velocity is not None
         return np.hstack([trajectory.omega, trajectory.velocity]).tolist()  # type: ignore[no-any-return]
@@ -57,7 +62,10 @@ def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
 
 
 def _to_places(x: Any, places: int) -> float:
-    """Return a number of any word to `places` decimals, with ties away from zero as for floats."""
+    """Return the number `x` rounded to `places` decimals, with ties away from zero.
+
+    `x` is a float or a `Number` of a word. A number that is not finite becomes nan.
+    """
     if not is_finite(x):
         return math.nan
     value = Fraction(x) if isinstance(x, float) else x.fraction()
@@ -69,7 +77,10 @@ def _to_places(x: Any, places: int) -> float:
 
 
 def formats_of(program: str) -> dict[str, Any]:
-    """Return the FORMATs of a program, with notes on what in them is certain or conjecture."""
+    """Return the FORMATs of a program, by the keys ``header``, ``heads`` and ``rows``.
+
+    Further keys name the cards, and say which characters are certain and which are conjecture.
+    """
     formats: dict[str, dict[str, Any]] = {
         each["name"]: each for each in facts("printer")["program"]
     }
@@ -77,14 +88,21 @@ def formats_of(program: str) -> dict[str, Any]:
 
 
 def _torque_cards(scene: Scene) -> tuple[float, float, float]:
-    """Return the torques on the cards of the deck; no card has a torque that varies with time."""
+    """Return the three torques (N m) that the cards of the deck hold for a scene.
+
+    They are the initial torques of a case that has them, because no card has a torque that varies
+    with time. For any other scene they are its constant torques.
+    """
     cards = {entry["case"]: entry["torque"] for entry in facts("printer")["initial_torque"]}
     first, second, third = cards.get(scene.case, scene.torque.constant)
     return first, second, third
 
 
 def write(text: str, values: Sequence[float]) -> list[str]:
-    """Return the records of one WRITE with a FORMAT, including the carriage control."""
+    """Return the records that a WRITE of `values` by the FORMAT `text` makes.
+
+    Each record begins with its carriage control.
+    """
     printed: str = _writer(text).write([x if math.isfinite(x) else _TOO_WIDE for x in values])
     return [_MINUS_ZERO.sub(r" \1", record) for record in printed.split("\n")]
 

@@ -20,9 +20,10 @@ WORD_NAMES = (*COMPILED_WORDS, "cdc48", "cdc48-rounded")
 
 @dataclass(frozen=True)
 class Program:
-    """A program from the appendix.
+    """A program from the appendix of the thesis.
 
-    After correction its global error is O(h**order), where h is the step size.
+    Its corrected version has a global error of O(h**order), where h is the step size. `source`
+    names the equation and the sections of the thesis that describe the program.
     """
 
     name: str
@@ -40,7 +41,9 @@ class Program:
         effort: float = 1.0,
         word: str = BINARY64,
     ) -> Trajectory:
-        """Run a listing of this program, with the parameters and errors of `run_program`.
+        """Run a listing of this program and return its trajectory.
+
+        The parameters, the result and the errors are those of the function `run_program`.
 
         Raise InputError if the listing belongs to another program.
         """
@@ -66,7 +69,7 @@ class Program:
     def _computed(
         self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
-        """Run the program in binary64 with checked arguments.
+        """Run the program in binary64, with arguments that have been checked.
 
         `options` are `lipschitz`, `may_stop` and `velocity`, as in `run`.
         """
@@ -79,17 +82,21 @@ class Program:
 
 
 def work_of(word: str, implementation: str) -> str:
-    """Return the key of the work limit in `check_steps` for a word and an implementation."""
+    """Return the key by which `check_steps` finds the work limit of a program.
+
+    `word` is the arithmetic, and `implementation` is ``fortran`` or ``python``.
+    """
     if word == BINARY64:
         return implementation
     return "another word" if implementation == "python" else word
 
 
 def checked_word(word: object, implementation: str) -> str:
-    """Return the name of a word.
+    """Return `word` if it is the name of an arithmetic in which the implementation can run.
 
-    Raise InputError if the word is unknown, or if the compiled programs do not support it and the
-    implementation is Fortran.
+    `implementation` is ``fortran``, the compiled programs, or ``python``, the twins. Raise
+    InputError if the name is unknown, or if the compiled programs are to run in an arithmetic that
+    they do not support.
     """
     if not isinstance(word, str) or word not in WORD_NAMES:
         raise unknown("word", word, WORD_NAMES, "--word")
@@ -134,20 +141,20 @@ def run_program(
     may_stop : bool
         Whether the stop test may end the run.
     velocity : bool
-        Whether the velocity is needed. If False, the compiled program computes the velocity only if
-        the stop test reads it, and does not return it. No other result depends on this.
+        Whether the translational velocity is needed. If False, the compiled program computes it
+        only if the stop test reads it, and does not return it. No other result depends on this.
     effort : float
         Factor on the work limit, which counts the steps and, for each step, the waves of the
         torque.
     word : str
-        The arithmetic, one of `pyharness.original.programs.WORD_NAMES`. Those that are not in
-        `COMPILED_WORDS` need `implementation="python"`.
+        The arithmetic, one of `pyharness.original.programs.WORD_NAMES`. An arithmetic that is not
+        in `COMPILED_WORDS` there needs `implementation="python"`.
 
     Returns
     -------
     Trajectory
-        One row for each step, up to a stop or an overflow. In a word other than binary64, `exact`
-        has the numbers of the word.
+        One row for each step, up to a stop or an overflow. In an arithmetic other than binary64,
+        `exact` has the numbers as that arithmetic represents them.
 
     Raises
     ------

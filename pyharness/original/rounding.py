@@ -1,12 +1,12 @@
-"""Rounding rules: the sum, the product and the quotient of two numbers of a word.
+"""Rounding rules: the sum, the product and the quotient of two numbers of a floating-point format.
 
 A number is a pair (m, e) of integers with the value m 2**e. m has p bits, or fewer for a subnormal
-number. If m is 0, e is the float that the pair represents: 0.0, -0.0, inf, -inf or nan. An
-`Operation` takes none of these, but may return them.
+number. If m is 0, e is the float that the pair represents: 0.0, -0.0, inf, -inf or nan. The
+operands of an `Operation` must have m other than 0, but its result may have m = 0.
 
-No library of software floating point has all these rules. mpmath and gmpy2 round correctly and have
-no exponent range of their own. SoftFloat and numpy have only the formats of IEEE 754. None has the
-CDC's (`cdc.py`).
+No library of software floating point has all the rules that are needed here. mpmath and gmpy2 round
+correctly, but have no limited range of exponents. SoftFloat and numpy have only the formats of
+IEEE 754. No library has the rules of the CDC (`cdc.py`).
 """
 
 import math
@@ -19,20 +19,23 @@ Operation = Callable[[int, int, int, int], Pair]
 
 
 class Rules(NamedTuple):
-    """The arithmetic of a word.
+    """The arithmetic of a word, which is a floating-point format, as functions.
+
+    Each function takes numbers m 2**e as integers m and e, and returns a pair (m, e).
 
     Attributes
     ----------
     nearest : Rounding
-        Rounding to nearest, ties to even, of functions and literals.
+        Rounds to nearest, ties to even; for square roots, sines, cosines and literals.
     cut : Rounding
-        Truncation towards zero, of literals in a word that truncates them.
+        Truncates towards zero; for literals in a word that truncates them.
     add, multiply, divide : Operation
-        Operations on two numbers; a difference is the sum with the negative.
+        Operations on two numbers. A difference is computed as the sum with the negative.
     difference : Operation
-        The sum of a number and the negative of another; the two compare equal if it is zero.
+        The sum with which two numbers are compared, one of them with opposite sign. The two numbers
+        are equal if it is zero.
     signed_zero : bool
-        Whether there is -0.0.
+        Whether the word has -0.0 besides 0.0.
     """
 
     nearest: Rounding
@@ -47,9 +50,10 @@ class Rules(NamedTuple):
 def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Rounding:
     """Return a function that rounds m 2**e to p bits and an exponent from `least` to `most`.
 
-    m may have any length. The function truncates towards zero if `cut`, else it rounds to nearest,
-    ties to even. A value too large becomes infinite. A value too small underflows gradually, as in
-    IEEE 754, if `gradual`, else it becomes zero.
+    The integer m may have any length. The function truncates towards zero if `cut`, else it rounds
+    to nearest, ties to even. A value whose exponent exceeds `most` becomes infinite. A value whose
+    exponent is below `least` underflows gradually, as in IEEE 754, if `gradual`; else it becomes
+    zero.
     """
     shortened = _cut if cut else _to_even
 
@@ -87,10 +91,11 @@ def _to_even(m: int, shift: int) -> int:
 
 
 def ieee(p: int, largest: int, cut: bool) -> Rules:
-    """Return the rules of IEEE 754 for p bits and numbers below 2**(largest + 1).
+    """Return the arithmetic of IEEE 754 for coefficients of p bits and exponents up to `largest`.
 
-    If `cut`, sums, products and quotients are truncated towards zero. A truncated result too large
-    is then infinite, as on machines that truncated; in IEEE 754 it is the largest number.
+    Numbers are below 2**(largest + 1). If `cut`, sums, products and quotients are truncated towards
+    zero, else rounded to nearest. A truncated result that is too large becomes infinite, as on
+    machines that truncated. IEEE 754 would return the largest number.
     """
     least, most = 2 - largest - p, largest - p + 1
     fit = rounding(p, least, most, cut, gradual=True)

@@ -1,7 +1,7 @@
 """Runge-Kutta: the third program of the appendix, Jacobs 1982, eq. 31 and IV.3.
 
-The stop test is the thesis's use of the Lipschitz condition (eq. 19): a run ends when the
-right-hand sides change by more than the constant times the change of the unknowns.
+The stop test is the thesis's use of the Lipschitz condition (eq. 19): a run ends when, within a
+step, the right-hand sides change by more than a constant times the change of the unknowns.
 """
 
 import math
@@ -24,7 +24,10 @@ from pyharness.original.equations import (
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the program; `lipschitz` is in 1/s, and without `may_stop` the stop test is skipped."""
+    """Run a listing of the Runge-Kutta program on a scene, and return its trajectory.
+
+    `lipschitz` is the constant of the stop test (1/s). The test is skipped without `may_stop`.
+    """
     a, b, c = scene.euler_coefficients
     acceleration = accelerations(scene, listing)
     dt = scene.step_size
@@ -101,7 +104,14 @@ def run(
 def lipschitz_test(
     listing: Listing, change_k: Vector, change_u: Vector, lipschitz: float
 ) -> tuple[str, float] | None:
-    """Return the variable that violates the condition of eq. 19 and its quotient, or None."""
+    """Return the variable that violates the condition of eq. 19, and its quotient (1/s), or None.
+
+    `change_k` and `change_u` are the magnitudes of the changes of the six right-hand sides and of
+    the six unknowns within one step. The condition is violated if the change of the right-hand
+    sides exceeds `lipschitz` (1/s) times the change of the unknowns. The two changes are norms, or
+    with the defect `lipschitz-per-component` those of one component after the other. The quotient
+    is the first change over the second, infinite if the second is zero.
+    """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3
     if listing.has("lipschitz-per-component"):

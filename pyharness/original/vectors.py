@@ -1,9 +1,9 @@
 """Test vectors of the CDC's arithmetic: instructions, operands and results, and our own results.
 
 The vectors in `data/words/cdc.json` follow from the rules of the CYBER 170 hardware reference (CDC
-60463560). A public emulator of its floating-point unit gives the same results. Such a file is a
-JSON object with `schema` and `vectors`, a list of objects. Each has `name`, `op` (an instruction of
-`octal.operated`), and `x`, `y` and `result` in octal.
+60463560). A public emulator of that machine's floating-point unit gives the same results. A file of
+test vectors is a JSON object with `schema` and `vectors`, a list of objects. Each object has
+`name`, `op` (an instruction of `octal.operated`), and `x`, `y` and `result` in octal.
 """
 
 import json
@@ -22,7 +22,7 @@ _FIELDS = ("name", "op", "x", "y", "result")
 
 
 class Vector(NamedTuple):
-    """A test vector: its name, an instruction, two operands and the result, as octal words."""
+    """A test vector: name, CDC instruction, two operands and expected result, both in octal."""
 
     name: str
     op: str
@@ -32,21 +32,22 @@ class Vector(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A test vector, and the result that we compute."""
+    """A test vector, and the result of its instruction that we compute (`found`, in octal)."""
 
     vector: Vector
     found: str
 
     @property
     def agrees(self) -> bool:
-        """Return whether our result is the vector's, blanks apart."""
+        """Return whether our result is the expected one; blanks are ignored."""
         return "".join(self.vector.result.split()) == "".join(self.found.split())
 
 
 def answers(path: str | Path = OURS) -> list[Answer]:
-    """Return the test vectors of a file, each with the result that we compute.
+    """Return the test vectors of a JSON file, each with the result that we compute.
 
-    Raise InputError if the file can't be read, does not have the right form, or has no vectors.
+    By default `path` is our own file, `data/words/cdc.json`. Raise InputError if the file can't be
+    read, does not have the right form, or has no vectors.
     """
     content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:

@@ -1,8 +1,8 @@
-"""Words: floating-point formats of p bits with a rounding rule, in which the twins can run.
+"""Words: floating-point formats of p bits with a rounding rule, for runs of the Python twins.
 
 A number of a word behaves like a float: it has operators, comparisons, `abs` and `float`. The other
 operand may be a number of the same word, an integer or a float. A float represents a literal of a
-source: the shortest decimal that is that float, rounded to the nearest number of the word.
+source text: the shortest decimal that has this float as its nearest one is rounded to the word.
 """
 
 import math
@@ -21,9 +21,10 @@ _GUARD_BITS = 40
 
 
 class Number:
-    """An immutable number m 2**e of a word; if m is 0, e is 0.0, -0.0, inf, -inf or nan.
+    """An immutable number of a word, which is a floating-point format: `m` times 2**`e`.
 
-    `Word` makes a subclass for each word.
+    `m` and `e` are integers. If `m` is 0, `e` is instead the float 0.0, -0.0, inf, -inf or nan,
+    which is then the value. `Word` makes a subclass for each word.
     """
 
     __slots__ = ("e", "m")
@@ -31,11 +32,11 @@ class Number:
     rules: ClassVar[Rules]
 
     def __init__(self, m: int, e: Any) -> None:
-        """Store m and e, which must be a number of the word already."""
+        """Store `m` and `e` of a number m 2**e that the word can represent; nothing is rounded."""
         self.m, self.e = m, e
 
     def __add__(self, other: Any) -> "Number":
-        """Return the sum, rounded by the rule of the word."""
+        """Return the sum with `other`, rounded by the rounding rule of the word."""
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -46,7 +47,7 @@ class Number:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> "Number":
-        """Return the difference, which is the sum with the negative."""
+        """Return this number minus `other`, computed as the sum with the negative of `other`."""
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -59,7 +60,7 @@ class Number:
         return self.word(other) - self
 
     def __mul__(self, other: Any) -> "Number":
-        """Return the product, rounded by the rule of the word."""
+        """Return the product with `other`, rounded by the rounding rule of the word."""
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -70,9 +71,9 @@ class Number:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> "Number":
-        """Return the quotient, rounded by the rule of the word.
+        """Return this number over `other`, rounded by the rounding rule of the word.
 
-        Division by zero gives infinity; zero by zero gives nan.
+        A nonzero number over zero is infinite; zero over zero is nan.
         """
         own = self.__class__
         if other.__class__ is not own:
@@ -86,11 +87,11 @@ class Number:
         return self.word(other) / self
 
     def __neg__(self) -> "Number":
-        """Return the negative."""
+        """Return this number with the opposite sign."""
         return self.__class__(-self.m, self.e) if self.m else self._plain(-self.e)
 
     def __abs__(self) -> "Number":
-        """Return the magnitude."""
+        """Return the magnitude of this number."""
         return self.__class__(abs(self.m), self.e if self.m else abs(self.e))
 
     def __bool__(self) -> bool:
@@ -98,9 +99,10 @@ class Number:
         return bool(self.m or self.e)
 
     def __eq__(self, other: object) -> bool:
-        """Return whether the difference is zero.
+        """Return whether the difference from `other`, computed in the word's arithmetic, is zero.
 
-        The difference of two neighbouring numbers of a CDC word can be zero.
+        In a CDC word the computed difference of two neighbouring numbers can be zero. They are then
+        equal.
         """
         x, y = self, self.word(other)
         if x.m and y.m:
@@ -111,23 +113,23 @@ class Number:
     __hash__ = None  # type: ignore[assignment]
 
     def __lt__(self, other: Any) -> bool:
-        """Return whether the exact difference is below zero, for a word of the CDC too."""
+        """Return whether the exact difference, this number minus `other`, is below zero."""
         return self._order(other) < 0
 
     def __gt__(self, other: Any) -> bool:
-        """Return whether the exact difference is above zero."""
+        """Return whether the exact difference, this number minus `other`, is above zero."""
         return self._order(other) > 0
 
     def __le__(self, other: Any) -> bool:
-        """Return whether the exact difference is zero or below; False for nan."""
+        """Return whether this number minus `other` is exactly zero or below; False for nan."""
         return self._order(other) <= 0
 
     def __ge__(self, other: Any) -> bool:
-        """Return whether the exact difference is zero or above; False for nan."""
+        """Return whether this number minus `other` is exactly zero or above; False for nan."""
         return self._order(other) >= 0
 
     def __float__(self) -> float:
-        """Return the nearest float, or infinity beyond the range of floats."""
+        """Return the nearest float; beyond the range of floats, infinity with the same sign."""
         if not self.m:
             return float(self.e)
         try:
@@ -136,7 +138,7 @@ class Number:
             return math.copysign(math.inf, self.m)
 
     def __repr__(self) -> str:
-        """Return the word and the value as text."""
+        """Return the word and the value as text, as in ``Word(48, 'FX')(m * 2**e)``."""
         value = f"{self.m} * 2**{self.e}" if self.m else str(self.e)
         return f"{self.word}({value})"
 
@@ -146,11 +148,14 @@ class Number:
         return bool(self.m) or self.e == 0.0
 
     def fraction(self) -> Fraction:
-        """Return the exact value of a finite number."""
+        """Return the exact value of a finite number as a fraction."""
         return Fraction(self.m) * Fraction(2) ** self.e if self.m else Fraction(self.e)
 
     def sqrt(self) -> "Number":
-        """Return the square root, correctly rounded to nearest, whatever the word's rule."""
+        """Return the square root, correctly rounded to nearest also if the word truncates.
+
+        The root of a number below zero is nan.
+        """
         if self.m <= 0:
             return self._plain(self.e if not self.m and not self.e < 0.0 else math.nan)
         shift = 2 * self.word.p + 4 + (self.e & 1)
@@ -159,11 +164,11 @@ class Number:
         return self.__class__(*self.rules.nearest(root << 1 | rest, (self.e - shift) // 2 - 1))
 
     def sin(self) -> "Number":
-        """Return the sine of an angle (rad), rounded to nearest, whatever the word's rule."""
+        """Return the sine of this number (rad), rounded to nearest also if the word truncates."""
         return self._wave("mpf_sin")
 
     def cos(self) -> "Number":
-        """Return the cosine of an angle (rad), rounded to nearest, whatever the word's rule."""
+        """Return the cosine of this number (rad), rounded to nearest also if the word truncates."""
         return self._wave("mpf_cos")
 
     def _wave(self, name: str) -> "Number":
@@ -178,7 +183,11 @@ class Number:
         return self.__class__(*self.rules.nearest(-int(m) if sign else int(m), e))
 
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
-        """Return the result of an operation with a zero, infinity or nan, as floats have it."""
+        """Return the result of an operation in which an operand is zero, infinite or nan.
+
+        `operation` is the same operation on floats, which decides between zero, infinity and nan.
+        `other` is the second operand.
+        """
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):
             return self if self.m else other  # a zero was added
@@ -189,13 +198,13 @@ class Number:
 
     @property
     def _shadow(self) -> float:
-        """Return a float of the same sign that is zero, infinite or nan if the number is."""
+        """Return a float for `_special`: 1.0 or -1.0, or the number's own zero, infinity or nan."""
         if self.m:
             return 1.0 if self.m > 0 else -1.0
         return float(self.e)
 
     def _order(self, other: Any) -> float:
-        """Return a number with the sign of the exact difference, or nan."""
+        """Return a number with the sign of the exact difference from `other`; nan if one is nan."""
         x, y = self, self.word(other)
         if not (x.m and y.m):
             return 0.0 if x._shadow == y._shadow else x._shadow - y._shadow
@@ -212,11 +221,22 @@ def _quotient(x: float, y: float) -> float:
 class Word:
     """A floating-point format with its arithmetic: p bits, and a rounding rule of `RULES`.
 
-    The exponents of `nearest-even` and `chop` (towards zero) are those of IEEE 754 up to `largest`.
-    By default they are those of binary64 for up to 53 bits, and those of binary128 beyond. The
-    exponents of the CDC's rules, `FX` and `RX`, are those of CDC words. A word is called with a
-    float, an integer, a fraction or the text of a decimal, and returns the nearest `Number`, or
-    with `cut_literals` the next one towards zero.
+    A word is called with a float, an integer, a fraction or the text of a decimal, and returns a
+    `Number` of the word.
+
+    Parameters
+    ----------
+    p : int
+        Number of bits of the coefficient.
+    rule : {"nearest-even", "chop", "FX", "RX"}
+        Rounding to nearest with ties to even; truncation towards zero; or the rules of the CDC's
+        instructions FX, which truncate, and RX, which round.
+    largest : int, optional
+        Largest exponent with `nearest-even` and `chop`: numbers are below 2**(largest + 1), and the
+        smallest exponent follows as in IEEE 754. By default it is the exponent of binary64 for up
+        to 53 bits, and of binary128 beyond. `FX` and `RX` have the exponents of CDC words.
+    cut_literals : bool
+        Whether a value is converted to the next number towards zero, instead of the nearest one.
 
     Raises
     ------
@@ -231,7 +251,7 @@ class Word:
         largest: int | None = None,
         cut_literals: bool = False,
     ) -> None:
-        """Make the class of the word's numbers."""
+        """Select the arithmetic for `p` and `rule`, and make the class of the word's numbers."""
         if rule not in RULES:
             raise unknown("rounding", rule, RULES)
         if p < 4:
@@ -249,13 +269,14 @@ class Word:
         self._literals: dict[float, Number] = {}
 
     def __repr__(self) -> str:
-        """Return the bits and the rule as text."""
+        """Return the number of bits and the rounding rule as text, as in ``Word(48, 'FX')``."""
         return f"Word({self.p}, {self.rule!r})"
 
     def __call__(self, value: Any) -> Number:
-        """Return a value as a number of the word.
+        """Return `value` as a number of the word: the nearest one, unless literals are truncated.
 
-        Raise TypeError if the value is of another type, or a number of another word.
+        `value` is a float, an integer, a fraction, the text of a decimal, or a number of this word.
+        Raise TypeError for any other type, and for a number of another word.
         """
         if isinstance(value, Number) and value.word is self:
             return value

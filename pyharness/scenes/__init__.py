@@ -1,1 +1,1 @@
-"""Random scenes by kind, and transformations of a scene."""
+"""Random scenes of several kinds, extreme scenes, and transformations of a scene."""

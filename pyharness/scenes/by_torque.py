@@ -1,7 +1,7 @@
-"""Random scenes by kind of torque relative to the motion, on which no method was tuned.
+"""Random scenes by kind of torque, on which no method was tuned.
 
-Torques and frequencies are relative to the initial angular velocity, so that each kind has the same
-character in a slow body and in a fast one.
+Torques and frequencies are relative to the initial angular velocity, so that each kind of torque
+has the same character in a slow body and in a fast body.
 """
 
 import math
@@ -13,7 +13,7 @@ from pyharness.model.scene import Scene, TorqueLaw, Triple
 MOST_TURNS = 300.0
 WAVES = {"one wave": 1, "three waves": 3, "ten waves": 10}
 LAWS = ("no torque", "constant torque", "ramp", *WAVES)
-# Ranges of the frequencies relative to the initial |omega|.
+# Ranges of the frequencies of waves, relative to the initial |omega|.
 SPEEDS = {"slow waves": (0.01, 0.1), "matched waves": (0.3, 3.0), "fast waves": (3.0, 10.0)}
 # Moments in an arbitrary unit, from a random generator.
 BODIES: dict[str, Callable[[Random], list[float]]] = {
@@ -29,9 +29,11 @@ BODIES: dict[str, Callable[[Random], list[float]]] = {
 
 
 def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tuple[Scene, float]:
-    """Return a random scene with a kind of `LAWS`, `SPEEDS` and `BODIES`, and a time (s).
+    """Return a random scene, and the time (s) in which its body should make 1 to 300 revolutions.
 
-    In that time the body should make 1 to 300 revolutions. `speed` matters only for waves.
+    `source` is the random generator, and `name` the name of the scene. `law` is the kind of torque,
+    a member of `LAWS`. `speed` is the range of the wave frequencies, a key of `SPEEDS`, and matters
+    only for waves. `body` is the shape of the body, a key of `BODIES`.
     """
     mass = _log(source, 1.0, 50.0)
     moments = [mass * each for each in BODIES[body](source)]
@@ -48,7 +50,7 @@ def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tup
     found, horizon = TorqueLaw(), 2.0 * math.pi * turns / start
     if law in ("constant torque", "ramp"):
         # By the end the torque alone would add `gain` times the initial |omega|. The number of
-        # revolutions follows from the mean.
+        # revolutions follows from the mean |omega|.
         gain = _log(source, 0.1, 30.0)
         constant = law == "constant torque"
         horizon /= 1.0 + gain / (2.0 if constant else 3.0)

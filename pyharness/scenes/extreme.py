@@ -1,7 +1,7 @@
-"""Extreme scenes by suite, each with a name and a time.
+"""Extreme scenes, each with a name and an end time, in named groups that are called suites.
 
-The suites contain motions near the separatrix, bodies near symmetry, bodies of extreme shape, a
-motion in other units of time, and bodies with an attitude. Only Case 6 has a torque.
+The suites contain motions near the separatrix, bodies near symmetry, bodies of extreme shape, one
+motion in many units of time, and bodies with an attitude. Only the scene of Case 6 has a torque.
 """
 
 import math
@@ -16,7 +16,7 @@ from pyharness.scenes.rescaled import scaled
 
 
 class Circumstance(NamedTuple):
-    """A named scene, and the time (s) until which methods are tested on it."""
+    """One named extreme scene, and the time (s) until which methods are tested on it."""
 
     name: str
     scene: Scene
@@ -24,15 +24,18 @@ class Circumstance(NamedTuple):
 
 
 def speed(scene: Scene, largest: float) -> float:
-    """Return a rate (1/s): the largest of |A|, |B|, |C| times `largest`, the largest omega."""
+    """Return the rate (1/s) at which omega of a body without torque may change, relative to omega.
+
+    It is the largest of |A|, |B|, |C| times `largest`, the largest component of omega (rad/s).
+    """
     return max(map(abs, scene.euler_coefficients)) * largest
 
 
 def in_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene with equal steps until `time` (s).
+    """Return the scene with a step size and a number of steps that end at `time` (s).
 
-    A step is .002 radians at the rate of `speed`, unless that takes fewer than 10 or more than
-    20 000 steps.
+    The step size times the rate that `speed` returns is .002, unless this would take fewer than 10
+    or more than 20 000 steps; the number of steps is then 10 or 20 000.
     """
     rate = speed(scene, max(map(abs, scene.omega)))
     count = max(10, min(20_000, math.ceil(rate * abs(time) / 0.002)))
@@ -43,16 +46,20 @@ def _stepped(name: str, scene: Scene, time: float) -> Circumstance:
     return Circumstance(name, in_steps(scene, time), time)
 
 
-# Separatrix. A = C = 1/2 are exact in binary64. A perturbation that is the same about axes 1 and 3
-# is therefore on the separatrix, where the body flips once and never again.
+# Separatrix. A = C = 1/2 are exact in binary64. A perturbation that is equal about axes 1 and 3 is
+# therefore on the separatrix, where the body flips once and never again.
 MIDDLE_AXIS = (6.0, 5.0, 2.0)
 _A, _B = 0.5, 0.8
 _FLIPS = 5
 
 
 def quarter(disturbance: float) -> float:
-    """Return the time (s) until omega2 first vanishes, from omega = (`disturbance`, 1, 0)."""
-    # The quarter period, K(k) over the frequency, by the arithmetic-geometric mean.
+    """Return the time (s) until omega2 first vanishes, for the body with moments `MIDDLE_AXIS`.
+
+    The initial omega is (`disturbance`, 1, 0) rad/s.
+    """
+    # The quarter period, which is the complete elliptic integral K(k) over the frequency, by the
+    # arithmetic-geometric mean.
     mean, other = math.sqrt(_A * _A + _A * _B * disturbance**2), math.sqrt(_A * _B) * disturbance
     while mean - other > 1e-9 * mean:
         mean, other = 0.5 * (mean + other), math.sqrt(mean * other)
@@ -60,7 +67,7 @@ def quarter(disturbance: float) -> float:
 
 
 def _separatrix() -> Iterator[Circumstance]:
-    """Yield rotations about the middle axis with smaller and smaller perturbations."""
+    """Yield rotations about the middle axis with perturbations from 1e-1 to 1e-15 rad/s."""
     for d in (10.0**-k for k in range(1, 16)):
         beside, on = (d, 1.0, 0.0), (d, 1.0, d)
         flip = quarter(d)
@@ -100,7 +107,7 @@ def _near_symmetry() -> Iterator[Circumstance]:
 
 _SHAPED = (0.3, 1.0, -0.6)
 _RADIANS = 20.0
-# With these orders every moment is about every axis, in both cyclic senses.
+# In these orders of the three moments, every moment is about every axis, in both cyclic senses.
 _ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (1, 0, 2))
 _NEEDLE, _PLATE = (1.0, 1.0 - 2.0**-41, 1e-12), (5.0, 3.0, 2.0)
 _BODIES: dict[str, Triple] = {
@@ -114,7 +121,7 @@ _BODIES: dict[str, Triple] = {
     "round-plate": (2.0, 1.0, 1.0),
     "strip": (1.0 + 2.0**-40, 1.0, 2.0**-40),
     "broad-strip": (1e12 + 1.0, 1e12, 1.0),
-    # One moment exceeds the sum of the others.
+    # The largest moment exceeds the sum of the other two.
     "impossible": (200.0, 10.0, 20.0),
     "impossible-equal": (1.0, 1.0, 1e3),
     "impossible-three": (1e3, 1.0, 1e-3),
@@ -122,7 +129,7 @@ _BODIES: dict[str, Triple] = {
 
 
 def _shapes() -> Iterator[Circumstance]:
-    """Yield needles, coins, flat plates, and moments that no body can have."""
+    """Yield needles, coins, flat plates, bodies that can not exist, and Case 6."""
     for name, moments in _BODIES.items():
         for axes in _ORDERS:
             first, second, third = (moments[axis] for axis in axes)
@@ -144,7 +151,7 @@ TWOS = (-996, -500, -100, 100, 498, 996)
 
 
 def _scales() -> Iterator[Circumstance]:
-    """Yield one motion at angular velocities from 1e-300 to 1e300 rad/s."""
+    """Yield one motion in many units of time, so that omega is from 1e-300 to 1e300 rad/s."""
     scene = in_steps(ORDINARY, ORDINARY_TIME)
     named = [(f"1e{power}", float(f"1e{power}")) for power in _TENS]
     named += [(f"2^{power}", math.ldexp(1.0, power)) for power in TWOS]
@@ -185,4 +192,4 @@ EXTREMES: dict[str, Callable[[], Iterator[Circumstance]]] = {
     "scales": _scales,
     "attitude": _attitude,
 }
-"""The extreme scenes by suite."""
+"""The functions that yield the extreme scenes, by the name of the suite."""

@@ -1,4 +1,7 @@
-"""Random scenes by kind: named functions that return a scene from a random generator."""
+"""Random scenes by kind: for each named kind a function that draws a scene.
+
+The argument `source` of these functions is the random generator from which they draw.
+"""
 
 import math
 from collections.abc import Callable
@@ -11,13 +14,13 @@ from pyharness.scenes.rotated import rotated
 
 
 def _body(source: Random) -> list[float]:
-    """Return moments that a body can have, in ascending order."""
+    """Draw moments (kg m2) that a body can have from `source`, in ascending order."""
     low, middle = sorted((source.uniform(1.0, 50.0), source.uniform(1.0, 50.0)))
     return [low, middle, source.uniform(middle, low + middle)]
 
 
 def _plain(source: Random) -> Scene:
-    """Return a body that can exist, which rotates at a few radians per second."""
+    """Draw a scene with a body that can exist and rotates at a few radians per second."""
     moments = _body(source)
     source.shuffle(moments)
     return _scene(source, _vector(source, 5.0), _triple(moments))
@@ -40,7 +43,10 @@ def _near_separatrix(source: Random) -> Scene:
 
 
 def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
-    """Return omega: `spin` about the middle axis, plus a random perturbation of size `faint`."""
+    """Return omega (rad/s): `spin` about axis 2, plus a random perturbation.
+
+    Each component of the perturbation, drawn from `source`, is at most `faint` (rad/s).
+    """
     return [w + faint * e for w, e in zip((0.0, spin, 0.0), _vector(source, 1.0), strict=True)]
 
 
@@ -53,7 +59,7 @@ def _violent(source: Random) -> Scene:
 
 
 def _from_rest(source: Random) -> Scene:
-    """Return a body at rest under a random torque about one axis or about all three."""
+    """Draw a scene with a body at rest under a random torque about one axis or about all three."""
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-3.0, 1.0)
     axes = source.choice(((0,), (1,), (2,), (0, 1, 2), (0, 1, 2)))
@@ -66,9 +72,9 @@ def _from_rest(source: Random) -> Scene:
 
 
 def _slow_waves(source: Random) -> Scene:
-    """Return a body under waves whose phase may change by only 1e-14 rad.
+    """Draw a scene under a torque of slow waves, whose phase may change by only 1e-14 rad.
 
-    In half of the scenes the body starts at rest.
+    In half of the scenes the body is initially at rest.
     """
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-2.0, 2.0)
@@ -78,7 +84,7 @@ def _slow_waves(source: Random) -> Scene:
 
 
 def _many_speeds(source: Random) -> Scene:
-    """Return a body under two to six waves together, of frequencies from 1e-6 to 600 rad/s."""
+    """Draw a scene with two to six torque waves, of frequencies from 1e-6 to 600 rad/s."""
     scene = _plain(source)
     some: list[list[Wave]] = [[], []]
     for _ in range(source.randint(2, 6)):
@@ -95,7 +101,7 @@ def _many_speeds(source: Random) -> Scene:
 
 
 def _far_scale(source: Random) -> Scene:
-    """Return a scene with other units of time and mass: omega from 1e-135 to 1e135."""
+    """Draw a scene in other units of time and mass, with omega from 1e-135 to 1e135 rad/s."""
     exponent = source.choice((-1, 1)) * source.randint(20, 450)
     scene = source.choice((_plain, _from_rest, _slow_waves, _many_speeds))(source)
     if abs(exponent) > 300:
@@ -107,7 +113,7 @@ def _far_scale(source: Random) -> Scene:
 
 
 def _sensitive(source: Random) -> Scene:
-    """Return a rotation near the middle axis that amplifies a perturbation up to 1e6 times."""
+    """Draw a scene near a rotation about the middle axis, with error amplification up to 1e6."""
     low, middle, high = body = _body(source)
     spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
     rate = abs(spin) * ((high - middle) * (middle - low) / (high * low)) ** 0.5
@@ -125,18 +131,18 @@ def _sensitive(source: Random) -> Scene:
 
 
 def _long(source: Random) -> Scene:
-    """Return a motion of up to a few hundred radians."""
+    """Draw a scene whose body rotates by up to a few hundred radians."""
     scene = _plain(source)
     return replace(scene, step_size=10.0 ** source.uniform(0.5, 1.3) / scene.steps)
 
 
 def _no_body(source: Random) -> Scene:
-    """Return a scene with coefficients of any sign, which no body can have."""
+    """Draw a scene with coefficients A, B, C of any sign, which no body can have."""
     return _scene(source, _vector(source, 2.0), None, _vector(source, 1.5))
 
 
 def _extreme(source: Random) -> Scene:
-    """Return a scene with numbers from the whole range of binary64; most such scenes overflow."""
+    """Draw a scene with numbers from the whole range of binary64; most such scenes overflow."""
 
     def any_size() -> float:
         if source.random() < 0.1:
@@ -151,20 +157,20 @@ def _extreme(source: Random) -> Scene:
 
 
 def _unsorted_body(source: Random) -> Triple:
-    """Return moments that a body can have, not sorted."""
+    """Draw moments (kg m2) that a body can have from `source`, not sorted."""
     low, middle = source.uniform(5.0, 50.0), source.uniform(5.0, 50.0)
     return source.uniform(abs(low - middle), low + middle), low, middle
 
 
 def _pointing(source: Random) -> Scene:
-    """Return a body without torque, with a random initial attitude."""
+    """Draw a scene without torque, with a random initial attitude."""
     moments, omega = _unsorted_body(source), _vector(source, 3.0)
     w, x, y, z = (source.gauss(0, 1) for _ in range(4))
     return Scene("", omega, moments=moments, attitude=(w, x, y, z))
 
 
 def _driven(source: Random) -> Scene:
-    """Return a body under a constant torque, a ramp and one wave."""
+    """Draw a scene with a constant torque, a torque linear in time and one torque wave."""
     moments = _unsorted_body(source)
     constant, rate, sine = (_vector(source, size) for size in (20.0, 5.0, 20.0))
     law = TorqueLaw(constant, rate, ((sine, source.uniform(0.1, 20.0)),))
@@ -184,16 +190,17 @@ NASTY: dict[str, Callable[[Random], Scene]] = {
     "coefficients": _no_body,
     "extreme": _extreme,
 }
-"""Kinds of random scenes that are difficult for numerical methods, by name."""
+"""The functions that draw scenes which are difficult for numerical methods, by kind."""
 
 KINDS = {"plain": _plain, **NASTY, "pointing": _pointing, "driven": _driven}
-"""All kinds of random scenes, by name."""
+"""The functions that draw random scenes, by kind."""
 
 
 def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
-    """Return a random torque law of magnitude about `size`.
+    """Draw a torque law from `source` whose components are at most `size` (N m) per term.
 
-    `kinds` is a bit mask: 1 constant, 2 linear in time, 4 sine, 8 cosine.
+    `kinds` is a bit mask of the terms: 1 constant, 2 linear in time, 4 sine, 8 cosine.
+    `frequencies` are the lowest and the highest frequency of a wave (rad/s).
     """
     low, high = map(math.log10, frequencies)
     constant, rate = _vector(source, size), _vector(source, size)
@@ -213,7 +220,11 @@ def _scene(
     coefficients: Triple | None = None,
     torque: bool = True,
 ) -> Scene:
-    """Return a scene whose torque is zero, constant, linear in time, or a sine and a cosine."""
+    """Draw the torque and the steps of a scene with given omega and body.
+
+    The torque is zero, constant, linear in time, or a sine and a cosine; it is zero if `torque` is
+    false. Either `moments` (kg m2) or `coefficients` describe the body, and the other is None.
+    """
     size = (max(moments) if moments else 10.0) * source.uniform(0.1, 2.0)
 
     def wave(most: float) -> list[Wave]:

@@ -10,9 +10,11 @@ from pyharness.model.scene import Scene, TorqueLaw, Triple
 
 
 def perturbed(scene: Scene, part: float) -> Iterator[Scene]:
-    """Yield the scene once for each of its numbers, with this number multiplied by 1 + `part`.
+    """Yield a copy of the scene for each of its numbers, with only this number perturbed.
 
-    Zeros in vectors are skipped.
+    The number is multiplied by 1 + `part`; `part` is thus the relative perturbation. The numbers
+    are the components of body, omega and torque, and the frequencies of the torque waves. A zero
+    component has no copy.
     """
     for name in ("moments", "coefficients", "omega"):
         for triple in _triples(getattr(scene, name), part):

@@ -1,4 +1,4 @@
-"""Random scenes, listings and parameters, reproducible from a seed and a number."""
+"""Random scenes, listings and parameters, which a seed and the number of the draw determine."""
 
 import datetime
 from dataclasses import dataclass, replace
@@ -9,20 +9,23 @@ from pyharness.model.scene import Scene
 from pyharness.scenes.kinds import KINDS, NASTY
 
 COARSEST = 1e-3
-# These names got their flag later. They are drawn last, so that the draws of a seed did not change.
+# These defects were added later. They are drawn last, so that the draws of a seed did not change.
 _LATER = ("three-masses",)
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 
 
 @dataclass(frozen=True)
 class Draw:
-    """A random scene and listing with parameters, determined by a seed and a number."""
+    """One draw for the random checks: a random scene, a random listing, and their parameters.
 
-    scene: Scene  # for odd numbers a difficult one, named by its kind in `NASTY`
-    listing: Listing  # of any program, with any defects and readings
+    A seed and the number of the draw determine it.
+    """
+
+    scene: Scene  # in odd draws a difficult scene, named by its kind in `NASTY`
+    listing: Listing  # of any program, with random defects and readings
     lipschitz: float  # constant of the stop test (1/s)
     may_stop: bool
-    digits: float  # 0 for the coarsest tolerance, 1 for the finest one of a method
+    digits: float  # 0 for the coarsest tolerance, 1 for the finest tolerance of a method
     backward: bool  # whether a method integrates to negative times
     stages: int  # of Gauss collocation
 
@@ -32,18 +35,27 @@ class Draw:
         return self.scene.step_size * self.scene.steps * (-1.0 if self.backward else 1.0)
 
     def tolerance(self, finest: float) -> float:
-        """Return the tolerance for a method whose finest tolerance is `finest`."""
+        """Return the relative tolerance of this draw for a method.
+
+        `finest` is the smallest tolerance of the method.
+        """
         return float(max(finest, COARSEST * (finest / COARSEST) ** self.digits))
 
 
 def weekly_seed(day: datetime.date | None = None) -> str:
-    """Return the week, as in 2026-W47, for use as a seed that changes every Monday."""
+    """Return the week of `day`, as in 2026-W47, for use as a seed that changes every Monday.
+
+    The default is the present week.
+    """
     year, week, _ = (day or datetime.date.today()).isocalendar()
     return f"{year}-W{week:02d}"
 
 
 def draw(seed: str, number: int) -> Draw:
-    """Return the draw of `number` with `seed`, which is the same in every version of Python."""
+    """Return the draw that a seed and the number of the draw determine.
+
+    The draw is the same in every version of Python.
+    """
     # Each number has its own generator, so that one draw can be repeated without the others.
     source = Random(f"{seed}/{number}")
     scene = KINDS["plain"](source)
@@ -70,5 +82,8 @@ def draw(seed: str, number: int) -> Draw:
 
 
 def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
-    """Return the random scene of a kind of `KINDS` that is determined by `seed`."""
+    """Return the random scene that `seed` determines, of one kind of `KINDS`.
+
+    `name` is the name of the scene.
+    """
     return replace(KINDS[kind](Random(seed)), name=name)

@@ -1,4 +1,4 @@
-"""Rescaled time: scenes and trajectories with omega and time in other units.
+"""Rescaled time: scenes and trajectories with omega and time in another unit of time.
 
 Products of two components of omega underflow below 1e-154 rad/s and overflow above 1e154 rad/s,
 although the solution itself is representable. A method that forms such products gets the scene in
@@ -15,15 +15,16 @@ import numpy as np
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Trajectory
 
-# Far enough from the ends of binary64 that products of components of different size keep their
-# digits.
+# Far enough from the ends of the range of binary64 that products of components of different size
+# keep their digits.
 _LARGE = 2.0**300
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
     """Return the scene with rescaled time, whose solution is factor * omega(factor * t).
 
-    A factor that is a power of 2 changes no digit of any quantity.
+    omega(t) is the solution of the given scene, with t in seconds. A factor that is a power of 2
+    changes no digit of any quantity.
     """
     law = scene.torque
 
@@ -49,12 +50,16 @@ def scaled(scene: Scene, factor: float) -> Scene:
 
 
 def is_ordinary(scene: Scene) -> bool:
-    """Return whether products of the initial omega are far from overflow and underflow."""
+    """Return whether products of components of the initial omega can not over- or underflow."""
     return 1.0 / _LARGE <= max(map(abs, scene.omega)) <= _LARGE
 
 
 def rescaling_factor(scene: Scene, time: float) -> float:
-    """Return the power of 2 by which a scene should be scaled; 1 for every ordinary scene."""
+    """Return the power of 2 with which `scaled` brings omega near 1 rad/s.
+
+    `time` is the end of the integration (s), up to which the torque may change omega. The result is
+    1 if the scene needs no rescaling, or if the rescaled scene would overflow.
+    """
     if is_ordinary(scene):
         return 1.0
     # The omega that the torque may add counts like the initial omega.
@@ -68,10 +73,10 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
 
 def omega_by_torque(scene: Scene, time: float) -> float:
-    """Return a bound of omega (rad/s) up to `time` (s) for a body that the torque sets in motion.
+    """Return a bound of the components of omega (rad/s) that the torque alone causes.
 
-    The body is at rest at time 0, and gyroscopic torques are neglected. The bound is infinite if it
-    is beyond the range of binary64.
+    The bound holds from 0 to `time` (s), for a body at rest at time 0, if gyroscopic torques are
+    neglected. It is infinite if it is beyond the range of binary64.
     """
     law, span = scene.torque, abs(time)
     moments = scene.moments or (1.0, 1.0, 1.0)
@@ -93,9 +98,10 @@ def omega_by_torque(scene: Scene, time: float) -> float:
 
 
 def _fits(scene: Scene, time: float, factor: float) -> bool:
-    """Return whether times and torques do not overflow in the new units.
+    """Return whether times and torques of a scene rescaled by `factor` do not overflow.
 
-    Nonzero times must not be subnormal either.
+    `time` is the end of the integration (s) in the original scene. Nonzero times must not be
+    subnormal either.
     """
     law = scene.torque
     waves = law.sines + law.cosines
@@ -109,7 +115,11 @@ def _fits(scene: Scene, time: float, factor: float) -> bool:
 
 
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
-    """Return the trajectory of a scaled scene in the units of the original scene."""
+    """Return the trajectory of a scaled scene in the units of the original scene.
+
+    `times` are the requested times of the original scene (s), and `factor` is the factor with which
+    the scene was scaled. If omega overflows in the original units, the result ends before that row.
+    """
     with np.errstate(over="ignore"):
         omega = trajectory.omega / factor
     finite = np.isfinite(omega).all(axis=1)

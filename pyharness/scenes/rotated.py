@@ -1,4 +1,4 @@
-"""Equivalent scenes: with rotated axes or changed signs, or with a later start."""
+"""Scenes with an equivalent motion: with rotated axes, changed signs, or a later time 0."""
 
 import math
 from collections.abc import Callable
@@ -11,10 +11,10 @@ from pyharness.model.trajectory import Array
 
 
 def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
-    """Return the scene with `turn` applied to every vector, and if `body` to the moments too.
+    """Return the scene with the function `turn` applied to omega and to all vectors of the torque.
 
-    A torque about the axes of space is unchanged. The attitude is also unchanged, so that the
-    caller has to transform it.
+    If `body` is true, `turn` is also applied to the moments. A torque about the axes of space is
+    unchanged. The attitude is also unchanged, so that the caller has to transform it.
     """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
@@ -34,9 +34,11 @@ def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene
 def restarted_at(
     scene: Scene, omega: Array, by: float, attitude: Quaternion | None = None
 ) -> Scene:
-    """Return the scene whose time 0 is the time `by` (s), with `omega` and `attitude` at that time.
+    """Return the scene whose time 0 is the time `by` (s) of the given scene.
 
-    Raise InputError if the torque is about the axes of space and `attitude` is None.
+    `omega` (rad/s) and `attitude` are the values at time `by`, which become the initial values.
+    Without `attitude`, the attitude of the given scene is kept. Raise InputError if the torque is
+    about the axes of space and `attitude` is None.
     """
     law = scene.torque
     if law.in_space and attitude is None:

@@ -1,10 +1,13 @@
-"""Linear stability: the amplification matrix of a step of each program.
+"""Linear stability: the amplification matrix of a step of each program of the thesis.
 
-A perturbation of a steady rotation obeys a linear equation x' = J x, and so does the velocity of a
-body in steady rotation. Along an eigenvector of J a step is a matrix whose elements are polynomials
-in z = h times the eigenvalue. The algebra of each scheme gives them here in fractions. The same
-polynomials hold for the matrix hJ in place of z. The original Runge-Kutta program keeps a second
-vector, U(1), from step to step. Its matrix therefore has two rows, for U(1) and for the result.
+A perturbation x of a steady rotation obeys a linear equation x' = J x with a constant matrix J. So
+does the translational velocity of a body in steady rotation. Along an eigenvector of J, a step of
+size h multiplies x by a matrix whose elements are polynomials in z, where z is h times the
+eigenvalue. The polynomials are derived here, in fractions, from the algebra of each scheme. The
+same polynomials hold for the matrix hJ in place of z.
+
+The original Runge-Kutta program keeps two vectors from step to step: the result of the step and
+U(1), at which the first stage is evaluated. Its amplification matrix therefore has two rows.
 """
 
 from dataclasses import dataclass
@@ -28,31 +31,36 @@ _NOTHING = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class Amplification:
-    """The amplification matrix of one step."""
+    """The matrix by which one step multiplies a perturbation, with polynomials in z as elements.
+
+    z is the step size times an eigenvalue of the Jacobian. The matrix acts on the m vectors that
+    the program keeps from step to step.
+    """
 
     # of Fraction, shape (m, m, 5): for element (i, j) the coefficients of 1, z ... z**4; the last
-    # row belongs to the result
+    # row belongs to the result of the step, the others to vectors such as U(1)
     coefficients: Fractions
 
     @property
     def size(self) -> int:
-        """Return the number of vectors that are kept from step to step."""
+        """Return m, the number of vectors that the program keeps from step to step."""
         return len(self.coefficients)
 
     def at(self, z: Complex) -> Complex:
-        """Return the matrices at many z, shape (..., m, m)."""
+        """Return the amplification matrix for each element of the array `z`, shape (..., m, m)."""
         powers = np.stack([z**k for k in range(_HIGHEST)], axis=-1)
         return np.asarray(np.einsum("...k,ijk->...ij", powers, self.coefficients.astype(float)))
 
     def radius(self, z: Complex) -> NDArray[np.float64]:
-        """Return the spectral radius of the matrix at many z."""
+        """Return the spectral radius of the amplification matrix for each element of `z`."""
         return np.asarray(np.abs(np.linalg.eigvals(self.at(z))).max(axis=-1))
 
     def moving(self) -> "Amplification":
-        """Return the matrix without the result, if no other vector depends on the result.
+        """Return the matrix without the row and column of the step's result, if it has no effect.
 
-        The result then only accumulates the other vectors, with an eigenvalue that does not depend
-        on z.
+        The result has no effect if no other vector depends on it. It then only accumulates the
+        other vectors, with an eigenvalue that does not depend on z. Otherwise return the whole
+        matrix.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -60,9 +68,10 @@ class Amplification:
         return self
 
     def of(self, matrix: Exact) -> Fractions:
-        """Return the exact matrix of a step for a linear system, from hJ with n rows.
+        """Return the exact matrix of a step for a linear system x' = J x of n equations.
 
-        The matrix has m n rows.
+        `matrix` is hJ, the step size times J, with n rows and columns. It takes the place of z. The
+        result has m n rows and columns, because each of the m vectors has n components.
         """
         power = np.eye(len(matrix), dtype=object)
         total = np.kron(self.coefficients[..., 0], power)
@@ -72,7 +81,7 @@ class Amplification:
         return np.asarray(total)
 
     def text(self) -> str:
-        """Return the polynomial, or the matrix row by row, as text."""
+        """Return the elements as text: one polynomial in z if m is 1, otherwise row by row."""
         rows = [", ".join(_polynomial_text(each) for each in row) for row in self.coefficients]
         return rows[0] if self.size == 1 else "[" + "; ".join(rows) + "]"
 
@@ -80,8 +89,10 @@ class Amplification:
 def amplification(listing: Listing, step: int = 1) -> Amplification:
     """Return the amplification matrix of a program's step number `step`, counted from 1.
 
-    In collocation the first estimate takes the right-hand side z x as constant, so that the
-    estimate is a straight line. The one correction evaluates the right-hand side along that line.
+    The number matters only with the defect `dt-accumulates`, which moves the collocation points
+    from step to step. In collocation the first estimate takes the right-hand side z x as constant,
+    so that the estimate is a straight line. The one correction evaluates the right-hand side along
+    that line.
     """
     if listing.program == "runge-kutta":
         return _runge_kutta(listing)
@@ -92,10 +103,12 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return a collocation program's integral of s**2 over a step, in units of the step cubed.
+    """Return the integral of s**2 over a step as a collocation program computes it, over h**3.
 
-    Along the first estimate the right-hand side is F + s J F + s**2 Q(F), where s is the time since
-    the beginning of the step. The exact integral is 1/3.
+    Here h is the step size, s is the time since the beginning of the step, and `step` is the number
+    of the step, from 1. Along the first estimate the right-hand side is F + s J F + s**2 Q(F). F
+    and J are the right-hand side and its Jacobian at the beginning of the step, and Q is the
+    quadratic part of the right-hand side. The exact integral is 1/3.
     """
     points, weights = _quadrature(listing, step)
     found: Fraction = weights @ points**2
@@ -103,9 +116,10 @@ def weight_of_squares(listing: Listing, step: int) -> Fraction:
 
 
 def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
-    """Return the collocation points and the weights of a step, in units of the step.
+    """Return the collocation points and their quadrature weights, both in units of the step size.
 
-    With `dt-accumulates` the points move from step to step.
+    `step` is the number of the step, from 1. With the defect `dt-accumulates` the points of step k
+    are k times those of the first step.
     """
     moved = step if listing.has("dt-accumulates") else 1
     points = [part * moved for part in PARTS[listing.program]]
@@ -113,7 +127,11 @@ def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
 
 
 def _runge_kutta(listing: Listing) -> Amplification:
-    """Return the matrix of the four stages, from U(1) and the base of the step (cards 770-1200)."""
+    """Return the amplification matrix of the Runge-Kutta program's four stages (cards 770-1200).
+
+    The stages depend on two vectors: U(1), at which the first stage is evaluated, and the base of
+    the step, which is the result of the previous step.
+    """
     first, base = _one(2, 0), _one(2, 1)
     half = Fraction(1, 2)
 
@@ -138,7 +156,11 @@ def _runge_kutta(listing: Listing) -> Amplification:
 
 
 def _one(size: int, place: int) -> Fractions:
-    """Return the polynomials of vector number `place` itself, shape (size, powers of z)."""
+    """Return vector number `place` as a linear combination of all `size` vectors.
+
+    The result has the shape (size, powers of z): for each vector the coefficients of a polynomial
+    in z, here 1 for the vector itself and 0 for the others.
+    """
     result = np.full((size, _HIGHEST), Fraction(0), dtype=object)
     result[place, 0] = Fraction(1)
     return result
@@ -160,10 +182,12 @@ def _polynomial_text(coefficients: Fractions) -> str:
 
 
 def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
-    """Return the distance along a direction up to which perturbations do not grow, and a slope.
+    """Return the distance of the stability boundary from z = 0 along `direction`, and a slope.
 
-    The direction is -1 or 1j. The distance is 0 if perturbations grow from the origin on. The slope
-    is that of the spectral radius just beyond the distance.
+    `matrix` is an amplification matrix. `direction` is -1 for the negative real axis or 1j for the
+    imaginary axis. Perturbations do not grow up to the distance. The slope is the increase of the
+    spectral radius per unit of distance just beyond it. Return (0, 1) if perturbations grow from
+    z = 0 on.
     """
 
     def grows(distance: float) -> bool:

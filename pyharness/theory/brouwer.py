@@ -28,7 +28,7 @@ _SAMPLES = 256
 
 @dataclass(frozen=True)
 class Noise:
-    """Bounds of the errors that one step may add, relative to the largest abs(omega)."""
+    """Bounds of the errors of omega that one step may add, relative to the largest abs(omega)."""
 
     step: float  # s
     rounding: float  # bound of the rounding error, whose sign is random
@@ -39,7 +39,7 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """One torque-free motion, with the quantities along it that the bounds need."""
+    """One torque-free motion, with the quantities along it from which error bounds follow."""
 
     # along the motion, shapes (n, 3), (n, 3), (n, 3, 3): omega (rad/s), its derivative (rad/s2),
     # and the Jacobian of the derivative (1/s)
@@ -54,7 +54,11 @@ class Orbit:
     turn: float  # largest factor from an error of omega, over `largest`, to a phase error (rad)
 
     def limits(self, noise: Noise, steps: float) -> dict[str, float]:
-        """Return the bounds on the errors of energy, momentum and phase after `steps` steps."""
+        """Return the bounds on the errors of energy, momentum and phase after `steps` steps.
+
+        `noise` has the bounds for one step. The keys are those of `LAWS`. The errors of energy and
+        momentum are relative, and the error of the phase is in radians.
+        """
         walk = DEVIATIONS * noise.rounding * math.sqrt(steps)
         drift = steps * noise.truncation
         # The result is rounded once more. A, B, C have two roundings each, which change the
@@ -75,7 +79,7 @@ class Orbit:
 
 
 def orbit(scene: Scene) -> Orbit:
-    """Compute the `Orbit` of a torque-free scene with moments, over two periods."""
+    """Return the `Orbit` of a torque-free scene with moments, sampled over two periods of omega."""
     a = np.array(scene.euler_coefficients)
     frequency = _frequency(a, np.array(scene.omega))
     times = np.linspace(0.0, 4.0 * math.pi / frequency, _SAMPLES).tolist()
@@ -98,17 +102,20 @@ def orbit(scene: Scene) -> Orbit:
 
 
 def floats(rows: Sequence[Sequence[Decimal]]) -> Array:
-    """Return decimal rows as an array in binary64."""
+    """Return rows of decimal numbers as an array in binary64."""
     return np.array([[float(x) for x in row] for row in rows])
 
 
 def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: float) -> Noise:
-    """Bound the rounding error of a step of the Taylor method by a running error analysis.
+    """Return bounds of the errors of a step of the Taylor method, by a running error analysis.
 
-    Term k is a sum of k products, each with at most k + 3 roundings, and propagates the errors of
-    the terms below. Omega enters without the part that compensated summation retains, half a unit
-    in the last place. The sum of the terms rounds each of them three times. `left_out` is the bound
-    of the truncation error, relative to the largest omega.
+    `body` is the orbit of the scene, `step` is the step size (s), and `order` is the degree of the
+    Taylor polynomial. `left_out` is the bound of the truncation error, relative to the largest
+    omega.
+
+    Taylor term k is a sum of k products, each with at most k + 3 roundings, and propagates the
+    errors of the lower terms. Omega enters without the part that compensated summation retains,
+    half a unit in the last place. The sum of the Taylor terms rounds each of them three times.
     """
     a = np.abs(np.array(scene.euler_coefficients))
     terms, errors = _terms(body, scene, step, order), [np.abs(body.states)]
@@ -125,15 +132,18 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
 
 
 def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
-    """Bound the rounding and truncation errors of a step of Gauss collocation with s stages.
+    """Return bounds of the errors of a step of Gauss collocation with s = `stages` stages.
 
-    The sum at each node has s + 3 roundings of the rates and one of the state. The iteration
-    propagates them by the inverse of 1 - h A J. Quadratic invariants are conserved for any step.
+    `body` is the orbit of the scene, and `step` is the step size h (s). The sum at each node has
+    s + 3 roundings of the rates and one of the state. The iteration propagates them by the inverse
+    of 1 - h A J, where A is the matrix of the Runge-Kutta tableau and J the Jacobian. Quadratic
+    invariants are conserved for any step.
 
     The truncation error is the integral of the state-transition matrix times the defect, which
     vanishes at the nodes. Because the nodes are those of an orthogonal polynomial, only the power s
-    of the remaining factor counts. By Leibniz's rule it is a sum over the derivatives j of the
-    state-transition matrix, (h J)**j / j!, and the Taylor terms 2s + 1 - j.
+    of the remaining factor counts. By Leibniz's rule its coefficient is a sum over j. Term j is a
+    multiple of (h J)**j / j!, from the derivatives of the state-transition matrix, times the Taylor
+    term 2s + 1 - j of omega.
     """
     from pyharness.theory.tableau import tableau
 
@@ -159,7 +169,11 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
 
 
 def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
-    """Return the Taylor terms 0 ... order of a step from each point of the motion (rad/s)."""
+    """Return the Taylor terms 0 to `order` of omega for a step from each state of the orbit `body`.
+
+    Term k is the power k of the step size `step` (s) with its coefficient. Each term has the shape
+    (n, 3), in rad/s.
+    """
     a = np.array(scene.euler_coefficients)
     terms = [body.states]
     for k in range(1, order + 1):
@@ -175,7 +189,9 @@ def errors(
 ) -> dict[str, float]:
     """Return the relative errors of energy and momentum and the phase error (rad), with signs.
 
-    If `rounded`, the exact solution takes A, B, C rounded to binary64, as a method does, instead of
+    `omega` (rad/s) is a computed result at `time` (s), and `body` is the orbit of the scene. Energy
+    and momentum are compared with their initial values, and the phase with the exact solution. If
+    `rounded`, the exact solution takes A, B, C rounded to binary64, as a method does, instead of
     the exact ones.
     """
     start = [Decimal(w) for w in scene.omega]
@@ -198,9 +214,10 @@ def errors(
 
 
 def root_mean_square(found: Array) -> Array:
-    """Return the root mean square of errors over the initial conditions, the rows of `found`.
+    """Return the root mean square of errors over the initial conditions.
 
-    NaN, where an integration did not get so far, is not counted.
+    The array `found` of errors has a row for each initial condition and a column for each number of
+    steps. An error is NaN where the integration was not continued so far; NaN is left out.
     """
     return np.asarray(np.sqrt(np.nanmean(np.asarray(found) ** 2, axis=0)))
 
@@ -208,14 +225,18 @@ def root_mean_square(found: Array) -> Array:
 def exponent(steps: Sequence[float] | Array, found: Array) -> float:
     """Return the power of the number of steps with which the root mean square of errors grows.
 
-    `found` has a row for each initial condition and a column for each number of steps.
+    The array `found` of errors has a row for each initial condition and a column for each of the
+    numbers in `steps`. The power is the slope of a straight line fitted to the logarithms.
     """
     size = np.log(np.maximum(root_mean_square(found), 1e-300))
     return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
 
 
 def _frequency(a: Array, omega: Array) -> float:
-    """Return 2 pi over the period of the polhode (rad/s), by the arithmetic-geometric mean."""
+    """Return 2 pi over the period of omega (rad/s), by the arithmetic-geometric mean.
+
+    `a` has the Euler coefficients A, B, C, and `omega` is the initial omega (rad/s).
+    """
     (odd,) = (i for i in range(3) if a[i] * a[i - 1] < 0.0 and a[i] * a[i - 2] < 0.0)
     squares = [abs(a[i - 1] * a[i - 2]) * omega[i] * omega[i] for i in range(3)]
     small, large = sorted((squares[odd - 1], squares[odd - 2]))
@@ -226,7 +247,7 @@ def _frequency(a: Array, omega: Array) -> float:
 
 
 def _steepness(a: Array, omega: Array) -> float:
-    """Return the sum of the absolute derivatives of the frequency with respect to omega."""
+    """Return the sum of the absolute derivatives of `_frequency` by the components of omega."""
     size = 1e-6 * float(np.abs(omega).max())
     return sum(
         abs(_frequency(a, omega + shift) - _frequency(a, omega - shift)) / (2.0 * size)

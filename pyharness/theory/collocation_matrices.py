@@ -1,6 +1,7 @@
 """The matrices of collocation (eq. 36), and the accuracy of their solution by LEQT1F.
 
-The exact solution is rational, since every float is a fraction: it is computed without rounding.
+LEQT1F is the linear solver that the collocation programs call. Every float is a fraction, so that
+the exact solution is rational. It is therefore computed here without rounding.
 """
 
 import math
@@ -31,7 +32,10 @@ PARTS = {
 
 @dataclass(frozen=True)
 class Solved:
-    """The errors of one matrix with its right-hand sides, solved by LEQT1F and exactly."""
+    """The accuracy of LEQT1F for one collocation matrix with six right-hand sides.
+
+    The solution X of A X = B by LEQT1F is compared with the exact solution.
+    """
 
     ier: int  # error code of the compiled solver: 0, or 129 for a singular matrix
     differing: int  # how many of the numbers X and IER differ in Fortran and in the Python twin
@@ -55,14 +59,17 @@ class Solved:
 
 
 def points(program: str, step: float) -> list[float]:
-    """Return the collocation points as a program computes them (s)."""
+    """Return the collocation points (s) for a step size `step` (s) as the program computes them."""
     if program == "two-term":
         return [step / 3.0, 2.0 * step / 3.0]
     return [step * 0.2, step * 0.4, step * 0.6, step * 0.8]
 
 
 def _right_hand_sides(count: int) -> Array:
-    """Return six right-hand sides: constant, linear, alternating, and three random ones."""
+    """Return six right-hand sides: constant, linear, alternating, and three random ones.
+
+    Each has `count` elements, so that the shape is (6, count).
+    """
     rough = np.random.default_rng(count).normal(size=(3, count))
     places = range(count)
     return np.array(
@@ -71,7 +78,10 @@ def _right_hand_sides(count: int) -> Array:
 
 
 def solved(program: str, step: float) -> Solved:
-    """Solve the matrix of a program for one `step` (s), and compare with the exact solution."""
+    """Solve a program's collocation matrix for one step size (s), by LEQT1F and exactly.
+
+    Return the differences of the two solutions as a `Solved`.
+    """
     from pyharness.model.extension import extension
 
     matrix = collocation.collocation_matrix(points(program, step))
@@ -113,19 +123,26 @@ def solved(program: str, step: float) -> Solved:
 
 
 def _small_step(program: str) -> tuple[Fraction, Fractions]:
-    """Return a step so small that 1 is the largest element of each row, and its matrix."""
+    """Return a step size (s) and its collocation matrix, in which each row's largest element is 1.
+
+    Any smaller step size has the same property.
+    """
     step = Fraction(1, 1000)
     return step, collocation_matrix([part * step for part in PARTS[program]])
 
 
 def solver_roundings(program: str) -> tuple[float, float]:
-    """Return bounds on the rounding error that solving adds to the result of a step.
+    """Return two bounds on the rounding error that solving for c1, c2, ... adds to a step's result.
 
-    The unit is 2**-53 of step times rate. The bound is 3n abs(powers) abs(inverse) abs(L) abs(U)
-    abs(X) (Higham 2002, theorem 9.4). It does not depend on the step as long as 1 is the largest
-    element of each row. The first number is for a rate that is the same at all points, so that only
-    c1 is not zero. The second number is to be multiplied by the relative difference between that
-    rate and the rates at the points.
+    Both are in units of 2**-53 times step size times rate, where a rate is a right-hand side of
+    Euler's equations. The first bound is for a rate that is the same at all collocation points, so
+    that only c1 is not zero. The second bound is for deviations of the rates at the points from
+    this constant rate, and must be multiplied by the relative deviation.
+
+    The bounds are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) (Higham 2002, theorem 9.4).
+    Here n is the number of points, the powers are those of the step size, L and U are the factors
+    of the collocation matrix, and X is the solution. The bounds do not depend on the step size as
+    long as 1 is the largest element of each row.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -141,11 +158,13 @@ def solver_roundings(program: str) -> tuple[float, float]:
 
 
 def singular_below(program: str, bits: int = 53) -> float:
-    """Return the step (s) at and below which LEQT1F must declare the matrix singular.
+    """Return the step size (s) at and below which LEQT1F must declare the matrix singular.
 
-    N + pivot equals N if the pivot is at most half a unit in the last place of N: a tie goes to N,
-    which is even. N is a power of 2, and its last place is 2**(1 - bits) of it in an arithmetic of
-    `bits` bits that rounds to nearest. The last scaled pivot is proportional to step**(n-1).
+    The matrix is the collocation matrix of a program, with N rows. LEQT1F declares it singular if
+    N + pivot equals N. This is the case if the pivot is at most half a unit in the last place of N,
+    because a tie goes to N, which is even. N is a power of 2, and its last place is 2**(1 - bits)
+    of it in an arithmetic of `bits` bits that rounds to nearest. The last scaled pivot is
+    proportional to step**(N-1).
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -156,9 +175,9 @@ def singular_below(program: str, bits: int = 53) -> float:
 
 
 def declared_singular_below(program: str) -> float:
-    """Return the largest step (s) whose matrix the compiled LEQT1F declares singular.
+    """Return the largest step size (s) whose matrix the compiled LEQT1F declares singular.
 
-    The step is found by bisection.
+    The matrix is the collocation matrix of a program. The step size is found by bisection.
     """
     from pyharness.model.extension import extension
 
@@ -188,7 +207,10 @@ def _errors(
 ) -> tuple[float, ...]:
     """Return the errors of residual, X and increment over their bounds, and the increment's error.
 
-    The last is relative to the step times the largest right-hand side.
+    `found` is the computed solution X of `matrix` X = `side`, and the increment is the change of
+    the unknown over the step. `solver` is the exact inverse of the matrix. `sizes` is abs(L) abs(U)
+    for its factors, with the rows in the order of the matrix. The fourth number is the error of the
+    increment relative to the step size times the largest right-hand side.
     """
     count = len(matrix)
     x, b = fractions(found), fractions(side)
@@ -215,7 +237,11 @@ def _share(error: Fraction, bound: Fraction) -> float:
 
 
 def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:
-    """Eliminate exactly in `order`; return the largest shortfall of a pivot, and its bound."""
+    """Return the largest relative shortfall of a pivot from the largest candidate, and its bound.
+
+    The pivots are those of an exact elimination of `matrix` whose pivot rows are taken in `order`.
+    The bound is the shortfall that rounding may cause; it follows from `sizes`, abs(L) abs(U).
+    """
     shortfall, allowed = Fraction(0), Fraction(0)
     scale = 1 / abs(matrix).max(axis=1)
     for j, (chosen, candidates, _) in enumerate(_columns(matrix, order)):
@@ -230,9 +256,11 @@ def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tupl
 def _columns(
     matrix: Fractions, order: Sequence[int] | None = None
 ) -> Iterator[tuple[int, dict[int, Fraction], Fractions]]:
-    """Eliminate exactly; yield for each column the pivot row, all scaled candidates and the rows.
+    """Eliminate a matrix exactly, and yield the choice of the pivot in each column.
 
-    Rows become pivots in `order` or, without it, by the rule of LEQT1F.
+    Yield the index of the pivot row, the scaled pivot candidates by row index, and all rows before
+    this column is eliminated. Rows become pivots in `order` or, without it, by the rule of LEQT1F:
+    the largest scaled candidate.
     """
     rows = matrix.copy()
     scale = 1 / abs(matrix).max(axis=1)

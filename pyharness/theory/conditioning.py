@@ -28,7 +28,7 @@ _MOST_NODES = 400_000
 
 @dataclass(frozen=True)
 class Conditioning:
-    """The amplification until the end of errors made during the motion."""
+    """The sensitivity of omega at the end of one motion to the errors made during the motion."""
 
     # largest factor from an error of omega at any time to the error at the end, at least 1
     amplification: float
@@ -41,11 +41,13 @@ class Conditioning:
     largest: float  # largest abs(omega) of any component until the end (rad/s)
 
     def limit(self, made: float, steps: float = 0.0) -> float:
-        """Return the largest error that a method may have, over `largest`; 2 is no restriction.
+        """Return the largest error of omega that a method may have at the end, over `largest`.
 
-        `made` is the sum of the errors of its steps, over `largest`, according to its tolerance or
-        its order. `steps` is the number of steps after which it rounds omega. It is 0 if the method
-        retains its rounding errors by compensated summation.
+        `made` is the sum of the errors of the method's steps, over `largest`, according to its
+        tolerance or its order. It is multiplied by the error amplification. `steps` is the number
+        of steps after which the method rounds omega, or 0 if the method retains its rounding errors
+        by compensated summation. The limit is at most 2. This is no restriction, because components
+        of magnitude up to `largest` differ by at most 2 times `largest`.
         """
         allowed = made * self.amplification + self.rounding + steps * self.storing
         # NaN allows no error.
@@ -54,18 +56,19 @@ class Conditioning:
     def angle_limit(self, made: float, time: float) -> float:
         """Return the largest error that an attitude at `time` (s) may have (rad).
 
-        `made` is the error that the method's tolerance allows (rad). Omega may have its rounding
-        error at all times.
+        `made` is the error that the method's tolerance allows (rad). The limit adds the rounding
+        error of the attitude, and the angle that results if omega has its rounding error at all
+        times.
         """
         turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
         return made + turned + ATTITUDE
 
 
 def conditioning(scene: Scene, time: float) -> Conditioning:
-    """Compute the conditioning of a scene from the linearised flow between 0 and `time` (s).
+    """Return the `Conditioning` of a scene from its linearised flow between 0 and `time` (s).
 
-    Raise InputError if the solution grows without bound before, or if the time would need too many
-    nodes.
+    Raise InputError if the solution grows without bound before `time`, or if `time` is so long that
+    the solution would be needed at too many times.
     """
     times = _nodes(scene, time)
     omega, complete = _path(scene, times)
@@ -75,7 +78,7 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 
 
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
-    """Compute the conditioning of a scene along a known solution.
+    """Return the `Conditioning` of a scene along a known solution.
 
     The solution is `omega`, shape (n, 3), at `times` (s), which begin at 0. It must turn by a small
     angle from each time to the next. Raise InputError if the amplification is beyond binary64.
@@ -88,7 +91,7 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 
 
 def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
-    """Return omega at each time, and whether the solution reaches the last time."""
+    """Return omega at each time (rad/s, shape (n, 3)), and whether it reaches the last time."""
     from pyharness.methods.problem import closed_form
     from pyharness.methods.solve import solve
 
@@ -99,7 +102,10 @@ def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
 
 
 def _nodes(scene: Scene, time: float) -> Array:
-    """Return times between which the solution turns by a small angle."""
+    """Return equally spaced times from 0 to `time` (s), with a small change of omega between them.
+
+    Raise InputError if more than `_MOST_NODES` times would be needed.
+    """
     if time == 0.0:
         return np.zeros(2)
     count = _FEWEST_NODES
@@ -145,8 +151,9 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     """Return the sum of the magnitudes of all terms of each right-hand side (1/s2), shape (n, 3).
 
-    A wave counts with its angle, because the product of frequency and time is rounded in proportion
-    to the angle.
+    The right-hand sides are those of Euler's equations for `omega` (rad/s, shape (n, 3)) at `times`
+    (s). A sine or cosine of the torque counts with 1 plus its angle, the product of frequency and
+    time, because this product is rounded in proportion to the angle.
     """
     products = np.abs(scene.euler_coefficients) * np.abs(
         np.roll(omega, -1, 1) * np.roll(omega, -2, 1)

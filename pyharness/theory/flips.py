@@ -43,7 +43,7 @@ def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
 
 
 def mean(upper: Array, lower: Array) -> Array:
-    """Return the arithmetic-geometric mean of non-negative numbers."""
+    """Return the arithmetic-geometric mean of each pair of non-negative `upper` and `lower`."""
     for _ in range(_LEVELS):
         if (np.abs(upper - lower) <= _NEAR * upper).all():
             break

@@ -14,11 +14,13 @@ _POINTS = 181
 
 
 def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
-    """Yield named curves of L / abs(L) without torque, shape (n, 3) each; none for a sphere.
+    """Yield the name and the points of curves that L / abs(L) follows without torque.
 
-    Along each curve sum L**2 and sum L**2 / I are constant. The last two curves are in the two
-    planes of the separatrix, L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)). Here j is 1 / I, and axis 2
-    is the middle one. If two moments are equal, both are in the plane across the third axis.
+    L is the angular momentum about the body's axes. Each curve has the shape (n, 3), and sum L**2
+    and sum L**2 / I are constant along it. The last two curves are in the two planes of the
+    separatrix, L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)). Here j is 1 / I, and axis 2 is the middle
+    one. If two moments are equal, both curves are in the plane across the third axis. A sphere has
+    no curves.
     """
     high, middle, low = sorted(range(3), key=lambda axis: moments[axis])
     j = min(moments) / np.array(moments)
@@ -46,9 +48,11 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
 
 
 def growth_of_bodies(first: Array, third: Array) -> Array:
-    """Return Re Q about the middle axis over the spin, for Smelt's numbers K1 and K3 of bodies.
+    """Return the growth rate Re Q about the middle axis, over the spin, for each of many bodies.
 
-    K1 = A is `first`, K3 = -C is `third`. All bodies are in the square from -1 to 1.
+    Q is the fastest rate of a perturbation of steady rotation about that axis (eq. 32). A body is
+    described by Smelt's numbers K1 = A, in `first`, and K3 = -C, in `third`, arrays of one shape.
+    All bodies are in the square from -1 to 1.
     """
     a, c = first, -third
     # Coefficients of moments satisfy A + B + C + ABC = 0. At two corners of the square, for bodies

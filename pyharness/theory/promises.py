@@ -18,8 +18,9 @@ from pyharness.methods.registry import FIXED_STEP, REGISTRY, SCIPY_METHODS
 def steps_of(name: str, run_steps: int, evaluations: int) -> float:
     """Return the number of steps after which a method rounds omega and drops the rounding error.
 
-    It is 0 for a method that retains its rounding errors by compensated summation. For SciPy's
-    methods it is estimated from the number of right-hand sides.
+    `name` is the method, `run_steps` is the number of steps of the run, and `evaluations` is its
+    number of right-hand sides. The result is 0 for a method that retains its rounding errors by
+    compensated summation. For SciPy's methods it is estimated from `evaluations`.
     """
     if name in SCIPY_METHODS:
         return evaluations / (1 if name == "lsoda" else 6)
@@ -27,9 +28,10 @@ def steps_of(name: str, run_steps: int, evaluations: int) -> float:
 
 
 def fixed_step_sum(name: str, angle: float, steps: int) -> float:
-    """Return a bound of the sum of the relative errors of all steps of a fixed-step method.
+    """Return a bound of the sum of the relative errors of `steps` steps of a fixed-step method.
 
-    `angle` is the largest coefficient times the largest omega times the step. The bound is infinite
+    The errors are truncation errors relative to the largest omega. `name` is the method. `angle` is
+    the largest Euler coefficient times the largest omega times the step size. The bound is infinite
     if the angle is 0.5 or more.
     """
     if angle >= 0.5:
@@ -41,7 +43,11 @@ def fixed_step_sum(name: str, angle: float, steps: int) -> float:
 
 @cache
 def _series(name: str) -> tuple[float, ...]:
-    """Return the coefficients of the method's own series in the angle for y' = y**2, y(0) = 1."""
+    """Return the coefficients, from power 0 of the step size, of a method's result after one step.
+
+    The step starts from y(0) = 1 and integrates y' = y**2. The step size is the `angle` of
+    `fixed_step_sum`.
+    """
     if name == "taylor-3":
         return 1.0, 1.0, 1.0
     y, h = Polynomial([1.0]), Polynomial([0.0, 1.0])

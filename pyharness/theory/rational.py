@@ -14,7 +14,7 @@ _UNIT = Fraction(1, 2**53)
 
 
 def inverse(matrix: Fractions) -> Fractions:
-    """Return the exact inverse of a regular matrix."""
+    """Return the exact inverse of a regular matrix of fractions, by Gauss-Jordan elimination."""
     count = len(matrix)
     rows = np.hstack([matrix, np.eye(count, dtype=object)])
     for j in range(count):
@@ -27,24 +27,30 @@ def inverse(matrix: Fractions) -> Fractions:
 
 
 def fractions(floats: ArrayLike) -> Fractions:
-    """Return the exact fractions of an array of floats."""
+    """Return the fractions that are exactly equal to an array of floats, in the same shape."""
     exact: Any = np.vectorize(Fraction, otypes=[object])
     found: Fractions = exact(floats)
     return found
 
 
 def gamma(count: int) -> Fraction:
-    """Return n u / (1 - n u), the bound of n successive roundings (Higham 2002, lemma 3.1)."""
+    """Return n u / (1 - n u), the bound of n successive roundings (Higham 2002, lemma 3.1).
+
+    Here n is `count`, and u = 2**-53 is the bound of one relative rounding error in binary64.
+    """
     return count * _UNIT / (1 - count * _UNIT)
 
 
 def norm(matrix: Fractions) -> Fraction:
-    """Return the row-sum norm of a matrix."""
+    """Return the row-sum norm of a matrix of fractions: the largest sum of absolute elements."""
     largest: Fraction = abs(matrix).sum(axis=1).max()
     return largest
 
 
 def collocation_matrix(points: Sequence[Fraction]) -> Fractions:
-    """Return the collocation matrix of equation 36 for some points."""
+    """Return the collocation matrix of equation 36, with a row for each collocation point t.
+
+    A row has the derivatives of t, t**2, ..., t**n at the point, where n is the number of points.
+    """
     rows = [[(j + 1) * point**j for j in range(len(points))] for point in points]
     return np.array(rows, dtype=object)

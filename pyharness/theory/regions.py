@@ -1,4 +1,4 @@
-"""Regions of linear stability, and growth along the imaginary axis, as data for plots."""
+"""Regions of linear stability, and growth of perturbations for imaginary z, as data for plots."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,10 @@ _HIDDEN = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """The spectral radius of one amplification matrix, over the plane and on the imaginary axis."""
+    """The spectral radius of one amplification matrix over the plane of z.
+
+    z is the step size times an eigenvalue of the Jacobian. The imaginary axis has finer samples.
+    """
 
     name: str  # of the programs and methods that have this matrix
     # shape (imaginary, real); spectral radius over the plane, without a result that only
@@ -29,9 +32,13 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """The stability regions of all programs on the same grids."""
+    """The stability regions of all programs on the same grids of z.
 
-    # coordinates of z in the plane
+    z is the step size times an eigenvalue of the Jacobian. A region is where the spectral radius of
+    the amplification matrix is at most 1.
+    """
+
+    # real and imaginary parts of z on the grid in the plane
     real: Array
     imaginary: Array
     distances: Array  # of z from 0, along the imaginary axis
@@ -39,7 +46,10 @@ class Regions:
 
 
 def matrices() -> dict[str, Amplification]:
-    """Return the different amplification matrices, by the programs and methods that have them."""
+    """Return the different amplification matrices, each under a name.
+
+    The name lists the programs and methods that have this matrix.
+    """
     return {
         "two-term and four-term, original and corrected": amplification(corrected("two-term")),
         "runge-kutta corrected, rk4": amplification(corrected("runge-kutta")),
@@ -52,7 +62,7 @@ def matrices() -> dict[str, Amplification]:
 
 
 def regions() -> Regions:
-    """Return the stability regions of all programs.
+    """Return the stability regions of all programs of the thesis, original and corrected.
 
     Gauss collocation is not among them: its region is the left half-plane.
     """

@@ -1,7 +1,8 @@
 """Steady rotations under constant torque, and their linear stability.
 
 The method is Grammel's, equation 32 of the thesis (III.4.a): omega = (a, b, c) + small amplitudes
-times exp(Q t). With M = N / I the rotation (a, b, c) is steady if
+times exp(Q t). A, B, C are the coefficients of Euler's equations, N the torque about each axis, and
+I the moments. With M = N / I the rotation (a, b, c) is steady if
 
     A bc = -M1,    B ca = -M2,    C ab = -M3,
 
@@ -34,7 +35,7 @@ OFF = 0.1
 
 @dataclass(frozen=True)
 class SteadyRotation:
-    """A steady rotation, and the behaviour of a small perturbation."""
+    """One steady rotation of a scene, and the behaviour of a small perturbation of it."""
 
     place: str  # an axis, a point of a hyperbola, ...
     omega: Triple  # rad/s
@@ -48,7 +49,7 @@ class SteadyRotation:
 
     @property
     def doubling_time(self) -> float | None:
-        """Return the time in which the fastest perturbation doubles (s).
+        """Return the time in which the fastest-growing perturbation doubles (s).
 
         It is None if no perturbation grows with exp(Q t).
         """
@@ -57,14 +58,17 @@ class SteadyRotation:
 
     @property
     def period(self) -> float | None:
-        """Return the period of the oscillation (s), or None if nothing oscillates."""
+        """Return the period of a perturbation's oscillation (s), or None if nothing oscillates."""
         rate = max(abs(each.imag) for each in self.rates)
         return 2.0 * math.pi / rate if rate > 0.0 else None
 
 
 @dataclass(frozen=True)
 class SteadyRotations:
-    """The steady rotations of a scene; of a continuous family only some members."""
+    """The steady rotations of a scene, or some members of them where they form a continuous family.
+
+    Each is analysed with a perturbation of the same relative magnitude.
+    """
 
     told: str  # text: which steady rotations exist, and which of them are shown
     disturbance: float  # magnitude of the perturbation over the magnitude of the rotation
@@ -89,7 +93,10 @@ def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
 
 
 def rates(coefficients: Triple, omega: Triple) -> Rates:
-    """Return the rates Q of a steady rotation (1/s), the largest real part first."""
+    """Return the three rates Q of a steady rotation (1/s), the largest real part first.
+
+    `coefficients` are A, B and C, and `omega` is the steady rotation (rad/s).
+    """
     size = max(map(abs, omega))
     if size == 0.0:
         return 0j, 0j, 0j
@@ -105,7 +112,10 @@ def rates(coefficients: Triple, omega: Triple) -> Rates:
 
 
 def _roots(slope: float, half: float) -> Rates:
-    """Return the roots of Q**3 - slope Q - 2 half; small roots are accurate to all digits too."""
+    """Return the three roots of Q**3 - slope Q - 2 half = 0, without loss of digits in small roots.
+
+    They are in no particular order.
+    """
     if half == 0.0:
         root = cmath.sqrt(slope)
         return root, 0j, -root
@@ -155,10 +165,12 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
 def _growing(
     scene: Scene, omega: Triple, rate: complex, matrix: Array, share: float
 ) -> float | None:
-    """Return the time at which the second-order terms reach a tenth of a growing perturbation (s).
+    """Return the time (s) at which a growing perturbation leaves the range of linear theory.
 
-    `share` is the initial perturbation over the rotation. The time is None if it is beyond the
-    range of binary64.
+    It is the time at which the second-order terms reach a tenth of the perturbation. `rate` is the
+    fastest rate Q (1/s), `matrix` is the Jacobian at the steady rotation `omega`, and `share` is
+    the initial magnitude of the perturbation over that of the rotation. The time is None if it is
+    beyond the range of binary64.
     """
     # The eigenvector of `rate` is the null vector of the matrix less the rate.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
@@ -177,11 +189,13 @@ def _growing(
 
 
 def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | None:
-    """Return the time at which the phase about a stable axis is off by a tenth of a radian (s).
+    """Return the time (s) at which linear theory has a phase error of 0.1 rad about a stable axis.
 
-    There is no torque. The first coefficient is the axis's own. A tilt d towards another axis
-    changes the rate by d**2 / 4 times the first coefficient over the coefficient of that axis. The
-    time is None if nothing oscillates about the axis, so that only the spin drifts.
+    There is no torque. `coefficients` are A, B, C in cyclic order from the axis of the rotation.
+    `rate` is the frequency of the linear oscillation (rad/s), and `share` is the perturbation over
+    the rotation. A tilt d towards another axis changes the rate by a fraction: d**2 / 4 times the
+    first coefficient over the coefficient of the other axis. The time is None if nothing oscillates
+    about the axis, so that only the spin drifts.
     """
     spun, *others = map(abs, coefficients)
     if spun == 0.0:
@@ -193,11 +207,14 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | 
 
 
 def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> float | None:
-    """Return the shortest time between flips about the middle axis (s), whose coefficient is first.
+    """Return the shortest time (s) between flips of a perturbed rotation about the middle axis.
 
-    It is 2 K / lambda, near (2 / lambda) ln(4 / k') if the perturbation is small. It is shortest if
-    the perturbation points along the axis of the smaller coefficient. It is None if the signs of
-    the coefficients belong to no body.
+    `coefficients` are A, B, C in cyclic order from the middle axis, `spin` is the rotation (rad/s),
+    and `share` is the perturbation over the rotation. The time is 2 K / lambda, which is near
+    (2 / lambda) ln(4 / k') if the perturbation is small. K is the complete elliptic integral with
+    the complementary modulus k', and lambda is near the growth rate of the perturbation. The time
+    is shortest if the perturbation points along the axis of the smaller coefficient. It is None if
+    the signs of the coefficients belong to no body.
     """
     first, second, third = coefficients
     if first * second >= 0.0 or first * third >= 0.0:
@@ -212,7 +229,7 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
 
 
 def _places(scene: Scene) -> tuple[str, Places]:
-    """Return a text on the steady rotations that exist, and the ones that are shown."""
+    """Return a text on the steady rotations that exist, and the list of rotations to be shown."""
     coefficients, torque = scene.euler_coefficients, scene.normalized_torque(0.0)
     held = [axis for axis in range(3) if torque[axis] != 0.0]
     if not held:
@@ -252,7 +269,11 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 
 
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
-    """Return the text and points of one branch of the hyperbola; the other has their opposites."""
+    """Return the text and the shown rotations for a torque about one axis, number `held` from 0.
+
+    The steady rotations form a hyperbola: omega about the two other axes has the product `product`
+    (rad2/s2). Rotations of one branch are shown; the other branch has their opposites.
+    """
     one, other = (held + 1) % 3, (held + 2) % 3
     told = (
         f"torque about axis {held + 1}: the hyperbola w{one + 1} w{other + 1} = {product:.6g}, "
@@ -276,7 +297,11 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
 
 
 def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
-    """Return the text and points of the hyperbola for a torque across the axis of symmetry."""
+    """Return the text and the shown rotations for a torque across the axis of symmetry.
+
+    `axis` is the number of the axis of symmetry, from 0. `products` are the products w2 w3, w3 w1
+    and w1 w2 that balance the torque (rad2/s2). The steady rotations form a hyperbola.
+    """
     one, other = (axis + 1) % 3, (axis + 2) % 3
     # The products w_one w_axis and w_other w_axis.
     across = products[other], products[one]

@@ -77,7 +77,11 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
 
 
 def _seen(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
-    """Return the coordinates of points to the right, up and towards the viewer, shape (n,) each."""
+    """Return the coordinates of points to the right, up and towards the viewer, shape (n,) each.
+
+    `points` has the shape (n, 3). `toward` is the unit vector to the viewer, and `upward` is a
+    vector that appears vertical in the picture.
+    """
     right = np.cross(upward, toward)
     right /= np.linalg.norm(right)
     return points @ right, points @ np.cross(toward, right), points @ toward

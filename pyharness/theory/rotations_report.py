@@ -1,4 +1,4 @@
-"""The report of `rotations`."""
+"""The report of the verb `rotations`: steady rotations of a scene and their stability."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -26,7 +26,7 @@ _SECONDS = digits(".3g")
 
 
 def rotations_report(scene: Scene, found: SteadyRotations) -> Report:
-    """Return the report of the steady rotations of a scene, with a row for each."""
+    """Return the report of the steady rotations of a scene, with a table row for each rotation."""
     text: list[Section] = [
         [*heading(scene), f"perturbation: {found.disturbance:g} of the rotation"]
     ]
@@ -61,7 +61,7 @@ def _table(rotations: Sequence[SteadyRotation]) -> Table:
 
 
 def _rates(rates: Rates) -> str:
-    """Return a short text of three rates; rates that differ only in sign share one entry."""
+    """Return a short text of the rates Q of a rotation; opposite or conjugate pairs share +-."""
     first, second, third = rates
     if not any(rates):
         return "0"

@@ -1,8 +1,8 @@
-"""The schemes of the programs and of the fixed-step methods, independent of their code.
+"""The schemes of the programs and of the fixed-step methods, written a second time for comparison.
 
-A scheme computes one step of a method, but shares no code with it. It runs on numbers and on power
-series of the step alike. With series, the truncation error of a step results term by term, before
-any method is run. Torques are constant here.
+A scheme computes one step of a method, but shares no code with the method. It runs on numbers and
+on power series in the step size alike. With series, the truncation error of a step results term by
+term, before any method is run. Torques are constant here.
 """
 
 import math
@@ -23,35 +23,41 @@ TERMS = 24
 
 
 class Numbers:
-    """The arithmetic of numbers, where omega is an array of shape (..., 3)."""
+    """The operations of a scheme on numbers, where omega (rad/s) is an array of shape (..., 3)."""
 
     def __init__(self, scene: Scene, step: float, sizes: bool = False) -> None:
-        """Store the scene's equations and a step (s); with `sizes` every term's absolute value."""
+        """Store the coefficients and the torque of a scene's equations, and a step size (s).
+
+        If `sizes`, store their absolute values, so that results are sums of magnitudes.
+        """
         self._step = step
         size = np.abs if sizes else np.positive
         self._coefficients = size(np.array(scene.euler_coefficients))
         self._torque = size(np.array(scene.normalized_torque(0.0)))
 
     def rate(self, omega: Array) -> Array:
-        """Return the right-hand sides of equations 16-18."""
+        """Return the right-hand sides of equations 16-18 for each omega (rad/s2)."""
         turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
         return np.asarray(self._torque + self._coefficients * turned * onward)
 
     def times_step(self, x: Array) -> Array:
-        """Return the step times x."""
+        """Return the step size times x."""
         return self._step * x
 
 
 class Series:
-    """The arithmetic of power series of the step, where omega has shape (TERMS, ..., 3)."""
+    """The operations of a scheme on power series in the step size.
+
+    Omega has the shape (TERMS, ..., 3): its element k is the coefficient of power k.
+    """
 
     def __init__(self, scene: Scene) -> None:
-        """Store the scene's equations."""
+        """Store the coefficients and the torque of a scene's equations."""
         self._coefficients = np.array(scene.euler_coefficients)
         self._torque = np.array(scene.normalized_torque(0.0))
 
     def rate(self, omega: Array) -> Array:
-        """Return the right-hand sides of equations 16-18, by Cauchy products."""
+        """Return the series of the right-hand sides of equations 16-18, by Cauchy products."""
         turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
         result = np.zeros(omega.shape)
         for k in range(TERMS):
@@ -61,11 +67,11 @@ class Series:
         return result
 
     def times_step(self, x: Array) -> Array:
-        """Return the step times x."""
+        """Return the series x times the step size, without the power that is then beyond TERMS."""
         return np.concatenate([np.zeros_like(x[:1]), x[:-1]])
 
     def solution(self, omega: Array) -> Array:
-        """Return the series of the solution through omega of shape (..., 3)."""
+        """Return the series of the exact solution that starts at omega (rad/s, shape (..., 3))."""
         result = constant(omega)
         for k in range(TERMS - 1):
             result[k + 1] = self.rate(result)[k] / (k + 1)
@@ -78,7 +84,7 @@ Scheme = Callable[[Arithmetic, Array], Array]
 
 @dataclass(frozen=True)
 class FixedStep:
-    """A method with a fixed step."""
+    """A program or method with a fixed step, described by its scheme, order and rounding."""
 
     name: str  # of the program or method
     order: int  # of its global error
@@ -87,14 +93,14 @@ class FixedStep:
 
 
 def constant(omega: Array) -> Array:
-    """Return omega as a constant series."""
+    """Return the series whose term of power 0 is omega, shape (..., 3), and whose others are 0."""
     result = np.zeros((TERMS, *omega.shape))
     result[0] = omega
     return result
 
 
 def collocation(program: str) -> Scheme:
-    """Return the scheme of a collocation program."""
+    """Return the scheme of a collocation program: a first estimate and one correction."""
     parts = PARTS[program]
     weights = inverse(collocation_matrix(parts)).sum(axis=0).astype(float)
 
@@ -109,10 +115,10 @@ def collocation(program: str) -> Scheme:
 
 
 def collocation_singular(program: str) -> Scheme:
-    """Return the scheme of a collocation program if LEQT1F declares its matrix singular.
+    """Return the scheme of a collocation program whose matrix LEQT1F declares singular.
 
-    LEQT1F then returns the right-hand sides unchanged. The program takes them for c1, c2, ..., the
-    coefficients of t, t**2, ...
+    LEQT1F, the linear solver, then returns the right-hand sides of the linear system unchanged. The
+    program takes them for c1, c2, ..., the coefficients of t, t**2, ...
     """
     parts = PARTS[program]
 
@@ -136,7 +142,7 @@ def collocation_singular(program: str) -> Scheme:
 
 
 def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after a step of equation 31."""
+    """Return omega after a step of the classical Runge-Kutta method of order 4 (eq. 31)."""
     first = on.times_step(on.rate(omega))
     second = on.times_step(on.rate(omega + 0.5 * first))
     third = on.times_step(on.rate(omega + 0.5 * second))
@@ -145,7 +151,11 @@ def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
 
 
 def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after the first step of the original Runge-Kutta program."""
+    """Return omega after the first step of the original Runge-Kutta program.
+
+    Its third stage starts from the point of the second stage, instead of from omega, and its fourth
+    stage from the point of the third stage.
+    """
     first = on.times_step(on.rate(omega))
     at = omega + 0.5 * first
     second = on.times_step(on.rate(at))
@@ -156,15 +166,16 @@ def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
 
 
 def improved_euler(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after a step of equation 29."""
+    """Return omega after a step of the improved Euler method (eq. 29)."""
     first = on.times_step(on.rate(omega))
     return np.asarray(omega + 0.5 * (first + on.times_step(on.rate(omega + first))))
 
 
 def taylor_3(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after a step of equation 30.
+    """Return omega after a step of the Taylor method with three terms (eq. 30).
 
-    The derivative of F along F is half of F(omega + F) - F(omega - F), because F is quadratic.
+    The second derivative of omega is the derivative of the right-hand side F along F. It is half of
+    F(omega + F) - F(omega - F), because F is quadratic.
     """
     rate = on.rate(omega)
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))
@@ -172,7 +183,10 @@ def taylor_3(on: Arithmetic, omega: Array) -> Array:
 
 
 def gauss(stages: int) -> Scheme:
-    """Return the scheme of Gauss collocation of order 2 stages, iterated until it converges."""
+    """Return the scheme of Gauss collocation with `stages` stages, iterated until it converges.
+
+    Its order is twice the number of stages.
+    """
     nodes, weights = legendre.leggauss(stages)
     nodes, weights = 0.5 * (nodes + 1.0), 0.5 * weights
     powers = np.array([[node**k for k in range(stages)] for node in nodes])
@@ -206,9 +220,9 @@ SCHEMES = {each.name: each for each in _ALL}
 
 
 def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
-    """Return the truncation error of a step from omega (rad/s), shape (n, 3), as a series.
+    """Return the truncation error of a step from each omega (rad/s, shape (n, 3)), as a series.
 
-    The series has the shape (TERMS, n, 3).
+    The series in the step size has the shape (TERMS, n, 3).
     """
     on = Series(scene)
     return scheme(on, constant(omega)) - on.solution(omega)
@@ -217,7 +231,8 @@ def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
 def spacing(count: int) -> Sequence[Fraction]:
     """Return the weights of a central first difference with `count` pairs, exact to degree 2 count.
 
-    The weight of pair i multiplies the difference of the values at i and -i spacings.
+    The weight of pair i, from 1, multiplies the difference of the values at i and -i spacings. The
+    sum over all pairs, divided by the spacing, is the first derivative.
     """
     middle = math.comb(2 * count, count)
     return [

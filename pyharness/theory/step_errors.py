@@ -1,7 +1,8 @@
 """Prediction of the truncation and rounding errors of fixed steps at the end of a scene.
 
-The truncation error of each step comes from `schemes` and is propagated to the end by the flow. The
-rounding error of each step is propagated likewise. No method is run.
+The truncation error of each step comes from `pyharness.theory.schemes`. The state-transition
+matrices propagate it to the end. The rounding error of each step is propagated likewise. No method
+is run.
 """
 
 import math
@@ -28,7 +29,7 @@ _CONVERGED = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The solution of a scene, and the state-transition matrices from each time to the end."""
+    """The solution of one scene, and the state-transition matrices from each time to the end."""
 
     scene: Scene  # torque constant
     times: Array  # shape (n,), s: from 0 to the end
@@ -40,17 +41,17 @@ class Path:
 
     @property
     def norms(self) -> Array:
-        """Return the row-sum norms of the state-transition matrices."""
+        """Return the row-sum norm of each state-transition matrix, shape (n,)."""
         return np.asarray(np.abs(self.propagators).sum(axis=2).max(axis=1))
 
     def over_time(self, values: Array) -> Array:
-        """Return the integral of values along the first axis."""
+        """Return the time integral of `values`, whose first axis has an element for each time."""
         return np.asarray(np.trapezoid(values, self.times, axis=0))
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """The predicted errors at the end, relative to the largest omega."""
+    """The predicted errors at the end of a run with a fixed step, relative to the largest omega."""
 
     truncation: float  # expected truncation error, the largest component
     bound: float  # of truncation and rounding error; infinite if steps are too large for a bound
@@ -59,9 +60,9 @@ class Forecast:
 
 
 def path(scene: Scene, time: float) -> Path:
-    """Return the solution to `time` (s) with its state-transition matrices.
+    """Return the solution from 0 to `time` (s) with the state-transition matrices to its end.
 
-    Raise InputError if the solution grows without bound before.
+    Raise InputError if the solution grows without bound before `time`.
     """
     from pyharness.methods.solve import solve
 
@@ -82,17 +83,20 @@ def path(scene: Scene, time: float) -> Path:
 
 
 class Forecaster:
-    """The error predictions for one method along one path, for any step."""
+    """The error predictions for one method along one solution, for any number of steps."""
 
     def __init__(self, along: Path, method: str) -> None:
-        """Store the path and the method, a name in `pyharness.theory.schemes.SCHEMES`."""
+        """Store the solution `along` and the method, a name in `pyharness.theory.schemes.SCHEMES`.
+
+        Compute the rounding error of one step, which does not depend on the step size.
+        """
         self._path = along
         self.method = SCHEMES[method]
         self._missed = cache(self._series)
         self._wandering = self._of_one_step()
 
     def at(self, steps: int) -> Forecast:
-        """Return the predicted errors for a number of equal steps."""
+        """Return the predicted errors at the end of the path after `steps` equal steps."""
         here = self._path
         h = float(here.times[-1]) / steps
         largest = here.flow.largest
@@ -115,9 +119,10 @@ class Forecaster:
         return Forecast(truncation, 2.0 * worst + rounding, rounding, wandering)
 
     def crossing(self, smallest: float) -> float:
-        """Return the step (s) at which truncation falls below the expected rounding error.
+        """Return the step size (s) below which rounding dominates the predicted error at the end.
 
-        The step is found by bisection between `smallest` and the whole time.
+        There the predicted truncation error falls below the expected rounding error. The step size
+        is found by bisection between `smallest` (s) and the whole time.
         """
         time = float(self._path.times[-1])
         high = max(1, math.floor(time / smallest))
@@ -130,10 +135,10 @@ class Forecaster:
         return time / high
 
     def _of_one_step(self) -> float:
-        """Return the mean rounding error of one step at the end, over the largest omega.
+        """Return the mean effect of one step's rounding error at the end, over the largest omega.
 
-        The rounding error of a component is proportional to the component. It is 0 if the component
-        never changes.
+        The rounding error of a component of omega is proportional to the component. It is 0 if the
+        component never changes.
         """
         here = self._path
         changes = (self._rates() != 0.0).any(axis=0)

@@ -1,9 +1,10 @@
 """The corrections of the weighted residual family as Runge-Kutta tableaux, for any step size.
 
-With f known along the step, the conditions for the c's are linear. The derivative that they
-determine is a projection of f on the polynomials of degree n - 1. The projection is computed once
-on the unit interval s = t / h, with Legendre polynomials as basis, so that it is well conditioned.
-The c's themselves are never formed.
+The trial function of a step of size h is omega(0) + c1 t + ... + cn t**n. If the right-hand side f
+is known along the step, the weighted residual conditions are linear in c1, ..., cn. They determine
+the derivative of the trial function as a projection of f on the polynomials of degree n - 1. The
+projection is computed once on the unit interval s = t / h, with Legendre polynomials as basis, so
+that it is well conditioned. The coefficients c1, ..., cn themselves are never formed.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,10 @@ from pyharness.model.trajectory import Array
 
 @dataclass(frozen=True, eq=False)
 class Tableau:
-    """A correction on the unit interval, in the form of a Runge-Kutta scheme."""
+    """One correction of the first estimate of a step, in the form of a Runge-Kutta tableau.
+
+    The step is scaled to the unit interval.
+    """
 
     # shape (m,); the points at which f is evaluated, in units of the step: the collocation points,
     # or the nodes of the quadrature of the weighted integrals
@@ -30,7 +34,11 @@ class Tableau:
 
 @cache
 def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None = None) -> Tableau:
-    """Return the tableau of a `Member` from its weighted residual conditions on the unit interval.
+    """Return the tableau of one weighted residual method from its conditions on the unit interval.
+
+    `weighting` is "collocation", "subdomain", "galerkin" or "least-squares". `terms` is n, the
+    number of powers of t in the trial function. `points` selects the collocation points, as in
+    `grid`, and matters only for collocation.
 
     The quadrature is exact for constant torques. Along a trial function the products of equations
     13-15 have degree 2n. The weights have degree n (Galerkin), n - 1 (least squares) or, in each
@@ -71,7 +79,7 @@ def _product(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Frac
 
 
 def _solved(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fraction]]:
-    """Return the solution x of a x = b, by elimination."""
+    """Return the exact solution x of a x = b, by elimination; all three are matrices."""
     rows = [[*left, *right] for left, right in zip(a, b, strict=True)]
     for k in range(len(rows)):
         pivot = next(i for i in range(k, len(rows)) if rows[i][k])
@@ -84,7 +92,11 @@ def _solved(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fract
 
 
 def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
-    """Return the collocation points, in units of the step."""
+    """Return the n collocation points in units of the step size, shape (n,).
+
+    `points` is "gauss" for the nodes of Gauss and Legendre, or "thesis" or None for k / (n + 1). A
+    tuple contains the points themselves.
+    """
     if points == "gauss":
         return _gauss(n)[0]
     if points is None or points == "thesis":
@@ -93,7 +105,7 @@ def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
 
 
 def _gauss(m: int) -> tuple[Array, Array]:
-    """Return the nodes and weights of Gauss-Legendre quadrature on the unit interval."""
+    """Return the m nodes and weights of Gauss-Legendre quadrature on the unit interval."""
     nodes, weights = [], []
     for near in legendre.leggauss(m)[0].tolist():
         # One Newton step removes the error of the eigenvalues.
@@ -114,11 +126,17 @@ def _legendre(m: int, x: Fraction) -> tuple[Fraction, Fraction]:
 
 
 def basis(s: Array, n: int) -> Array:
-    """Return the Legendre polynomials 0 ... n - 1 of the unit interval at `s`, shape (m, n)."""
+    """Return the Legendre polynomials 0 ... n - 1 of the unit interval at m points, shape (m, n).
+
+    `s` has the points, from 0 to 1.
+    """
     return np.asarray(legendre.legvander(2.0 * s - 1.0, n - 1), dtype=float)
 
 
 def _integrals(s: Array, n: int) -> Array:
-    """Return the integrals of the basis from 0 to `s`, shape (m, n); to 1 they are 1, 0, 0 ..."""
+    """Return the integrals of the n polynomials of `basis` from 0 to m points `s`, shape (m, n).
+
+    Their integrals from 0 to 1 are 1, 0, 0 ...
+    """
     antiderivatives = legendre.legint(np.eye(n), lbnd=-1.0, scl=0.5)
     return np.asarray(legendre.legval(2.0 * s - 1.0, antiderivatives).T, dtype=float)

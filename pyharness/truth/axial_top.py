@@ -1,7 +1,8 @@
 """Exact solution of a symmetric body with a torque along its axis, in decimal arithmetic.
 
-The spin is the integral of the torque. The vector of the other two components rotates by an angle
-proportional to the integral of the spin. The solution is tested against the reference.
+The spin, omega about the symmetry axis, is the initial spin plus the integral of the torque over
+the moment. The vector of the other two components of omega rotates by an angle proportional to the
+integral of the spin. The solution is tested against the reference (`truth/reference.py`).
 """
 
 import decimal
@@ -19,7 +20,7 @@ DIGITS = 50
 def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
     """Return omega (rad/s) at `times` (s) of a body with I1 = I2 and its torque along axis 3.
 
-    Raise InputError for any other scene.
+    There is a row of three decimal numbers for each time. Raise InputError for any other scene.
     """
     law, moments = scene.body_torque, scene.moments
     vectors = [law.constant, law.rate, *(a for a, _ in law.sines + law.cosines)]
@@ -53,7 +54,11 @@ def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
 
 
 def _arithmetic(*sizes: Sequence[float]) -> "decimal._ContextManager":
-    """Return a decimal context with enough digits for angles as large as the product of `sizes`."""
+    """Return a context manager that sets a decimal precision sufficient for large angles.
+
+    The precision allows for angles up to the product of the largest absolute values of the
+    sequences `sizes`: the times (s), omega (rad/s) and the frequencies of the torque (rad/s).
+    """
     context = decimal.Context(Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN)
     largest = [max(map(abs, each), default=1.0) for each in sizes]
     context.prec = DIGITS + sum(max(0, Decimal(x).adjusted() + 1) for x in largest)

@@ -1,4 +1,4 @@
-"""Sine and cosine in the decimal arithmetic of the reference, to all its digits."""
+"""Sine, cosine and pi to all digits of the current decimal arithmetic."""
 
 import decimal
 from decimal import Decimal
@@ -6,7 +6,11 @@ from functools import cache
 
 
 def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
-    """Return the sine and cosine of any angle (rad), by halving it and the addition theorem."""
+    """Return the sine and the cosine of any angle (rad).
+
+    The angle is halved eight times, and the formulas of the double angle are applied to the series
+    of the small angle.
+    """
     with decimal.localcontext() as context:
         context.prec += 12 + max(0, angle.adjusted())
         angle = angle.remainder_near(2 * pi(context.prec))
@@ -14,7 +18,7 @@ def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
         x = angle / 2**halvings
         square = x * x
         sine = _alternating(x, square, 1)
-        # versine 1 - cos keeps its digits where cos is near 1
+        # The versine 1 - cos keeps its digits where cos is near 1.
         versine = _alternating(square / 2, square, 2)
         for _ in range(halvings):
             sine, versine = 2 * sine * (1 - versine), 2 * versine * (2 - versine)
@@ -23,7 +27,10 @@ def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
 
 
 def _alternating(term: Decimal, square: Decimal, n: int) -> Decimal:
-    """Return the alternating sum of x**n / n! over every second n, beginning with `term`."""
+    """Return the sum of x**n / n! with alternating signs over every second n.
+
+    `term` is the first term and belongs to the power `n`; `square` is x**2.
+    """
     total = term
     while abs(term) > Decimal(1).scaleb(-decimal.getcontext().prec):
         n += 2
@@ -34,7 +41,7 @@ def _alternating(term: Decimal, square: Decimal, n: int) -> Decimal:
 
 @cache
 def pi(digits: int) -> Decimal:
-    """Return pi to a number of digits, by Machin's formula."""
+    """Return pi to `digits` significant digits, by Machin's formula."""
     with decimal.localcontext(prec=digits + 5):
         return 16 * _arctan_inverse(5) - 4 * _arctan_inverse(239)
 

@@ -1,4 +1,7 @@
-"""The Taylor series of equations 13-15, of velocity and of attitude, in decimal arithmetic."""
+"""Integration of omega, velocity and attitude by Taylor series in decimal arithmetic.
+
+Omega obeys Euler's equations, numbers 13-15 of the thesis.
+"""
 
 from collections.abc import Sequence
 from decimal import Decimal
@@ -11,13 +14,14 @@ from pyharness.model.scene import Scene
 from pyharness.truth.decimal_functions import sine_cosine
 
 _MOST_STEPS = 100_000  # some 30 seconds, more with waves
-# Work limit in steps if an effort is given, some ten seconds. A wave costs a fifth of a step.
+# Work limit in steps, some ten seconds, if the caller gives an `effort`, which is a factor on it. A
+# wave of the torque costs a fifth of a step.
 _ORDINARY_STEPS = 20_000
 # After so many steps, a small part of a second, their pace shows whether the end is out of reach.
 # The forecast allows for a motion that becomes slower by the factor _PACE_SLACK.
 _FIRST_STEPS = 100
 _PACE_SLACK = 3.0
-# If the number of steps grows with time to a higher power than this, the power is no accident.
+# If the number of steps grows with time to a higher power than this, the forecast uses that power.
 _GROWING = Decimal("1.3")
 
 Row = list[Decimal]
@@ -32,11 +36,15 @@ def taylor_series(
     tolerance: Decimal,
     effort: float | None,
 ) -> list[Row]:
-    """Return omega (and velocity, and attitude) at `times`; fewer rows if the solution blows up.
+    """Return a row of omega, velocity and attitude at each of `times` (s).
 
-    The attitude is included if the scene has one, with the norm of the scene's quaternion.
-    `coefficients` are A, B, C of the scene. `tolerance` is the local tolerance, relative to omega
-    and to the attitude.
+    There are fewer rows if omega grows without bound before the last time. Omega is in rad/s. The
+    translational velocity (m/s) is included if `velocity` is true. The attitude is included if the
+    scene has one; its quaternion keeps the norm of the scene's quaternion. `coefficients` are A, B,
+    C of the scene, and `order` is the degree of the Taylor polynomials. `tolerance` is the local
+    tolerance, relative to omega and to the attitude. `effort` is a factor on a work limit of some
+    ten seconds; if it is None, the limit is 100 000 steps. Raise InputError if the limit is
+    exceeded.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
@@ -65,7 +73,7 @@ def taylor_series(
 
 
 class _Limit:
-    """The limit of the number of steps of a series, with a forecast of the steps needed."""
+    """The limit of the number of Taylor steps of an integration, with a forecast of that number."""
 
     def __init__(self, scene: Scene, effort: float | None) -> None:
         self._effort = None if effort is None else checked_effort(effort)
@@ -75,7 +83,11 @@ class _Limit:
         self._before: tuple[int, Decimal] = (0, Decimal(0))
 
     def check(self, step: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
-        """Raise InputError before a step if the steps so far or the forecast exceed the limit."""
+        """Raise InputError before a step if the steps so far or the forecast exceed the limit.
+
+        `step` is the number of steps taken, `begin` the time reached (s), `length` the length of
+        the next step (s), and `rest` the time left until the end (s).
+        """
         if step == 0:
             # The first step alone shows only that the end is far out of reach.
             if rest > 10 * Decimal(self._most) * abs(length):
@@ -94,10 +106,11 @@ class _Limit:
                 self._before = step, abs(begin)
 
     def _forecast(self, step: int, begin: Decimal, rest: Decimal) -> Decimal:
-        """Return a forecast of the number of steps until the end.
+        """Return a forecast of the number of steps from time 0 until the end.
 
-        It assumes as many steps per second as so far. If the number of steps so far grew like a
-        higher power of time, it assumes that power.
+        `step` steps have reached the time `begin` (s), and `rest` (s) is left. The forecast assumes
+        as many steps per second as so far. If the number of steps so far grew like a higher power
+        of time, the forecast assumes that power, but at most 3.
         """
         step_before, begin_before = self._before
         power = Decimal(1)
@@ -119,9 +132,12 @@ class _Limit:
 
 
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
-    """Return the step for which the last two terms are small relative to the leading unknowns.
+    """Return the length (s) of the step for which the last two Taylor terms are small.
 
-    For a body at rest they are small relative to its first terms that are not zero.
+    They are at most `tolerance` times the largest absolute value of the first `leading` unknowns.
+    For a body at rest they are small relative to its first Taylor terms that are not zero.
+    `coefficients` contains the Taylor coefficients of each unknown. The step is not longer than
+    `rest`, the time left until the end (s).
     """
     order = len(coefficients[0]) - 1
     begun = next((j for j in range(order - 1) if _size(coefficients, j, leading)), None)
@@ -140,7 +156,10 @@ def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: i
 
 
 def _size(coefficients: list[Row], k: int, unknowns: int | None = None) -> Decimal:
-    """Return the largest absolute coefficient k of the first `unknowns` unknowns, or of all."""
+    """Return the largest absolute value of the Taylor coefficients number k.
+
+    The maximum is over the first `unknowns` unknowns, or over all if that is None.
+    """
     return max(abs(series[k]) for series in coefficients[:unknowns])
 
 
@@ -152,14 +171,19 @@ def _evaluate(coefficients: list[Row], t: Decimal) -> Row:
 
 
 def divisors(scene: Scene) -> tuple[Fraction, Fraction, Fraction]:
-    """Return the exact divisors of torques: the moments, or 1 for a body given by coefficients."""
+    """Return the exact numbers by which torques are divided, as fractions.
+
+    They are the moments (kg m2), or 1 for a body given by coefficients.
+    """
     return scene.exact_moments or (Fraction(1), Fraction(1), Fraction(1))
 
 
 class _Equations:
-    """Equations 13-15 as recurrences of Taylor coefficients.
+    """Euler's equations (13-15 of the thesis) of one scene, as recurrences of Taylor coefficients.
 
-    The equations dV/dt = F/m - omega x V and dq/dt = q (0, omega)/2 are added if they are needed.
+    The equation dV/dt = F/m - omega x V of the velocity V under the force F on the mass m is added
+    if `velocity` is true. The equation dq/dt = q (0, omega)/2 of the quaternion q is added if the
+    scene has an attitude.
     """
 
     def __init__(self, scene: Scene, coefficients: Row, velocity: bool) -> None:
@@ -170,7 +194,10 @@ class _Equations:
         self._acceleration = [Decimal(force) / Decimal(scene.masses[0]) for force in scene.forces]
 
     def expand(self, time: Decimal, state: Row, order: int) -> list[Row]:
-        """Return the Taylor coefficients 0 ... order of every unknown around `time`."""
+        """Return the Taylor coefficients 0 ... order of every unknown around `time` (s).
+
+        `state` contains the values of the unknowns at that time.
+        """
         series = [[x] for x in state]
         torque = self._torque_series(time, order)
         for k in range(order):
@@ -193,7 +220,10 @@ class _Equations:
         return series
 
     def _torque_series(self, time: Decimal, order: int) -> list[Row]:
-        """Return the Taylor coefficients of the normalized torque around `time`."""
+        """Return the Taylor coefficients of the torque over moment around `time` (s).
+
+        There are `order` coefficients for each axis.
+        """
         law = self._torque
         series = [
             [Decimal(constant) + Decimal(rate) * time, Decimal(rate), *[Decimal(0)] * (order - 2)]
@@ -218,7 +248,12 @@ class _Equations:
 
 
 def _turning(q: list[Row], omega: list[Row]) -> Row:
-    """Return half of Hamilton's product q (0, omega), in which each product is a Cauchy product."""
+    """Return the next Taylor coefficient of q (0, omega)/2, four numbers.
+
+    The product is Hamilton's product, in which each product of two components is a Cauchy product.
+    `q` contains the Taylor coefficients of the quaternion. `omega` contains those of the angular
+    velocity in reversed order.
+    """
     (a, b, c, d), (x, y, z) = q, omega
     return [
         (-_product(b, x) - _product(c, y) - _product(d, z)) / 2,

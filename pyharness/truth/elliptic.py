@@ -1,8 +1,8 @@
 """Torque-free motion in decimal arithmetic by Jacobi's elliptic functions, to check other methods.
 
-Unlike a series it loses no digits with time, so that many flips near the separatrix cost no more
-than a short time. It shares no code with the method that it checks. Its arithmetic is different,
-and it uses Landen's transformation.
+Unlike a Taylor series the solution loses no digits with time, so that a time with many flips near
+the separatrix costs no more than a short time. The module shares no code with the closed form that
+it checks. Its arithmetic is different, and it uses Landen's transformation.
 """
 
 import decimal
@@ -15,15 +15,15 @@ from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.decimal_series import Row
 from pyharness.truth.reference import exact_coefficients
 
-# Digits, in addition to those that the squares of small components need.
+# Digits of the arithmetic, in addition to those that the squares of small components need.
 _DIGITS = 90
 
 
 def torque_free(scene: Scene, time: float, rounded: bool = False) -> Row:
-    """Return omega of a scene without torque at `time` (s), in rad/s.
+    """Return omega (rad/s) of a scene without torque at `time` (s).
 
-    The motion must be bounded, as it is if A, B and C belong to moments. If `rounded`, A, B and C
-    are taken as rounded to binary64, instead of the exact ones.
+    The motion must be bounded, as it is if the coefficients A, B and C belong to moments. If
+    `rounded` is true, A, B and C rounded to binary64 are used instead of the exact coefficients.
     """
     with decimal.localcontext() as context:
         context.prec = _DIGITS
@@ -38,7 +38,10 @@ def torque_free(scene: Scene, time: float, rounded: bool = False) -> Row:
 
 
 def _decades(values: Row) -> int:
-    """Return the difference of the decimal exponents of the largest and smallest nonzero value."""
+    """Return the difference of the decimal exponents of the largest and the smallest value.
+
+    Zeros are ignored.
+    """
     powers = [value.adjusted() for value in values if value]
     return max(powers) - min(powers) if powers else 0
 
@@ -70,10 +73,16 @@ def _solution(coefficients: Sequence[Decimal], start: Sequence[Decimal], time: D
 
 
 def _turned(a: Sequence[Decimal], omega: Row, time: Decimal) -> Row:
-    """Solve a motion with one coefficient zero, where the other two omegas move on an ellipse."""
+    """Return omega (rad/s) at `time` (s) of a motion in which the first or third coefficient is 0.
+
+    The component of omega about that axis is constant, and the other two components move on an
+    ellipse. `a` contains the three coefficients, the second one negative, and `omega` the initial
+    components (rad/s).
+    """
     axis = 0 if not a[0] else 2
     other = 2 - axis
-    # other' = a[other] w2 w, w2' = a[1] other w, and w of `axis` is constant.
+    # With u the component about the axis `other` and v the component about the second axis,
+    # u' = a[other] v w and v' = a[1] u w, where w, the component about `axis`, is constant.
     w = omega[axis]
     upper, lower = a[other] * w, a[1] * w
     rate = (-upper * lower).sqrt()
@@ -86,7 +95,11 @@ def _turned(a: Sequence[Decimal], omega: Row, time: Decimal) -> Row:
 
 
 def _normal(start: Row, time: Decimal) -> Row:
-    """Solve x' = y z, y' = -z x, z' = x y by the addition theorems of sn, cn, dn."""
+    """Return x, y, z at `time` (s), where x' = y z, y' = -z x, z' = x y.
+
+    `start` contains x, y, z at time 0 (1/s). The solution uses the addition theorems of the
+    elliptic functions sn, cn and dn.
+    """
     x, y, z = start
     p, q = x * x + y * y, z * z + y * y
     if q < p:
@@ -107,9 +120,10 @@ def _normal(start: Row, time: Decimal) -> Row:
 
 
 def jacobi(u: Decimal, comodulus: Decimal) -> tuple[Decimal, Decimal, Decimal]:
-    """Return sn, cn, dn of `u`; `comodulus` is the square of the complementary modulus.
+    """Return Jacobi's elliptic functions sn, cn and dn of the argument `u`.
 
-    Descending Landen transformation: Abramowitz and Stegun 16.12.
+    `comodulus` is the square of the complementary modulus, 1 - k**2 with the modulus k. The method
+    is the descending Landen transformation (Abramowitz and Stegun 16.12).
     """
     if not comodulus:
         e = (-abs(u)).exp()

@@ -1,9 +1,9 @@
 """Attitude of a torque-free body at any time in decimal arithmetic, to check other methods.
 
-In each period of omega the body rotates about the angular momentum by the same angle. Therefore one
-period of the series of omega and attitude determines all the others. This module shares no code
-with the method that it checks. It uses no elliptic function except for the length of the period,
-and no theta function.
+In each period of omega the body rotates about the angular momentum by the same angle. Therefore an
+integration of omega and attitude over one period, by Taylor series, determines all other periods.
+This module shares no code with the closed form that it checks. It uses no theta function, and an
+elliptic integral only for the length of the period.
 """
 
 import decimal
@@ -23,9 +23,10 @@ _ORDER, _TOLERANCE = 44, Decimal("1e-44")
 def free_attitude(scene: Scene, time: float) -> Row:
     """Return the attitude of a scene without torque at `time` (s), as a unit quaternion.
 
-    Its sign is continuous from time 0 on. The scene must have moments and an attitude. Near the
-    separatrix a period is long. On the separatrix the motion is integrated all the time. Raise
-    InputError if the integration takes too many steps.
+    The sign of the quaternion is continuous from time 0 on. The scene must have moments and an
+    attitude. The motion is integrated over at most one period of omega, which is long near the
+    separatrix. On the separatrix there is no period, and the motion is integrated from 0 to `time`.
+    Raise InputError if the integration takes too many steps.
     """
     assert scene.attitude is not None
     with decimal.localcontext() as context:
@@ -51,7 +52,10 @@ def free_attitude(scene: Scene, time: float) -> Row:
 
 
 def period_of(scene: Scene) -> Decimal | None:
-    """Return the period of omega (s), to the digits of the arithmetic; None on the separatrix."""
+    """Return the period of omega (s) of a torque-free scene; None on the separatrix.
+
+    The period is accurate to nearly all digits of the current decimal arithmetic.
+    """
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     low, middle, high = sorted(range(3), key=lambda axis: i[axis])
     energies = [moment * rate * rate for moment, rate in zip(i, w, strict=True)]
@@ -72,13 +76,13 @@ def period_of(scene: Scene) -> Decimal | None:
 
 
 def is_steady(scene: Scene) -> bool:
-    """Return whether omega of a scene without torque is constant."""
+    """Return whether omega of a scene without torque is constant: a steady rotation, or rest."""
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     return all((i[a - 1] - i[a - 2]) * w[a - 1] * w[a - 2] == 0 for a in range(3))
 
 
 def product(p: Row, q: Row) -> Row:
-    """Return Hamilton's product of two quaternions."""
+    """Return Hamilton's product p q of two quaternions, scalar first."""
     (a, b, c, d), (e, f, g, h) = p, q
     return [
         a * e - b * f - c * g - d * h,
@@ -89,7 +93,10 @@ def product(p: Row, q: Row) -> Row:
 
 
 def conjugate(q: Row) -> Row:
-    """Return the conjugate of a quaternion, which is the inverse rotation of a unit quaternion."""
+    """Return the conjugate of a quaternion, scalar first.
+
+    For a unit quaternion the conjugate is the inverse rotation.
+    """
     return [q[0], -q[1], -q[2], -q[3]]
 
 

@@ -1,8 +1,9 @@
-"""A second reference, the Taylor series in integer arithmetic.
+"""A second reference for the solutions of scenes, by Taylor series in integer arithmetic.
 
-It shares no code with the first reference. A number is an integer over 2**BITS, in units in which
-the last requested time is 1 and the largest omega is about 1. Sines and cosines of the torque are
-unknowns of the series, as omega is, so that no library function is needed.
+It shares no code with the first reference (`truth/reference.py`). A number is represented by an
+integer over 2**BITS, in units in which the last requested time is 1 and the largest omega is about
+1. The sines and cosines of the torque are unknowns of the Taylor series, as omega is, so that no
+library function is needed.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ from pyharness.model.trajectory import Array
 
 BITS = 160
 _ORDER = 36
-_LAST = 60  # bits of the last terms of a step: 2**-100 of the unit
+_LAST = 60  # bits of the last Taylor terms of a step, which are 2**-100 of the unit
 _CLOCK = 64  # steps are multiples of 2**-64 of the last requested time
 _MOST_STEPS = 20_000  # each takes a third of a millisecond
 # The unit of omega is guessed. It is accepted if the largest omega is at most 2**_ABOVE and at
@@ -33,7 +34,7 @@ Series = list[int]
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The true solution at the requested times and at nodes between them."""
+    """The true solution of one scene at the requested times and at nodes between them."""
 
     time: Array  # shape (n,); as requested, s
     omega: Array  # shape (n, 3); rounded to binary64, rad/s
@@ -42,7 +43,10 @@ class Path:
 
 
 class _OtherUnitError(Exception):
-    """An exception that omega is far from 1 and needs a unit 2**power times as large."""
+    """An exception which reports that the unit of omega does not fit the size of omega.
+
+    The next integration needs a unit that is 2**power times as large.
+    """
 
     def __init__(self, power: int) -> None:
         super().__init__()
@@ -54,8 +58,8 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
 
     The times are strictly monotonic in order away from 0, on one side, and none of them is 0.
     Before rounding, the solution has an error of some 1e-29 of the largest omega, times the error
-    amplification. Raise InputError if omega grows without bound before, or if too many steps would
-    be needed.
+    amplification. Raise InputError if omega grows without bound before the last time, or if too
+    many steps would be needed.
     """
     power = _power_of(_guess(scene, abs(Fraction(times[-1]))))
     for _ in range(_MOST_GUESSES):
@@ -67,7 +71,10 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
 
 
 def _guess(scene: Scene, span: Fraction) -> Fraction:
-    """Return the larger of the initial omega and the omega that torque alone would give (rad/s)."""
+    """Return a guess of the largest omega (rad/s) from time 0 to `span` (s).
+
+    It is the larger of the initial omega and a bound of the omega that torque alone would give.
+    """
     law = scene.body_torque
     found = [abs(Fraction(w)) for w in scene.omega]
     for axis, moment in enumerate(scene.moments or (1.0, 1.0, 1.0)):
@@ -82,7 +89,10 @@ def _power_of(size: Fraction) -> int:
 
 
 def _march(scene: Scene, times: Sequence[float], power: int) -> Path:
-    """Integrate from 0 to the last time with omega in units of 2**power rad/s."""
+    """Return the solution at `times` (s), integrated with omega in units of 2**power rad/s.
+
+    Raise _OtherUnitError if this unit turns out to be too large or too small.
+    """
     span = Fraction(times[-1])
     wanted = [Fraction(t) / span for t in times]
     equations = _Equations(scene, span, Fraction(2) ** power)
@@ -132,7 +142,10 @@ def _march(scene: Scene, times: Sequence[float], power: int) -> Path:
 
 
 def _at(terms: Series, part: Fraction) -> Fraction:
-    """Return the value of a series at the fraction `part` of its step."""
+    """Return the value of a Taylor series at the fraction `part` of its step.
+
+    `terms` are its Taylor terms at the end of the step, as integers over 2**BITS.
+    """
     fixed = _fixed(part)
     total = 0
     for term in reversed(terms):
@@ -146,20 +159,23 @@ def _fixed(value: Fraction) -> int:
 
 @dataclass(frozen=True)
 class _Wave:
-    """The waves of one frequency, by two unknowns of the series: a sine and a cosine.
+    """The waves of one frequency, represented by two unknowns of the series: a sine and a cosine.
 
-    For a slow wave the first unknown is the sine divided by the angle of the wave at the end, so
-    that a large amplitude keeps all its digits.
+    If the angle of the wave at the last time is below 1 rad, the first unknown is the sine divided
+    by this angle, so that a large amplitude keeps all its digits.
     """
 
     to_sine: int  # the derivative of the unknown sine is `to_sine` times the cosine
     to_cosine: int  # the derivative of the cosine is `to_cosine` times the unknown sine
-    on_sine: Series
-    on_cosine: Series
+    on_sine: Series  # for each axis, the factor of the unknown sine in the torque over moment
+    on_cosine: Series  # for each axis, the factor of the cosine in the torque over moment
 
 
 def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
-    """Return the exact divisors of torques (kg m2, or 1 for coefficients), and exact A, B, C."""
+    """Return the exact numbers by which torques are divided, and the exact coefficients A, B, C.
+
+    The divisors are the moments (kg m2), or 1 for a body given by coefficients.
+    """
     moments = list(scene.exact_moments or (Fraction(1),) * 3)
     if scene.coefficients is not None:
         return moments, [Fraction(x) for x in scene.coefficients]
@@ -167,7 +183,11 @@ def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
 
 
 class _Equations:
-    """Equations 13-15 in units of the requested time and of omega, as recurrences of terms."""
+    """Euler's equations (13-15 of the thesis) of one scene, as recurrences of Taylor terms.
+
+    `span` is the unit of time, the last requested time (s), and `unit` is the unit of omega
+    (rad/s).
+    """
 
     def __init__(self, scene: Scene, span: Fraction, unit: Fraction) -> None:
         law = scene.body_torque
@@ -200,7 +220,12 @@ class _Equations:
         self.start += [0, 1 << BITS] * len(self._waves)
 
     def expand(self, state: Series, begin: int, length: int) -> list[Series]:
-        """Return the terms 0 ... order of all unknowns, multiplied by the powers of the step."""
+        """Return the Taylor terms of all unknowns at the end of a step, from the values `state`.
+
+        The terms are Taylor coefficients 0 ... order times powers of the step. `begin` is the time
+        at the beginning of the step and `length` is its length, both in units of 2**-64 of the last
+        requested time.
+        """
 
         def stepped(x: int) -> int:
             return x * length >> _CLOCK

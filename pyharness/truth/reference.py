@@ -29,27 +29,27 @@ _HALF_ULP = 2.0**-53
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The true solution in binary64."""
+    """The true solution of one scene at requested times, rounded to binary64, with its error."""
 
-    time: Array  # shape (n,), s; if the solution grows without bound, the rows end before
+    time: Array  # shape (n,), s; ends before omega grows without bound
     omega: Array  # shape (n, 3), rad/s
     velocity: Array | None  # shape (n, 3), m/s; from the deck's forces and its first mass
-    source: str  # text: how the solution was computed
+    source: str  # a text that states how the solution was computed
     estimate: float  # estimated error of any omega before rounding (rad/s)
-    # shape (n, 3); the part of omega that rounding removed (rad/s): `omega` plus `remainder` has
-    # twice as many digits
+    # shape (n, 3); the part of omega (rad/s) that rounding removed. The sum of `omega` and
+    # `remainder` has twice as many digits as `omega`.
     remainder: Array | None = None
     attitude: Array | None = None  # shape (n, 4), unit quaternions; None if the scene has none
     angle_estimate: float = 0.0  # estimated error of any attitude before rounding (rad)
 
     @property
     def angle_error(self) -> float:
-        """Return a bound of the error of any attitude (rad): the estimate plus rounding."""
+        """Return a bound of the error of any attitude (rad): the estimate plus rounding errors."""
         return self.angle_estimate + 4.0 * _HALF_ULP
 
     @property
     def error(self) -> float:
-        """Return a bound of the error of any omega (rad/s): the estimate plus rounding."""
+        """Return a bound of the error of any omega (rad/s): the estimate plus rounding errors."""
         largest = float(np.max(np.abs(self.omega), initial=0.0))
         return self.estimate + _HALF_ULP * largest
 
@@ -64,12 +64,13 @@ def reference(
     """Return the true solution of `scene` at `times` (s).
 
     The times are strictly monotonic in order away from 0, forward or backward; the first may be 0.
-    A series is accurate to more digits than binary64 has. If `precise`, it is accurate to 1e-25
-    before rounding, unless the motion amplifies errors too much. Its error is estimated by the
-    largest difference of two series of different order and step. `effort` is a factor on a work
-    limit of some ten seconds; the pace of the first steps decides whether the rest would exceed it.
-    Without `effort` the limit is 100 000 steps. If the scene has an attitude, the result has
-    attitudes, always by the series. `velocity` requests the velocity.
+    An integration by Taylor series is accurate to more digits than binary64 has. If `precise` is
+    true, it is accurate to 1e-25 before rounding, unless the motion amplifies errors too much. Its
+    error is estimated by the largest difference between two integrations with different order and
+    steps. `effort` is a factor on a work limit of some ten seconds. The pace of the first steps
+    decides whether the whole integration would exceed the limit. If `effort` is None, the limit is
+    100 000 steps. If the scene has an attitude, the result contains attitudes, which always come
+    from the series. `velocity` requests the translational velocity.
 
     Raise InputError if the times are not in order, or if the series needs too many steps.
     """
@@ -108,10 +109,10 @@ def reference(
 
 
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
-    """Return the closed form of a sphere, or of a symmetric body without torque, else None.
+    """Return omega of a sphere, or of a symmetric body without torque, in closed form, else None.
 
-    The solution has as many decimals as the arithmetic has digits. A phase of 1e41 radians
-    therefore needs 41 additional digits.
+    There is a row (rad/s) for each of `times` (s). The solution has as many decimals as the current
+    decimal arithmetic has digits. A phase of 1e41 radians therefore needs 41 additional digits.
     """
     with decimal.localcontext() as context:
         context.prec += _digits_before_the_point(scene, max(map(abs, times)))
@@ -119,7 +120,10 @@ def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 
 def _digits_before_the_point(scene: Scene, time: Decimal) -> int:
-    """Return a bound of the digits before the point of any number in a known solution."""
+    """Return a bound of the digits before the decimal point of any number in a known solution.
+
+    The known solution is computed from time 0 to `time` (s).
+    """
     law = scene.body_torque
     omega = max(Decimal(abs(w)) for w in scene.omega)
     rate = max(map(abs, exact_coefficients(scene))) * omega
@@ -158,7 +162,10 @@ def _known_rows(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 
 def _sphere(scene: Scene, t: Decimal) -> Row:
-    """Return omega of a sphere, omega(0) plus the integral of the normalized torque."""
+    """Return omega (rad/s) of a sphere at time t (s).
+
+    It is omega at time 0 plus the integral of the torque over the moment.
+    """
     torque = scene.body_torque
     row = []
     for axis in range(3):
@@ -179,7 +186,7 @@ def _sphere(scene: Scene, t: Decimal) -> Row:
 
 
 def exact_coefficients(scene: Scene) -> Row:
-    """Return A, B, C to all digits of the arithmetic."""
+    """Return A, B, C of Euler's equations to all digits of the current decimal arithmetic."""
     if scene.coefficients is not None:
         return [Decimal(x) for x in scene.coefficients]
     i1, i2, i3 = divisors(scene)

@@ -1,1 +1,1 @@
-"""Output formats of reports, and pictures with their numbers; nothing is computed here."""
+"""Output formats of reports, and files of pictures and their numbers; nothing is computed here."""

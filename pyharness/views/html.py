@@ -1,4 +1,4 @@
-"""Sections of a report as HTML, for insertion into pages."""
+"""Sections of a report as HTML, for insertion into web pages."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
@@ -12,14 +12,15 @@ def write(report: Report) -> str:
 
 
 def sections(text: Sequence[Section]) -> str:
-    """Return sections as HTML, in their order, with numbers formatted for people."""
+    """Return the sections of a report as HTML, in their order, with formatted numbers."""
     return "\n".join(part for section in text if section for part in _parts(section))
 
 
 def table(given: Table, label: str = "table", links: Mapping[str, str] | None = None) -> str:
     """Return a table as HTML, in a block that scrolls if the table is wider than the page.
 
-    `links` maps the text of a cell to the target of its link.
+    `label` is the name of the table for screen readers. `links` maps the text of a cell to the
+    target of its link.
     """
     (head, *rows), columns = given.written(), given.columns
     lines = [
@@ -46,7 +47,10 @@ def _cell(tag: str, text: str, left: bool, link: str | None = None) -> str:
 
 
 def _parts(section: Section) -> Iterator[str]:
-    """Yield the HTML of a section; successive lines, or successive fields, form one element."""
+    """Yield the HTML elements of a section.
+
+    Successive objects of type Line form one element, and so do successive objects of type Field.
+    """
     lines: list[str] = []
     fields: list[str] = []
     for each in [*section, ""]:

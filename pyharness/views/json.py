@@ -10,12 +10,15 @@ SCHEMA = 1
 
 
 def write(report: Report) -> str:
-    """Return the record of a report as JSON, with the number of its schema."""
+    """Return the record of a report as JSON, with the number of the JSON schema."""
     return json_text({"schema": SCHEMA, **report.record()})
 
 
 def json_text(record: dict[str, Any]) -> str:
-    """Return strict JSON in one line; floats round-trip, and a non-finite number becomes null."""
+    """Return a record as strict JSON in one line.
+
+    Floats round-trip, and a number that is not finite becomes null.
+    """
     try:
         return json.dumps(record, allow_nan=False) + "\n"
     except ValueError:

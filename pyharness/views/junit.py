@@ -6,7 +6,7 @@ from pyharness.model.report import Report
 
 
 def write(report: Report) -> str:
-    """Return a JUnit test suite with a test case for each check."""
+    """Return a JUnit test suite as XML, with a test case for each check of the report."""
     suite = xml.Element(
         "testsuite",
         name=report.title,

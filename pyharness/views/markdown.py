@@ -1,11 +1,11 @@
-"""A report in Markdown: its page, or its data with numbers in full."""
+"""A report as Markdown: its page, or its data with numbers in full if it has no page."""
 
 from pyharness.model.report import Report, Section, Table
 from pyharness.views.table import paragraph
 
 
 def write(report: Report) -> str:
-    """Return the page of a report, or its data if it has no page, as Markdown."""
+    """Return the page of a report, or its table of data if it has no page, as Markdown."""
     if report.page is not None:
         return "\n".join(map(_section, report.page))
     assert report.data is not None

@@ -1,4 +1,4 @@
-"""Files of a picture: an image with the same bytes in every run, and its numbers as CSV."""
+"""Files of a picture: an image with identical bytes in every run, and its numbers as CSV."""
 
 import io
 import textwrap
@@ -18,20 +18,24 @@ FORMATS = ("png", "svg", "pdf")
 # Without a fixed salt, or with a date, a file would have different bytes in every run.
 _REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
 _DATES: dict[str, dict[Any, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-# Of a title in font size 10.
+# Letters of a title in font size 10.
 _LETTERS_PER_INCH = 12.5
 _MOST_LINES = 4
 
 
 def check_picture(path: str) -> None:
-    """Raise InputError if a picture can't be made, before anything is computed for it."""
+    """Raise InputError if no picture can be made in the file `path` of --plot.
+
+    The suffix of `path` must be a known picture format, and matplotlib must be installed. This is
+    checked before anything is computed for the picture.
+    """
     if _form(path) not in FORMATS:
         raise InputError(f"--plot '{path}': unknown picture format; allowed: {', '.join(FORMATS)}")
     check_matplotlib("--plot")
 
 
 def check_matplotlib(what: str) -> None:
-    """Raise InputError if matplotlib is missing; `what` names the option or verb."""
+    """Raise InputError if matplotlib is missing; `what` names the option or verb that needs it."""
     try:
         import matplotlib  # noqa: F401
     except ImportError:
@@ -39,12 +43,16 @@ def check_matplotlib(what: str) -> None:
 
 
 def numbers_beside(path: str) -> str:
-    """Return the path of the CSV file with the numbers of a picture."""
+    """Return the path of the CSV file with the numbers of the picture in the file `path`."""
     return str(Path(path).with_suffix(".csv"))
 
 
 def saved(picture: Picture, *paths: str) -> dict[str, bytes]:
-    """Return file contents by path: the picture in the format of each suffix, and a CSV file."""
+    """Return the contents of the files of a picture, by path.
+
+    Each of `paths` gets the picture in the format of its suffix. The numbers of the picture are in
+    a CSV file beside the first path.
+    """
     _set_title(picture)
     content = {path: _image(picture.figure, _form(path)) for path in paths}
     return content | {numbers_beside(paths[0]): csv_text(picture.numbers).encode()}
@@ -55,7 +63,7 @@ def _form(path: str) -> str:
 
 
 def _set_title(picture: Picture) -> None:
-    """Set the title of the figure, wrapped to the figure's width."""
+    """Set the title of the picture's matplotlib figure, wrapped to the width of the figure."""
     if not picture.title:
         return
     room = int(_LETTERS_PER_INCH * picture.figure.get_figwidth())
@@ -74,7 +82,7 @@ def _image(figure: "Figure", form: str) -> bytes:
 
     buffer = io.BytesIO()
     with matplotlib.rc_context(_REPRODUCIBLE), warnings.catch_warnings():
-        # A letter that the font lacks is drawn as a box, as is usual.
+        # A letter that the font lacks is drawn as a box, without a warning.
         warnings.filterwarnings("ignore", r"Glyph \d+ .*missing from", UserWarning)
         figure.savefig(buffer, format=form, dpi="figure", metadata=_DATES.get(form))
     return buffer.getvalue()

@@ -1,4 +1,4 @@
-"""Choice of an output format: each format is a module of this package, named as in `--format`."""
+"""Choice of an output format: a format of `--format` is the module of that name in this package."""
 
 from importlib import import_module
 
@@ -6,6 +6,6 @@ from pyharness.model.report import Report
 
 
 def render(report: Report, form: str) -> str:
-    """Return a report as ``table`` (text), ``csv``, ``markdown``, ``json`` or ``junit``."""
+    """Return a report in the format `form`: table (text), csv, markdown, json, junit or html."""
     text: str = import_module(f"pyharness.views.{form}").write(report)
     return text

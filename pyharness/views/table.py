@@ -1,4 +1,4 @@
-"""A report as text of at most 100 columns."""
+"""A report as plain text of at most 100 columns."""
 
 import textwrap
 
@@ -24,7 +24,10 @@ def _lines(section: Section) -> list[str]:
 
 
 def paragraph(told: str | Field) -> list[str]:
-    """Return the wrapped lines of a paragraph, at least one line."""
+    """Return the wrapped lines of a paragraph, at least one line.
+
+    A Line is not wrapped, and a Field begins with its label.
+    """
     if isinstance(told, Line):
         return [told]
     if isinstance(told, Field):
@@ -36,7 +39,7 @@ def paragraph(told: str | Field) -> list[str]:
 
 
 def _aligned(table: Table) -> list[str]:
-    """Return the aligned lines of a table, without those in the middle if the table is long."""
+    """Return the aligned lines of a table, without the rows in the middle of a long table."""
     n = len(table.rows)
     if n > _MOST_ROWS:
         table = table._replace(rows=[*table.rows[:_END_ROWS], *table.rows[-_END_ROWS:]])

@@ -20,7 +20,10 @@ _COUNT = itertools.count()
 
 @dataclass(frozen=True)
 class PlantedTwin(Program):
-    """A program with a faulty twin; if `both`, the twin also replaces the compiled program."""
+    """A program with a faulty Python twin, which is `module`, a changed copy of the twin.
+
+    If `both`, the faulty twin also runs in place of the compiled program.
+    """
 
     module: ModuleType
     both: bool = True
@@ -28,7 +31,7 @@ class PlantedTwin(Program):
     def _computed(
         self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
-        """Run the faulty twin, or the unchanged compiled program."""
+        """Run the faulty twin on a scene; without `both`, the Fortran program runs unchanged."""
         if self.both or implementation == "python":
             lipschitz, may_stop, _ = options
             found: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)
@@ -39,7 +42,11 @@ class PlantedTwin(Program):
 def plant_in_twin(
     program: str, file: str, old: str, new: str, folder: Path, both: bool = True
 ) -> PlantedTwin:
-    """Copy the twins into `folder`, replace `old` by `new` in one file, and import the copy."""
+    """Return the program named `program`, with one fault in its Python twin.
+
+    The twins are copied into `folder`, the text `old` is replaced by `new` in the copy of `file`,
+    and the copy is imported. If `both`, the faulty twin also runs in place of the compiled program.
+    """
     package = f"planted_{next(_COUNT)}"
     target = folder / package
     ignore = shutil.ignore_patterns("__pycache__")

@@ -38,8 +38,8 @@ _BOTH = "pyharness.original.programs.Program.run"  # in either language
 class Plant:
     """A fault with its name, its description, and the context manager that plants it.
 
-    `kinds` are kinds of checks that can detect it, besides the golden record. The self-test runs
-    these.
+    `kinds` are the kinds of checks, besides the golden record, that can detect the fault. The
+    self-test runs these kinds.
     """
 
     name: str
@@ -49,13 +49,19 @@ class Plant:
 
 
 def instead(target: str, faulty: Callable[..., Any]) -> AbstractContextManager[Any]:
-    """Replace `target`, a dotted name, by ``faulty(right, ...)``; `right` is the original."""
+    """Return a context manager that replaces the function with the dotted name `target`.
+
+    A call then becomes ``faulty(right, ...)``, where `right` is the original function.
+    """
     right = pkgutil.resolve_name(target)
     return patch(target, lambda *rest, **named: faulty(right, *rest, **named))
 
 
 def changed(target: str, change: Callable[[Any], Any]) -> AbstractContextManager[Any]:
-    """Apply `change` to the results of the function of the dotted name `target`."""
+    """Return a context manager that applies `change` to the results of a function.
+
+    `target` is the dotted name of the function.
+    """
     return instead(target, lambda right, *rest, **named: change(right(*rest, **named)))
 
 
@@ -68,7 +74,10 @@ def _twin(program: str, file: str, old: str, new: str, both: bool) -> Iterator[N
 
 
 def _method(name: str, faulty: Callable[..., Trajectory]) -> AbstractContextManager[Any]:
-    """Replace the `solve` of a method by ``faulty(right, scene, times, ...)``."""
+    """Return a context manager that replaces the `solve` of the method `name`.
+
+    A call then becomes ``faulty(right, scene, times, ...)``, where `right` is the original `solve`.
+    """
     known = METHODS[name]
     return patch.dict(METHODS, {name: replace(known, solve=partial(faulty, known.solve))})
 
@@ -102,7 +111,10 @@ def _half_step_label(run: Trajectory) -> Trajectory:
 
 
 def _stale() -> Callable[[Trajectory], Trajectory]:
-    """Return a change that gives the previous trajectory if it has as many rows."""
+    """Return a fault, a function that maps each trajectory to the previous one of as many rows.
+
+    The first trajectory of each number of rows is returned unchanged.
+    """
     before: dict[int, Trajectory] = {}
 
     def change(run: Trajectory) -> Trajectory:
@@ -119,7 +131,10 @@ _Answer = tuple[Array, int, int, Array]
 
 
 def _prepared(change: Callable[[Array, _Answer], _Answer]) -> AbstractContextManager[Any]:
-    """Change the result of the kernel of a prepared solver; `change` also gets the packed input."""
+    """Return a context manager that changes the results of the kernel of prepared solvers.
+
+    Each result becomes ``change(packed, result)``, where `packed` is the input of the kernel.
+    """
     entry = extension.extension().solve_packed
     kernel = SimpleNamespace(
         solve_packed=lambda packed, *rest: change(packed, entry(packed, *rest))
@@ -128,7 +143,10 @@ def _prepared(change: Callable[[Array, _Answer], _Answer]) -> AbstractContextMan
 
 
 def _stale_solver() -> AbstractContextManager[Any]:
-    """Make every second call of a prepared solver return the result of the previous call."""
+    """Return a context manager by which every second call of a prepared solver is stale.
+
+    Such a call returns the result of the call before it.
+    """
     calls = itertools.count()
     before: list[_Answer] = []
 
@@ -150,7 +168,10 @@ _FIXED = [code for name, code in _CODES.items() if name.startswith(("gauss", "rk
 
 
 def _too_large(packed: Array, answer: _Answer) -> _Answer:
-    """Enlarge the results of the methods with a fixed step and of Gauss collocation by 1 %."""
+    """Return a kernel's answer, 1 % too large for methods with a fixed step and Gauss collocation.
+
+    `packed` is the input of the kernel, which contains the method.
+    """
     omega, status, steps, found = answer
     return (omega * 1.01 if packed[Places.METHOD] in _FIXED else omega, status, steps, found)
 
@@ -160,7 +181,7 @@ def _half_step(scene: Scene) -> Scene:
 
 
 def _half_step_compiled(run: Callable[..., Trajectory], scene: Scene, *rest: Any) -> Trajectory:
-    """Run with half the step size and return the times of whole steps."""
+    """Call `run`, a compiled program, with half the step size; return the times of whole steps."""
     found, labels = run(_half_step(scene), *rest), run(scene, *rest)
     if found.steps != labels.steps:
         return found
@@ -184,7 +205,10 @@ def _label_both(
 def _shifted(
     solve: Callable[..., Trajectory], scene: Scene, times: Sequence[float], *rest: float
 ) -> Trajectory:
-    """Solve for times half a step later; energy and momentum are conserved nevertheless."""
+    """Call `solve` for times that are half a step late, and return the requested times with it.
+
+    Energy and momentum are conserved nevertheless.
+    """
     half = 0.5 * scene.step_size if times[-1] >= 0.0 else -0.5 * scene.step_size
     found = solve(scene, [t + half for t in times], *rest)
     time = np.array(times[: len(found.time)], dtype=float)
@@ -192,7 +216,10 @@ def _shifted(
 
 
 def _wrong_card() -> AbstractContextManager[Any]:
-    """Exchange two flags that the compiled programs read, so that they correct other cards."""
+    """Return a context manager that exchanges two flags of the compiled programs.
+
+    The programs then correct other cards than those that the listing names.
+    """
     known = [entry["flag"] for entry in flagged() if entry["kind"] != "reading"]
     flags = Listing.flags.fget  # type: ignore[attr-defined]
 
@@ -206,7 +233,7 @@ def _wrong_card() -> AbstractContextManager[Any]:
 
 
 def _digit_altered(known: Problem) -> Problem:
-    """Change the last but one digit of a published figure."""
+    """Return a published problem with the last but one digit of its first number changed."""
     value = known.values[0]
     figure = next(each for each in value.omega if each is not None)
     wrong = replace(figure, value=figure.value + Decimal(20.0 * figure.accuracy))

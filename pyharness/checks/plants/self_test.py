@@ -1,4 +1,4 @@
-"""Self-test of `verify`: which checks detect each planted fault, and the report of it."""
+"""Self-test of `verify`: it plants one fault at a time, and reports which checks detect it."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -44,12 +44,17 @@ class Caught:
 
     @property
     def counts(self) -> str:
-        """Return the number of failed checks of each kind, as text."""
+        """Return the number of failed checks of each kind, as text for the report."""
         return ", ".join(f"{kind} {count}" for kind, count in self.failed.items())
 
 
 def self_test(seed: str, record: Path) -> Iterator[Caught]:
-    """Run a part of every kind without a fault, and the kinds that can detect each fault."""
+    """Yield which checks fail without any fault, and then with each planted fault.
+
+    Without a fault, a few checks of every kind are made. With a fault, only the kinds that can
+    detect it are made. `seed` determines the random scenes, and `record` is the folder of the
+    golden record.
+    """
     chosen = Selection(seed=seed, draws=_DRAWS, record=record, thin=True)
     yield _caught(None, chosen)
     for plant in PLANTS:
@@ -69,7 +74,10 @@ def _caught(plant: Plant | None, chosen: Selection) -> Caught:
 
 
 def as_check(caught: Caught) -> Check:
-    """Return the result for a planted fault as a check."""
+    """Return the result for a planted fault as a check, which passes if the fault was detected.
+
+    Its value is the number of failed checks besides the golden record.
+    """
     name = Name("self-test", caught.plant.name if caught.plant else "none")
     value = float(caught.failed.total() - caught.failed[_NOT_ENOUGH])
     again = "python -m pyharness verify --self-test"
@@ -78,7 +86,7 @@ def as_check(caught: Caught) -> Check:
 
 
 def self_test_report(title: Sequence[str], found: Sequence[Caught], seed: str) -> Report:
-    """Report each fault, and how many checks of each kind detected it."""
+    """Return the report of each fault, with the numbers of checks of each kind that detected it."""
     told = []
     for caught in found:
         plant = caught.plant or Plant("none", "no fault: nothing may fail", nullcontext, ())

@@ -1,4 +1,4 @@
-"""Trial of torque-free attitude: separatrix, symmetry, a million revolutions, poles of angles."""
+"""Trial of torque-free attitude: separatrix, symmetry, 1e6 revolutions, poles of Euler angles."""
 
 import math
 import random
@@ -46,7 +46,8 @@ from pyharness.truth.free_attitude import free_attitude, period_of
 _unknown = partial(unknown_flow, 1.0)
 _SERIES = ("taylor", "dop853")
 _TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
-# An angle in degrees is rounded when it is formed, converted and read again. Three angles add up.
+# An angle in degrees is rounded when it is formed, converted and read again. The errors of three
+# angles add up.
 _ANGLES = 64.0 * ROUNDING
 _BODIES = 8
 
@@ -60,7 +61,11 @@ _MOTIONS = {
 
 @dataclass(frozen=True)
 class Turn:
-    """A rotation of a whole problem, in the body or in space, and the inverse for its attitude."""
+    """A rotation of a whole problem, about axes of the body or of space.
+
+    `scene` rotates a scene. `back` applies the inverse rotation to the quaternions of its solution,
+    shape (n, 4).
+    """
 
     scene: Callable[[Scene], Scene]
     back: Callable[[Array], Array]
@@ -93,14 +98,21 @@ def _limit(truth: Truth, tried: Tried) -> float:
 
 
 def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> float:
-    """Return the largest error of an angle that a method may have (rad)."""
+    """Return the largest error of the attitude that a method may have at `time` (s), in rad.
+
+    A closed form may have rounding errors alone. Other methods may have an error of the tolerance,
+    amplified by the flow if perturbations grow a thousandfold, and amplified rounding errors.
+    """
     if method in FORMS:
         return ATTITUDE
     return flow.angle_limit(tolerance * lively(flow.amplification), time)
 
 
 POLICY = Policy(_limit, refusable)
-"""Policy that grants a closed form its rounding, others their tolerance and rounding, amplified."""
+"""Policy that grants a closed form its rounding, and other methods tolerance and rounding.
+
+Tolerance and rounding of the other methods are amplified by the flow.
+"""
 
 
 def _truth(scene: Scene, time: float, flow: Callable[[], Conditioning]) -> Truth:
@@ -140,7 +152,11 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterator[Check]:
-    """Judge a method's angle by the true solution; check quaternion norm and angular momentum."""
+    """Yield the checks of a method's attitude at the last time of the true solution `known()`.
+
+    They are the angle from the true attitude, the norm of the quaternion, and for closed forms the
+    drift of the angular momentum in space.
+    """
     scene, truth = scene_of(name), known()
     tried = by_rows(name.subject, tolerance, scene, [truth.end])
     # Quaternions are compared with their signs, since the sign is continuous in time.
@@ -158,7 +174,7 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
 
 
 def _omega_limit(scene: Scene) -> float:
-    """Return the relative error of the angular momentum for an omega error of 16 roundings."""
+    """Return the relative error of the angular momentum if omega has an error of 16 roundings."""
     momentum = np.array(scene.moments) * scene.omega
     size = float(np.linalg.norm(momentum)) or 1.0
     largest = max(scene.moments or (1.0,)) * max(map(abs, scene.omega))
@@ -174,11 +190,12 @@ def _momentum_drift(scene: Scene, found: Answer) -> float:
 
 
 def _montgomery(name: Name) -> Check:
-    """Check the rotation in one period about the angular momentum by Montgomery's formula.
+    """Check the rotation about the angular momentum in one period by Montgomery's formula.
 
-    The angle is 2 E T/L less the solid angle that the angular momentum encloses in the body, on the
-    side of the axis on which it keeps its sign. The angle is no invariant. No other check detects a
-    wrong rate of this rotation.
+    The angle is 2 E T/L less a solid angle, where E is the energy, T the period, and L the norm of
+    the angular momentum. The solid angle is the one that the angular momentum encloses in the body,
+    on the side of the axis on which it keeps its sign. The angle is no conserved quantity. No other
+    check detects a wrong rate of this rotation.
     """
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)
@@ -200,10 +217,10 @@ def _montgomery(name: Name) -> Check:
 
 
 def _solid_angle(scene: Scene, period: float) -> float:
-    """Return the solid angle enclosed by the path of the angular momentum in the body.
+    """Return the solid angle that the angular momentum encloses in the body in one period (s).
 
-    For a smooth periodic function no rule is better than the trapezoidal rule. omega comes from the
-    elliptic functions in decimals.
+    It is integrated by the trapezoidal rule, because no rule is better for a smooth periodic
+    function. omega comes from the elliptic functions in decimals.
     """
     moments = np.array(scene.moments)
     before, count, rows = math.inf, 32, np.empty((0, 3))
@@ -226,7 +243,10 @@ def _solid_angle(scene: Scene, period: float) -> float:
 
 
 def _turned(turn: Turn, name: Name) -> Check:
-    """Compare the attitude of the rotated problem, rotated back, with the original attitude."""
+    """Check that the attitude of the rotated problem, rotated back, is the original attitude.
+
+    Each of the two solutions may have the error that the method is allowed.
+    """
     scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
     plain, other = (
         solve(each, [time], method, tolerance, attitude=True).attitude
@@ -240,7 +260,10 @@ def _turned(turn: Turn, name: Name) -> Check:
 
 
 def _back(name: Name) -> Check:
-    """Check that integrating forward and back gives the initial attitude."""
+    """Check that integrating forward and back gives the initial attitude.
+
+    The limit is the sum of the errors that both integrations may cause.
+    """
     scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
     there = solve(scene, [time], method, tolerance, attitude=True)
     assert there.attitude is not None
@@ -258,7 +281,10 @@ def _back(name: Name) -> Check:
 
 
 def _angles(off: float, name: Name) -> Check:
-    """Check Euler angles near a pole by converting them back with SciPy's rotations."""
+    """Check Euler angles near a pole by converting them back with SciPy's rotations.
+
+    `off` is the distance of the second angle from the pole (rad).
+    """
     from scipy.spatial.transform import Rotation
 
     sequence = name.circumstance

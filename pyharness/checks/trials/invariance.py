@@ -51,10 +51,11 @@ SCENES = {
 
 @dataclass(frozen=True)
 class Symmetry:
-    """A transformation of a problem: the changed scene, and the result transformed back.
+    """A transformation of a problem, with its inverse for the result.
 
-    The changed problem takes the time divided by `faster`. `bitwise` are the methods and programs
-    whose operations change in the same way, so that their results must be bit-for-bit identical.
+    `turn` transforms the scene, whose motion then takes the time divided by `faster`. `back`
+    transforms the resulting omega back. `bitwise` are the methods and programs whose operations
+    change in the same way, so that their results must be bit-for-bit identical.
     """
 
     turn: Callable[[Scene], Scene]
@@ -137,12 +138,16 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
-    """Return omega at `time`; NaN if a prepared kernel did not get there."""
+    """Return omega at `time` (s) by the method `name`; NaN if a prepared solver ends before."""
     return run_method(name, scene, time, tolerance).omega
 
 
 def _turned(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Check:
-    """Compare the changed problem with the original problem."""
+    """Check that the result of the transformed problem, transformed back, is the original result.
+
+    The bits must agree for a method in `symmetry.bitwise`. Otherwise, each of the two results may
+    have the error that the method is allowed. A method with a fixed step then has no limit.
+    """
     scene, method = scene_of(name), name.subject
     try:
         plain = end(scene, time, method, tolerance)

@@ -33,8 +33,8 @@ MOTIONS = {
     # All three components take part, and the elliptic modulus is large.
     "tumbling": Scene("tumbling", (0.25, 1.0, 0.5), moments=(40.0, 30.0, 20.0)),
 }
-# With so many starts, over two decades of steps, a random walk is mistaken for a drift with a
-# probability below one in a thousand.
+# Number of initial conditions of each motion. With so many, over two decades of steps, a random
+# walk is mistaken for a drift with a probability below one in a thousand.
 STARTS = 12
 # Below this number of revolutions the rounding of the result itself is not negligible.
 _FIT_FROM = 10**2.5
@@ -57,18 +57,20 @@ Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
 
 @dataclass(frozen=True)
 class Marcher:
-    """A method with the noise of its steps and the length of its runs.
+    """A method whose growth of errors is measured, with error bounds of its steps.
 
     Attributes
     ----------
     run : callable
         ``run(scene, times)`` returns omega at the times, shape (n, 3), and the steps until then.
     noise : callable
-        ``noise(orbit, scene, step)`` returns bounds on what a step of that size (s) may add.
+        ``noise(orbit, scene, step)`` returns bounds on the errors that a step of the size `step`
+        (s) may add.
     revolutions, others : float
-        Revolutions in the longest run of the first start, and of the other starts.
+        Revolutions in the longest run from the first initial condition, and from the others.
     preference : bool
-        Whether the errors of a step are known to be biased. The expected powers are then 1 and 2.
+        Whether the errors of a step are known to be biased. Errors are then expected to grow like
+        the powers 1 (energy, momentum) and 2 (phase) of the number of steps.
     """
 
     run: Runner
@@ -100,7 +102,10 @@ def _gauss(stages: int) -> Runner:
 
 
 def _rate(scene: Scene) -> float:
-    """Return the largest rate of the linearised equations (1/s), within a third."""
+    """Return the largest rate of the linearised equations at the initial omega (1/s).
+
+    The value is accurate to a third.
+    """
     return speed(scene, max(map(abs, scene.omega)))
 
 
@@ -141,7 +146,12 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def hold(marcher: Marcher, name: Name) -> Iterator[Check]:
-    """Compare a method with Brouwer's law: a bound at each horizon, and the power of the growth."""
+    """Yield the checks of the growth of a method's errors, against Brouwer's law.
+
+    The errors of energy, momentum and phase after each number of revolutions are compared with
+    their bounds. The power of the number of steps with which they grow is compared with the
+    expected power.
+    """
     motion = name.circumstance
     for what, found, steps, limits in measured(marcher, MOTIONS[motion], orbit_of(motion)):
         horizons = np.array(REVOLUTIONS[: len(steps)])
@@ -157,7 +167,12 @@ def hold(marcher: Marcher, name: Name) -> Iterator[Check]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The error of one method against the number of steps, its bound, and the number of starts."""
+    """The errors of one quantity of a motion by one method, as a function of the number of steps.
+
+    The quantity `what` is energy, momentum or phase. The arrays have an element for each number of
+    revolutions. `steps` is the number of steps, `error` the root mean square of the errors over the
+    initial conditions, and `limits` its bound. `starts` is the number of initial conditions.
+    """
 
     motion: str
     method: str
@@ -169,7 +184,7 @@ class Drift:
 
 
 def curves() -> Iterator[Drift]:
-    """Measure every method on every motion, as the trial does."""
+    """Yield the errors of every quantity by every method on every motion, as the trial measures."""
     for motion, scene in MOTIONS.items():
         for method, marcher in MARCHERS.items():
             for what, found, steps, limits in measured(marcher, scene, orbit_of(motion)):
@@ -181,10 +196,11 @@ def curves() -> Iterator[Drift]:
 def measured(
     marcher: Marcher, scene: Scene, body: Orbit
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
-    """Yield a quantity, its errors, the steps to each horizon, and the bounds there.
+    """Yield a quantity, its errors, the steps to each horizon, and the bounds at each horizon.
 
-    The quantities are energy, momentum and phase. The errors have a row for each start and a column
-    for each horizon, with NaN beyond the end of the run.
+    The quantities are energy, momentum and phase. A horizon is a number of revolutions. The errors
+    have a row for each initial condition of `starts` and a column for each horizon, with NaN beyond
+    the end of the run. `body` is the orbit of the scene.
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * marcher.revolutions]
@@ -206,19 +222,25 @@ def measured(
 
 @cache
 def orbit_of(motion: str) -> Orbit:
-    """Return the orbit of a motion."""
+    """Return the `Orbit` of a motion of `MOTIONS`, with the quantities that the bounds need."""
     return brouwer.orbit(MOTIONS[motion])
 
 
 def starts(scene: Scene, body: Orbit) -> list[Scene]:
-    """Return several initial states of one motion, to average over the phase."""
+    """Return the scene with several initial omegas along one motion, to average over the phase.
+
+    `body` is the orbit of the motion.
+    """
     times = [0.37 * k / body.frequency for k in range(STARTS)]
     rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times]).tolist()
     return [replace(scene, omega=(row[0], row[1], row[2])) for row in rows]
 
 
 def _prepared(name: Name) -> Check:
-    """Compare a prepared solver bit for bit with the method's own run; both take the same steps."""
+    """Check that a prepared solver gives the same bits as the method's own run.
+
+    Both take the same steps, for 1e4 revolutions.
+    """
     method, scene = name.subject, MOTIONS[name.circumstance]
     time = 1e4 * 2.0 * math.pi / orbit_of(name.circumstance).largest
     rows, _ = MARCHERS[method].run(scene, [time])
@@ -246,7 +268,7 @@ def _scipy(name: Name) -> Iterator[Check]:
 
 
 def _program(listing: Listing, name: Name) -> Iterator[Check]:
-    """Describe the errors of a program after 10 and after 1e4 revolutions."""
+    """Report, without a limit, the errors of a program after 10 and after 1e4 revolutions."""
     scene = scene_of(name)
     found = unstopped(listing).rows(scene)
     for count in (1_000, 1_000_000):

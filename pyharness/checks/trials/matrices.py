@@ -62,7 +62,10 @@ def _condition_note(found: Solved) -> str:
 
 
 def _threshold(name: Name) -> Check:
-    """Compare the step below which IER is 129 with the step from the exact last pivot."""
+    """Compare the step up to which LEQT1F declares the matrix singular with the derived step.
+
+    LEQT1F then returns IER = 129. The derived step follows from the exact last pivot.
+    """
     program = name.subject
     wanted = singular_below(program)
     found = declared_singular_below(program)
@@ -74,9 +77,9 @@ def _threshold(name: Name) -> Check:
 
 
 def _counted(listing: Listing, name: Name) -> Check:
-    """Check the number of steps of a run that print IER = 129.
+    """Check the number of steps of a run in which the program prints IER = 129.
 
-    In the original programs the points move away from the singularity in later steps.
+    In the original programs the collocation points move in later steps, away from the singularity.
     """
     scene = scene_of(name)
     ier = compiled.run(scene, listing, velocity=False).ier

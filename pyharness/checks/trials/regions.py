@@ -1,4 +1,7 @@
-"""Trial of linear stability: each program's own steps against its derived amplification matrix."""
+"""Trial of linear stability: each program's own steps against its amplification matrix.
+
+The matrix is derived from the scheme, and the steps are made by running the program.
+"""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -43,7 +46,10 @@ _DIRECTIONS = {"real": -1.0 + 0.0j, "imaginary": 1.0j}
 
 
 def _attempts() -> Iterator[Attempt]:
-    """Compare the steps of every program with its matrix, Runge-Kutta also with each defect."""
+    """Yield deferred checks that compare the steps of every program with its amplification matrix.
+
+    The Runge-Kutta program is also tried with each of two defects alone.
+    """
     halves = [subset("runge-kutta", keep=[name]) for name in ("stage-base", "base-not-restored")]
     for listing in (*LISTINGS, *halves):
         label = "-".join(sorted(listing.defects)) if listing in halves else listing.label
@@ -110,7 +116,10 @@ def _polynomial(listing: Listing, name: Name) -> Check:
 
 
 def _spin(listing: Listing, name: Name) -> Check:
-    """Describe the growth per step of the wobble of a case's spin about axis 3."""
+    """Report, without a limit, the growth per step of the wobble of a case's spin about axis 3.
+
+    The growth is the spectral radius of the amplification matrix less 1.
+    """
     scene = scene_of(name)
     z = eigenvalues(replace(scene, omega=(0.0, 0.0, scene.omega[2])))
     spin = z[np.argmax(np.abs(z))]

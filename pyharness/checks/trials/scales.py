@@ -28,7 +28,11 @@ _DRIVEN_TWOS = (-320, -100, 100, 320)
 
 
 def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
-    """Check that one of our methods gives the same digits if a power of two scales the motion."""
+    """Yield deferred checks that a scaled motion by one of our methods has the same digits.
+
+    `powers` are the exponents of the powers of two by which omega is multiplied and the time
+    divided. `kind` is the first part of the circumstance's name.
+    """
     time = scene.step_size * scene.steps
     plain = cache(lambda: _tried(method, scene, time))
 
@@ -48,7 +52,7 @@ def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) ->
 
 
 def _beyond(name: Name) -> Check:
-    """Check that a method reports when omega leaves the range of binary64."""
+    """Check that a method reports an omega beyond the range of binary64, instead of a result."""
     run = _tried(name.subject, scene_of(name), 1e300)
     silent = run.has_result
     note = "a silent wrong number" if silent else run.ended
@@ -68,9 +72,10 @@ def _flow() -> Conditioning:
 
 
 def _truth(scene: Scene, time: float) -> Truth:
-    """Return the true solution, with the conditioning of the unscaled motion.
+    """Return the true omega of a scaled motion at `time` (s), with a known conditioning.
 
-    A scaled motion has the same error amplification as the motion itself.
+    A scaled motion has the same error amplification as the motion itself. The conditioning is
+    therefore computed once, for the unscaled motion.
     """
     size = max(map(abs, scene.omega)) / max(map(abs, ORDINARY.omega))
     return truth_of(scene, time, replace(_flow(), largest=_flow().largest * size))

@@ -16,7 +16,11 @@ _STAYS = 50.0  # s
 
 
 def _undisturbed() -> Iterator[Attempt]:
-    """Compare every method with the exact solution: a perturbation of 0 stays 0 for ever."""
+    """Yield deferred checks that a rotation about the middle axis stays constant.
+
+    Without a perturbation this is the exact solution. Every method must return it exactly, except
+    that `quick` may have one rounding error.
+    """
     scene = in_steps(
         Scene("middle axis, undisturbed", (0.0, 1.0, 0.0), moments=MIDDLE_AXIS), _STAYS
     )

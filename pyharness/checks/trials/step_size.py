@@ -45,7 +45,11 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attempt]:
-    """Judge the error at the end for every step, its crossing with rounding, and divergence."""
+    """Yield deferred checks of a method's errors and divergence in a case.
+
+    The error at the end is checked for every step size, and so is the step size at which truncation
+    and rounding errors are equal. `listing` is None for a method that is no program of the thesis.
+    """
     before = listing is not None and listing.label == "original"
     label = listing.label if listing else ""
     place = named("step-size", method, f"case-{case}", label, scene=case_scene(case))
@@ -78,7 +82,8 @@ def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attemp
 def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
     """Compare the smallest step at which truncation dominates with the prediction.
 
-    Truncation dominates if the error equals the predicted truncation error within a factor of 2.
+    `error` returns the relative error of omega for a number of steps. Truncation dominates if this
+    error equals the predicted truncation error within a factor of 2.
     """
     forecaster = _forecaster(case, method)
     smallest = SMALLEST
@@ -104,7 +109,11 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
 
 
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
-    """Return the error at the end over the largest omega, and a note on the run."""
+    """Return the relative error of omega at the end of a run, and a note on the run.
+
+    The error is relative to the largest omega. It is infinite or NaN if the run does not reach the
+    end.
+    """
     largest = _path(case).flow.largest
     note = ""
     if listing is not None:
@@ -136,7 +145,10 @@ def _rows(name: str, scene: Scene) -> Trajectory:
 
 
 def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
-    """Find the step sizes for which a run diverges, and compare them with any prediction."""
+    """Compare the smallest step for which a run diverges with the prediction of linear stability.
+
+    Without a prediction the step is only reported.
+    """
     scene, method = case_scene(case), name.subject
     if listing is None:
         runner: Runner = partial(_rows, method)
@@ -149,8 +161,8 @@ def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
         return name.described(found, _from(found, TIME))
     seen = divergence(scene, _LONG, amplification(scheme), runner, _SMALLEST_LONG)
     note = f"{_from(seen.found, _LONG)}, predicted from {seen.predicted:.4g} s"
-    # Linear theory does not cover points that move from step to step, unless the equations are
-    # linear.
+    # Linear theory does not cover collocation points that move from step to step, unless the
+    # equations are linear.
     if listing is None or listing.label == "corrected" or (method in PARTS and case == 2):
         return name.bounded(abs(seen.found / seen.predicted - 1.0), seen.limit, note)
     return name.described(seen.found, note)

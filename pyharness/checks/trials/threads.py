@@ -1,7 +1,7 @@
 """Trial of threads: the same calls from many threads at once give bit-for-bit identical results.
 
 `choose_instructions` sets the instruction set of the kernels for the whole process. It must be
-called before threads start, and is not called here.
+called before threads start, and is therefore not called here.
 """
 
 import random
@@ -56,7 +56,11 @@ class Job:
 
 
 def _run(only: Sequence[str]) -> Iterator[Check]:
-    """Make every call alone, then all calls at once in mixed order, several times each."""
+    """Yield, for each method, the check that its calls give the same bits in many threads as alone.
+
+    Each call is made alone first, and then `_REPEATS` times by `THREADS` threads in mixed order.
+    The value of a check is the number of calls that gave other bits, and the limit is 0.
+    """
     asked = [job for job in jobs() if may_hold(f"threads/{job.subject}", only)]
     differing = different(asked)
     for subject in dict.fromkeys(job.subject for job in asked):
@@ -68,7 +72,10 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
 
 
 def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEATS) -> list[Job]:
-    """Return the jobs that gave other bits in many threads than in a call alone."""
+    """Return the jobs that gave other bits in many threads than in a call alone.
+
+    Each job is called `repeats` times, and is returned once for each call with other bits.
+    """
     alone = [bits(job) for job in jobs]
     order = [index for index in range(len(jobs)) for _ in range(repeats)]
     random.Random("threads").shuffle(order)
@@ -83,7 +90,7 @@ def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEA
 
 
 def bits(job: Job) -> bytes:
-    """Make the call and return its bits; for a refusal, return its message."""
+    """Make the call of a job and return its bits; for a refusal, return its message."""
     try:
         return job.call()
     except InputError as refusal:
@@ -91,7 +98,10 @@ def bits(job: Job) -> bytes:
 
 
 def jobs() -> list[Job]:
-    """Return the calls of every method, prepared solver, program and twin, and a refused call."""
+    """Return the calls of every method, prepared solver, program and twin in all scenes.
+
+    Calls that are refused, and calls of the linear solver, are among them.
+    """
     found = []
     for scene in SCENES:
         for name in METHODS:
@@ -126,7 +136,7 @@ def _prepared(scene: Scene, name: str) -> bytes:
 
 @cache
 def _shared(scene: Scene, name: str) -> Solver:
-    """Return the single solver that all threads call."""
+    """Return the prepared solver named `name` for a scene, which all threads share."""
     return prepare(scene, name, 1e-7)
 
 
@@ -137,7 +147,7 @@ def _program(scene: Scene, listing: Listing, implementation: str) -> bytes:
 
 
 def _refusal(scene: Scene) -> bytes:
-    """Request a tolerance that no method claims to meet."""
+    """Request a tolerance that no method claims to meet, which raises InputError."""
     return method_candidate("taylor", 1e-30).rows(scene, _TIMES).omega.tobytes()
 
 

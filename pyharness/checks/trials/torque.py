@@ -41,9 +41,10 @@ _START = (0.3, 1.0, 2.0)
 
 @dataclass(frozen=True, eq=False)
 class Circumstance:
-    """A scene that is tried until a time (s), and the methods that can take it.
+    """A scene that is tried until a time (s), with the methods that can take it.
 
-    If `programs` is set, the programs are also run over the scene's steps.
+    `truth` computes the true solution. If `programs` is set, the programs are also run over the
+    scene's steps.
     """
 
     scene: Scene
@@ -54,7 +55,7 @@ class Circumstance:
 
 
 def axial(scene: Scene, time: float) -> Truth:
-    """Return the true solution of a symmetric body whose torque acts along its axis.
+    """Return the true omega at `time` (s) of a symmetric body whose torque acts along its axis.
 
     The rounding error of a wave's angle, frequency times t, is random from one evaluation to the
     next. `conditioning` counts n such errors in full, with n evaluations, at least one per period.
@@ -70,9 +71,9 @@ def axial(scene: Scene, time: float) -> Truth:
 
 
 def averaged(scene: Scene, time: float) -> Truth:
-    """Return the true solution without the wave, which is too fast to matter.
+    """Return the true omega at `time` (s) without the waves of the torque.
 
-    The effect of the wave is added to the error of the solution.
+    The waves are too fast to matter. A bound on their effect is added to the error of the solution.
     """
     moments = np.array(scene.moments)
     waves = scene.torque.sines + scene.torque.cosines
@@ -82,9 +83,10 @@ def averaged(scene: Scene, time: float) -> Truth:
 
 
 def summed(scene: Scene, time: float) -> Truth:
-    """Return the true solution of a sphere, whose closed form has its angle in double-double.
+    """Return the true omega at `time` (s) of a sphere, for a limit of a few rounding errors.
 
-    The angle then has no rounding error. Only the rounding of the terms of one sum is left.
+    The closed form has the angle of a wave in double-double, so that this angle has no rounding
+    error. Only the rounding of the terms of one sum is left.
     """
     known = reference(scene, [time])
     largest = float(np.abs([known.omega[-1], scene.omega]).max())
@@ -94,7 +96,10 @@ def summed(scene: Scene, time: float) -> Truth:
 
 
 def _wave(frequency: float) -> Circumstance:
-    """Return a scene with torques about all axes that change omega by about 1 rad/s per period."""
+    """Return a scene with torques about all axes that change omega by about 1 rad/s per period.
+
+    `frequency` is the angular frequency of the torques (rad/s).
+    """
     size = 10.0 * frequency
     law = TorqueLaw(
         sines=(((4.0 * size, 0.0, 2.0 * size), frequency),),
@@ -113,7 +118,10 @@ def _spun(frequency: float, time: float, programs: bool) -> Circumstance:
 
 
 def _huge(size: float, start: Triple = _START) -> Circumstance:
-    """Return a scene with a constant torque, for some fifty radians of the motion it causes."""
+    """Return a scene with a constant torque, for some fifty radians of the motion it causes.
+
+    `size` is the largest component of the torque (N m), and `start` is the initial omega (rad/s).
+    """
     law = TorqueLaw((size, 0.7 * size, -0.5 * size))
     scene = Scene("huge torque", start, moments=_BODY, torque=law, steps=6)
     return Circumstance(scene, math.sqrt(4e3 / size), programs=size == 1e6)
@@ -177,7 +185,10 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check]:
-    """Judge one method by the true solution, with tolerance and rounding amplified by the flow."""
+    """Yield the check of the error of one method at the last time of the true solution.
+
+    The limit is the sum of tolerance and rounding, both amplified by the flow.
+    """
     assert tolerance is not None
     method = name.subject
     kind = prepared_candidate if method in _PREPARED else method_candidate
@@ -188,7 +199,10 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
 
 
 def _describe_axial(name: Name) -> Iterator[Attempt]:
-    """Describe the results of runs whose steps are a hundred radians of a wave apart."""
+    """Yield deferred checks that report, without a limit, the errors of runs with too large steps.
+
+    A step of the scene takes a hundred radians of the torque's wave, or more.
+    """
     scene = scene_of(name)
     truth = cache(lambda: brouwer.floats(axial_top(scene, scene.times())))
 

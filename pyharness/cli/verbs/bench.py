@@ -18,7 +18,7 @@ from pyharness.model.scene_file import case_numbers
 from pyharness.scenes.random_scenes import weekly_seed
 
 _Named = TypeVar("_Named", bound=Contender)
-# s; beyond it the reference, in decimal arithmetic, takes too long.
+# s; beyond this time the reference, in decimal arithmetic, takes too long.
 _LONGEST = 1e3
 _BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
 OPTIONS = {
@@ -39,7 +39,7 @@ EXAMPLE = "bench --case 5 --peers none"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure, print the results and return the exit status."""
+    """Measure run times and errors, print the results, and return exit status 0."""
     if options.ensemble:
         return _ensemble(options)
     if options.bodies is not None:
@@ -86,7 +86,12 @@ def run(options: argparse.Namespace) -> int:
 def _present(
     methods: Sequence[_Named], others: Sequence[_Named], named: bool
 ) -> tuple[list[_Named], list[_Named]]:
-    """Return the contenders, and those not installed; raise InputError for these if `named`."""
+    """Return the solvers to measure, and the third-party solvers that are not installed.
+
+    `methods` are our solvers, and `others` the third-party ones. Raise InputError if nothing is
+    left to measure. If `named`, because the user listed the third-party solvers, also raise it if
+    one of these is not installed.
+    """
     missing = [each for each in others if not each.is_installed]
     if missing and named:
         raise InputError(
@@ -103,7 +108,10 @@ def _absent() -> str:
 
 
 def _count(options: argparse.Namespace) -> int:
-    """Return the number of random scenes, 0 without --random; set a missing seed to the week's."""
+    """Return the number of random scenes that --random gives, or 0 without --random.
+
+    With --random, a missing seed in `options` is set to the present week.
+    """
     if options.random is None:
         if options.seed is not None:
             raise InputError("--seed has no meaning without --random or --ensemble")
@@ -123,9 +131,12 @@ def chosen(
     where: str,
     attitude: bool = False,
 ) -> list[SceneContender]:
-    """Return the contenders that `text` lists, by name or package; by default all able ones.
+    """Return the solvers for single scenes that the value `text` of an option lists.
 
-    With `attitude`, a listed contender must compute the attitude; without it, omega alone.
+    The value lists solvers by name or by package. `what` is the noun for a solver in a message, and
+    `where` the option. With `attitude`, a listed solver must be able to compute the attitude;
+    without it, omega alone. Otherwise InputError is raised. If `text` is None, the result is all
+    of `contenders` with `attitude`, and without it those that can compute omega alone.
     """
     if text is None:
         return [each for each in contenders if attitude or each.velocity]
@@ -139,7 +150,7 @@ def chosen(
 
 
 def _again(options: argparse.Namespace) -> str:
-    """Return the command that reproduces the page."""
+    """Return the command that measures the same again and prints the report as Markdown."""
     command = "pyharness bench" + (" --ensemble" if options.ensemble else "")
     for name in ("case", "horizon", "random", "bodies", "seed", "methods", "peers"):
         value = getattr(options, name)
@@ -196,7 +207,11 @@ def _ensemble(options: argparse.Namespace) -> int:
 
 
 def named(contenders: Sequence[_Named], text: str | None, what: str, where: str) -> list[_Named]:
-    """Return the contenders that `text` lists, by name or package; by default all."""
+    """Return the solvers that the value `text` of an option lists, by name or package.
+
+    If `text` is None, the result is all of `contenders`; for "none" it is empty. `what` is the noun
+    for a solver in a message, and `where` the option. Raise InputError for an unknown name.
+    """
     names: list[str] = shared.names(text)
     if names == ["none"]:
         return []

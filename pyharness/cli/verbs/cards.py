@@ -1,4 +1,7 @@
-"""`cards`: the text of the edition, card by card, beside the scan, the port and the twin."""
+"""`cards`: the text of the edition, card by card, beside the scan, the port and the twin.
+
+The port is the Fortran program of this edition, and the twin its Python counterpart.
+"""
 
 import argparse
 from hashlib import sha256
@@ -25,7 +28,10 @@ EXAMPLE = "cards runge-kutta:860"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show the cards; return exit status 1 if a difference in a scan or deck is unexplained."""
+    """Print the requested cards, or a comparison of the scan or the decks with our reading.
+
+    Return exit status 1 if a difference in a scan or in a deck is unexplained, otherwise 0.
+    """
     if options.format == "tei":
         from pyharness.history.tei import tei_document
 

@@ -1,4 +1,4 @@
-"""`claims`: the statements of the thesis by kind, each with a verdict."""
+"""`claims`: the statements of the thesis, each with a verdict whether it is reproduced."""
 
 import argparse
 
@@ -22,7 +22,7 @@ EXAMPLE = "claims --explain abstract-superior"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Judge the claims, print the verdicts and return exit status 0."""
+    """Judge the claims of the thesis, print the verdicts, and return exit status 0."""
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain", "evidence", "word"))
         shared.check_known("format", options.format, ("table", "json"))

@@ -1,4 +1,4 @@
-"""`compare`: original and corrected programs, Fortran and Python, each against the truth."""
+"""`compare`: original and corrected programs, in Fortran and Python, against the reference."""
 
 import argparse
 from collections.abc import Sequence
@@ -29,7 +29,11 @@ EXAMPLE = "compare --case 3 --listing original --plot case-3.png"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print a comparison; return status 1 if unexpected, or sensitive with --strict."""
+    """Compare the programs on a scene, and print the comparison.
+
+    Return exit status 1 if a result is unexpected, or with --strict if the scene is sensitive, that
+    is, if amplified rounding errors exceed the tolerance. Otherwise return 0.
+    """
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)
     shared.check_known("word", options.word, WORD_NAMES)

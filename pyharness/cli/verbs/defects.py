@@ -1,4 +1,4 @@
-"""`defects`: the entries of the apparatus and their effects."""
+"""`defects`: the entries of the apparatus (defects, readings, ...) and their effects."""
 
 import argparse
 
@@ -17,7 +17,10 @@ EXAMPLE = "defects stage-base"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show the list, or one entry with its effect in every case."""
+    """Print all entries of the apparatus, or one entry with its effect in every case of Table 1.
+
+    Return exit status 0.
+    """
     listed = entries(options.kind)
     if options.name is None:
         shared.check_outputs(options)
@@ -34,7 +37,10 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _card(options: argparse.Namespace) -> int:
-    """Show a card and the apparatus entries that name it, with their effects."""
+    """Print a card and the entries of the apparatus that name it, with their effects in all cases.
+
+    Return exit status 0.
+    """
     from pyharness.history.cards_report import cards_report
     from pyharness.original.cards import chosen
 

@@ -1,4 +1,4 @@
-"""`doctor`: the build, its compiler and flags, and missing parts."""
+"""`doctor`: the build of this installation, its compiler and flags, and what is missing."""
 
 import argparse
 
@@ -13,7 +13,7 @@ EXAMPLE = "doctor"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the report; return exit status 3 if the extension is not built."""
+    """Print the report on the build; return exit status 3 if the extension is not built, else 0."""
     shared.check_outputs(options)
     found = build()
     shared.show(doctor_report(found), options)

@@ -1,4 +1,4 @@
-"""`edition`: the edition as a static web site."""
+"""`edition`: the whole edition of the three programs as a static web site."""
 
 import argparse
 
@@ -15,7 +15,10 @@ EXAMPLE = "edition --out pages"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Make all pages, write them and print a list of the files."""
+    """Make all pages of the web site, write them, and print a list of the written files.
+
+    Return exit status 0.
+    """
     from pyharness.cli.output import check_tree, write_tree
     from pyharness.edition.libraries import check_libraries
     from pyharness.edition.report import MARK, edition_report

@@ -1,4 +1,4 @@
-"""`family`: derived and measured orders of the weighted residual methods."""
+"""`family`: orders of convergence of the weighted residual methods, derived and measured."""
 
 import argparse
 
@@ -26,7 +26,10 @@ EXAMPLE = "family --case 5 --weighting galerkin --terms 3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the orders; return exit status 1 if a measured order is below the derived one."""
+    """Measure the orders of the methods on a scene and print them beside the derived orders.
+
+    Return exit status 1 if a measured order is below the derived order, otherwise 0.
+    """
     if options.lost:
         return _lost(options)
     shared.refuse(options, "the family; give --lost", ("word",))

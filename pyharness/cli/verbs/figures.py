@@ -15,7 +15,10 @@ EXAMPLE = "figures --out figures"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Draw all figures, then write all files and print a list of them."""
+    """Draw Figures 6 to 12, then write all files, and print a list of the figures.
+
+    Return exit status 0.
+    """
     from pyharness.cli.output import check_folder, write_folder
     from pyharness.views.pictures import check_matplotlib, saved
     from pyharness.views.render import render

@@ -18,7 +18,10 @@ EXAMPLE = "limits --case 5 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compare the original programs with their limits and with the truth."""
+    """Compare the original programs with their limits and with the true solution.
+
+    Print the distances for each step size, and return exit status 0.
+    """
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)
     halvings = 6 if options.halvings is None else shared.whole(options.halvings, "--halvings")

@@ -1,4 +1,4 @@
-"""`plan`: the computations that a scene requires, those left out, and the reasons."""
+"""`plan`: the computations that a scene requires, the computations left out, and the reasons."""
 
 import argparse
 
@@ -19,7 +19,7 @@ EXAMPLE = "plan --case 5 --tolerance 1e-9"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the decisions of the plan for a scene."""
+    """Print which parts of the solution of a scene are computed, and why; return exit status 0."""
     scene = shared.chosen_scene(options, any_torque=True)
     method = options.method or "auto"
     shared.check_known("method", method, tuple(PREPARED))

@@ -16,7 +16,7 @@ EXAMPLE = "rotations --case 4 --disturbance 1e-3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Find the steady rotations and print them."""
+    """Find the steady rotations of a scene and print them; return exit status 0."""
     scene = shared.chosen_scene(options)
     disturbance = shared.positive(options.disturbance, "--disturbance", 1e-3)
     if disturbance >= 1.0:

@@ -46,7 +46,11 @@ EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the results; return exit status 1 if they are sensitive and --strict is given."""
+    """Compute one trajectory by a program or a method, and print it.
+
+    Return exit status 1 if --strict is given and amplified rounding errors exceed the tolerance.
+    Otherwise return 0.
+    """
     by_method = options.method is not None
     scene = shared.chosen_scene(options, any_axes=by_method, any_torque=by_method)
     if (options.program is None) == (options.method is None):
@@ -83,7 +87,11 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) -> None:
-    """Raise InputError if the run has no page or tape, or if a tape would go to a terminal."""
+    """Raise InputError if the run can not be written in `form`, which is "printer" or "tape5".
+
+    Only a program has a printer page and a tape. A tape is binary, and is not written to a
+    terminal.
+    """
     if options.program is None:
         raise InputError(
             f"--format {form} has no meaning with --method; allowed: {', '.join(shared.FORMATS)}"

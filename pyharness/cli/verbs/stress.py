@@ -1,4 +1,4 @@
-"""`stress`: trials of numerical stability, each against a bound derived beforehand."""
+"""`stress`: trials of numerical stability, each with a bound that was derived beforehand."""
 
 import argparse
 
@@ -20,7 +20,10 @@ EXAMPLE = "stress --only separatrix --plot separatrix.png"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the trials and print them; return exit status 1 if a bound does not hold."""
+    """Run the requested trials and print their results.
+
+    Return exit status 1 if a result exceeds its bound, otherwise 0.
+    """
     only = shared.chosen_names(options.only, "trial", tuple(TRIALS))
     if options.plot is not None and len(_chosen(only)) != 1:
         raise InputError("--plot draws one trial: choose it by --only, as in --only separatrix")

@@ -1,4 +1,7 @@
-"""`sweep`: a grid of scenes, solved chunk by chunk into a store that a later run completes."""
+"""`sweep`: a grid of scenes, solved chunk by chunk, with the results in a store.
+
+A later run completes the store of an interrupted run.
+"""
 
 import argparse
 from functools import partial
@@ -32,7 +35,10 @@ EXAMPLE = "sweep docs/tumbling.toml --out store"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute the missing chunks of the store, and print a report of its contents."""
+    """Compute the missing chunks of the store, and print a report of its contents.
+
+    Return exit status 0.
+    """
     if options.file is None:
         raise InputError("sweep: give a sweep file, as in 'sweep FILE.toml --out STORE'")
     if options.out is None:

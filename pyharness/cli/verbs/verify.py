@@ -1,4 +1,4 @@
-"""`verify`: bit-for-bit comparisons, errors against the truth, and the golden record."""
+"""`verify`: bit-for-bit comparisons of programs, errors against references, the golden record."""
 
 import argparse
 from pathlib import Path
@@ -158,7 +158,10 @@ def _title(chosen: Selection) -> list[str]:
 
 
 def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
-    """Return a line on decks or published figures that no check judged; no failure shows it."""
+    """Return a line about decks or published numbers that no check could judge, or no line.
+
+    The line is needed because such a check does not fail.
+    """
     if chosen.may_ask("decks") and compiler() is None:
         return ["decks: not run, as there is no gfortran on the PATH"]
     count = sum(check.passed and check.value is None for check in checks)

@@ -1,4 +1,8 @@
-"""`words`: the programs with words of any length and rounding, and test vectors of the CDC."""
+"""`words`: the programs with words of any length and rounding, and test vectors of the CDC.
+
+A word is a floating-point format, with a precision in bits and a rounding rule. A test vector is an
+instruction of the CDC with its operands and its result.
+"""
 
 import argparse
 
@@ -24,7 +28,10 @@ EXAMPLE = "words --case 2 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the programs in every word, or check vectors; return status 1 if a vector differs."""
+    """Run the programs with every word, or check our arithmetic of the CDC by test vectors.
+
+    Return exit status 1 if our result of a test vector differs from its result, otherwise 0.
+    """
     if options.vectors is not None:
         shared.refuse(options, "--vectors", ("case", "program", "all", "plot"))
         return _vectors(options)

@@ -1,7 +1,8 @@
 """The atlas of claims: which claims of the thesis hold from which initial omega.
 
-The starts, values of omega(0), cover the sphere at several magnitudes. A verdict counts as in
-`evidence`: 1 if reproduced, 1/2 if in part, 0 otherwise, without weights.
+The starts, values of omega(0), cover the sphere of directions at several magnitudes. A verdict has
+points as in `evidence`: 1 if the claim is reproduced, 1/2 if in part, 0 otherwise, without weights.
+A verdict code is one of the integers FAILS, HOLDS and IN_PART.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,10 +38,10 @@ Codes = NDArray[np.int8]
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """The verdict codes of each claim over a grid of readings, steps and starts.
+    """The verdict codes of each claim over a grid of readings, numbers of steps and starts.
 
-    The axes of each array are reading, steps, magnitude of omega(0) (rad/s), height (omega3 divided
-    by the magnitude) and longitude (rad).
+    `codes` has an array for each claim. Its axes are reading, number of steps, magnitude of
+    omega(0) (rad/s), height (omega3 divided by the magnitude) and longitude (rad).
     """
 
     codes: Mapping[str, Codes]
@@ -60,16 +61,23 @@ class Atlas:
         return list(product(self.readings, self.steps))
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return the sum of the points of all claims, shape (magnitude, height, longitude)."""
+        """Return for each start the sum of the points of all claims.
+
+        `reading` and `steps` are indices into `readings` and `self.steps`. The shape is that of the
+        starts, (magnitude, height, longitude).
+        """
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
-        """Return for each start whether every claim is reproduced, at least in part."""
+        """Return for each start whether every claim is reproduced, at least in part.
+
+        The arguments and the shape are as in `score`.
+        """
         held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
         return np.asarray(np.all(held, axis=0))
 
     def start(self, at: Sequence[int] | NDArray[Any]) -> Triple:
-        """Return omega(0) (rad/s) at the grid indices `at`."""
+        """Return omega(0) (rad/s) at the grid indices `at` of magnitude, height and longitude."""
         size, height = self.magnitudes[at[0]], self.heights[at[1]]
         across, longitude = np.sqrt(1.0 - height * height), self.longitudes[at[2]]
         found = size * np.array([across * np.cos(longitude), across * np.sin(longitude), height])
@@ -77,9 +85,11 @@ class Atlas:
 
 
 def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
-    """Return the atlas of a sweep's claims; `axes` are its dimensions with their values, in order.
+    """Return the atlas that a sweep over starts, readings and numbers of steps has computed.
 
-    Raise InputError if they are not the axes of an atlas, or if the sweep is incomplete.
+    `codes` are the verdict codes by claim, negative where the sweep is incomplete. `axes` are the
+    dimensions of these arrays with their values, in order. Raise InputError if they are not the
+    axes of an atlas, or if the sweep is incomplete.
     """
     if tuple(axes) != (*CHOSEN, *WHERE) or not codes:
         allowed = ", ".join((*CHOSEN, *WHERE))
@@ -95,7 +105,7 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
-    """Return the sum of the points of several verdicts."""
+    """Return the sum of the points of several claims' verdicts, with the shape of each array."""
     values = np.zeros(len(_CODES) + 1)
     for code, points in _POINTS.items():
         values[code] = points
@@ -103,7 +113,10 @@ def sum_of_points(codes: Sequence[Codes]) -> Array:
 
 
 def shares(codes: Codes) -> tuple[float, float, float]:
-    """Return the fractions of starts from which a claim is reproduced, in part, and not at all."""
+    """Return the fractions of starts from which a claim is reproduced, in part, and not at all.
+
+    `codes` are the verdict codes of the claim, one for each start.
+    """
     whole, part, not_at_all = (float((codes == each).mean()) for each in (HOLDS, IN_PART, FAILS))
     return whole, part, not_at_all
 
@@ -111,8 +124,8 @@ def shares(codes: Codes) -> tuple[float, float, float]:
 def bits(codes: Codes) -> float:
     """Return the entropy of a claim's verdict over the starts, in bits.
 
-    It is 0 if the verdict is the same from every start, and 1 if each of two verdicts comes from
-    half of the starts.
+    `codes` are the verdict codes of the claim, one for each start. The entropy is 0 if the verdict
+    is the same from every start, and 1 if each of two verdicts comes from half of the starts.
     """
     parts = np.array([(codes == code).mean() for code in _CODES])
     parts = parts[parts > 0.0]
@@ -120,7 +133,7 @@ def bits(codes: Codes) -> float:
 
 
 def about(names: Sequence[str]) -> dict[int, list[str]]:
-    """Return the claims that are about a single case, by the number of the case."""
+    """Return, by case, the identifiers of the claims in `names` that are about this case alone."""
     found: dict[int, list[str]] = {}
     for name in names:
         case = claim(name)["parameters"].get("case")
@@ -130,7 +143,10 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return the verdict codes of claims from the starts that the thesis shows, and from ours."""
+    """Return, by start and claim, the verdict codes of the claims `names` from a few starts.
+
+    The starts are the initial omegas that the thesis shows, and our own (`laboratory.starts`).
+    """
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))
     found = {name: judged(claim(name), bench, len(given)) for name in names}

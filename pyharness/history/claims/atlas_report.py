@@ -30,7 +30,10 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 
 
 def atlas_report(atlas: Atlas) -> Report:
-    """Report an atlas, with the first reading and number of steps unless a table shows others."""
+    """Return the report of `claims --atlas`: how the verdicts depend on the initial omega.
+
+    Unless a table compares them, the tables are for the first reading and number of steps.
+    """
     claims = _claims(atlas)
     score = atlas.score()
     first = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
@@ -154,9 +157,10 @@ def _by_choice(atlas: Atlas) -> Table:
 
 
 def _turned(atlas: Atlas) -> Table:
-    """Return the fraction of verdicts that another reading changes, or another number of steps.
+    """Return a table, by claim, of the fraction of starts whose verdict another choice changes.
 
-    Only one of the two is changed at a time.
+    The other choice is a reading or a number of steps other than the first; only one of the two is
+    changed at a time.
     """
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]
@@ -170,7 +174,11 @@ def _turned(atlas: Atlas) -> Table:
 
 
 def atlas_picture(atlas: Atlas) -> Picture:
-    """Draw the points over the sphere at some magnitudes, and each claim over all magnitudes."""
+    """Draw maps of the sum of the claims' points over the sphere of directions of omega(0).
+
+    Beside the maps, which are for some magnitudes of omega(0), a diagram shows the mean points of
+    each claim at every magnitude.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 7.2), dpi=100, layout="constrained")
@@ -263,7 +271,7 @@ def _draw_claims(figure: "Figure", atlas: Atlas, names: Sequence[str], means: An
 
 
 def _edges(values: Array) -> Array:
-    """Return the edges of the cells around `values` on a logarithmic axis."""
+    """Return the edges of a picture's cells, whose centres on a logarithmic axis are `values`."""
     if len(values) < 2:
         return np.array([values[0] / 2.0, values[0] * 2.0])
     middles = np.sqrt(values[1:] * values[:-1])

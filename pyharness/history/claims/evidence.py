@@ -26,23 +26,29 @@ KINDS = ("result", "design")
 
 @dataclass(frozen=True)
 class Combination:
-    """One combination of the open choices, the verdicts on all testable claims, and its score."""
+    """One combination of the choices that the thesis leaves open, with the verdicts under it.
+
+    `verdicts` are on all testable claims about the original programs, by the claim's identifier.
+    """
 
     assumptions: Assumptions
     verdicts: dict[str, str]
 
     @property
     def score(self) -> float:
-        """Return the sum of the points of all claims."""
+        """Return the sum of the claims' points: 1 if reproduced, 1/2 if in part, 0 otherwise."""
         return sum(POINTS.get(each, 0.0) for each in self.verdicts.values())
 
     @property
     def holding(self) -> int:
-        """Return how many claims are reproduced, at least in part."""
+        """Return how many claims are reproduced, at least in part, under this combination."""
         return sum(each in POINTS for each in self.verdicts.values())
 
     def choices(self) -> dict[str, str]:
-        """Return the choice on each axis, as text."""
+        """Return, by axis, the value that this combination chooses, as text.
+
+        The axes are omega(0), each reading, each conjecture, and the number of steps.
+        """
         given = self.assumptions
         start = given.start or ()
         return {
@@ -57,7 +63,7 @@ class Combination:
 
 
 def evidence() -> Iterator[Combination]:
-    """Compute and yield every combination with its verdicts, one by one."""
+    """Compute and yield every combination of the open choices with its verdicts, one by one."""
     for assumptions in combinations():
         verdicts = {}
         for entry in claims():
@@ -70,7 +76,7 @@ def evidence() -> Iterator[Combination]:
 
 
 def evidence_rule() -> str:
-    """Return the description of how a combination is scored."""
+    """Return the text that tells readers of the report how a combination of choices is scored."""
     return (
         "Every combination of starts (one for all cases in which none is given, or those adopted), "
         "readings, conjectures and steps, scored by the claims about results and design of the "
@@ -90,7 +96,7 @@ def combinations() -> list[Assumptions]:
 
 
 def discriminating(found: list[Combination]) -> list[str]:
-    """Return the claims whose verdict is not the same in all combinations."""
+    """Return the identifiers of the claims whose verdict differs between combinations."""
     every = dict.fromkeys(name for each in found for name in each.verdicts)
     return [
         name for name in every if len({each.verdicts.get(name, NOT_TESTABLE) for each in found}) > 1
@@ -98,14 +104,21 @@ def discriminating(found: list[Combination]) -> list[str]:
 
 
 def undecided(found: list[Combination]) -> dict[str, list[str]]:
-    """Return, by axis, the choices that occur among the combinations of the highest score."""
+    """Return, by axis, the choices that occur among the combinations of the highest score.
+
+    The axes are omega(0), each reading, each conjecture, and the number of steps.
+    """
     best = max(each.score for each in found)
     choices = [each.choices() for each in found if each.score == best]
     return {axis: sorted({each[axis] for each in choices}) for axis in choices[0]}
 
 
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
-    """Return the choices on which a claim depends; all other choices are the adopted ones."""
+    """Return the assumptions with the chosen values on which a claim depends.
+
+    `entry` is the claim, as in `data/claims.toml`. Assumptions on which the claim does not depend
+    have their adopted values, so that equal tests are run only once.
+    """
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)
     named = [each for each in hangs_on if each.startswith("conjecture ")]

@@ -34,7 +34,11 @@ _SHORT = {
 
 
 def evidence_report(found: Sequence[Combination]) -> Report:
-    """Report the best and worst combinations, the discriminating claims, and the open choices."""
+    """Return the report of the evidence on the choices that the thesis leaves open.
+
+    It shows the combinations of choices with the highest and lowest scores, the claims whose
+    verdict differs between combinations, and the choices that the highest score leaves open.
+    """
     ordered = sorted(found, key=lambda each: -each.score)
     axes = list(ordered[0].choices())
     columns = [

@@ -22,12 +22,13 @@ from pyharness.truth.reference import Reference, reference
 
 @dataclass(frozen=True)
 class Assumptions:
-    """The choices that the thesis leaves open.
+    """One value for each choice that the thesis leaves open.
 
-    `start` is omega(0) (rad/s) of the cases without a given start; None takes the values in
-    `cases.toml`. `readings` are the selected readings that are not adopted. `conjectures` are the
-    assumptions where no card exists; None takes those of the original listing. `word` is the
-    arithmetic of the programs.
+    `start` is omega(0) (rad/s) of the cases in which the thesis gives none; None takes the values
+    in `cases.toml`. `readings` are names of readings of a card that the edition does not adopt, but
+    that are used here. `steps` is the number of steps of every run. `conjectures` are the
+    assumptions where no card exists; None takes those of the original listing. `word` is the name
+    of the arithmetic of the programs.
     """
 
     start: Triple | None = None
@@ -39,7 +40,10 @@ class Assumptions:
 
 @dataclass(frozen=True)
 class Laboratory:
-    """The three programs: with their defects except those in `fixed`, or wholly corrected."""
+    """The three programs, original or corrected, which run the cases under given assumptions.
+
+    The original programs have all their defects but those in `fixed`.
+    """
 
     is_original: bool
     assumptions: Assumptions = field(default_factory=Assumptions)
@@ -60,21 +64,30 @@ class Laboratory:
         return replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
 
     def run(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Trajectory:
-        """Run a program on a case."""
+        """Run a program on a case; without `may_stop` the stop test is skipped.
+
+        The step size is divided by `parts`.
+        """
         return self.run_on(self.scene(case, parts), self.listing(program), may_stop)
 
     def run_on(
         self, scene: Scene, listing: Listing, may_stop: bool = True, lipschitz: float = 500.0
     ) -> Trajectory:
-        """Run a listing on any scene, in the assumed arithmetic."""
+        """Run a listing on any scene, in the assumed arithmetic.
+
+        `lipschitz` is the constant of the stop test (1/s); without `may_stop` the test is skipped.
+        """
         return _run(listing, scene, may_stop, lipschitz, self.assumptions.word)
 
     def truth(self, case: int) -> Reference:
-        """Return the reference solution of a case at its steps."""
+        """Return the reference solution of a case, under the assumptions, at the case's steps."""
         return _truth(self.scene(case))
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program on a case, and return arrays for the rules."""
+        """Run a program as `run` does, and return the arrays that `rules` need.
+
+        Omega has the rows at the steps of the case only, and is NaN after the end of the run.
+        """
         run = self.run(program, case, may_stop, parts)
         reached = run.omega[parts - 1 :: parts]
         omega = np.full((self.assumptions.steps, 3), np.nan)
@@ -83,23 +96,31 @@ class Laboratory:
         return Runs(omega, np.asarray(len(reached)), complete, overflow)
 
     def solution(self, case: int) -> Array:
-        """Return the reference omega (rad/s) of a case at its steps."""
+        """Return the reference omega (rad/s) of a case at its steps, shape (steps, 3)."""
         return self.truth(case).omega
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> float:
-        """Return the largest error of omega (rad/s) at the steps of the case; inf on overflow."""
+        """Return the largest error of any omega component (rad/s) at the steps of the case.
+
+        It is infinite after an overflow. The arguments are as in `run`.
+        """
         return float(largest_error(self, program, case, may_stop, parts))
 
     def models(self, case: int, terms: int) -> Array:
-        """Return omega of the collocation model with n = `terms` terms, at points k/(n+1).
+        """Return omega (rad/s) of the collocation model with n = `terms` terms, shape (steps, 3).
 
-        In the original programs the points leave the interval; the torque must then be constant.
+        Its collocation points are at k/(n+1) of the step, k = 1 ... n. In the original programs the
+        points move out of the step; the torque must then be constant.
         """
         accumulates = self.is_original and "dt-accumulates" not in self.fixed
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
 
     def required_constant(self, case: int) -> float:
-        """Return the least Lipschitz constant (1/s) with which Runge-Kutta runs all steps."""
+        """Return the least Lipschitz constant (1/s) with which every step passes the stop test.
+
+        The stop test is that of the Runge-Kutta program. The constant is infinite if no constant
+        is large enough.
+        """
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
         for _ in range(6 * scene.steps):
@@ -113,26 +134,32 @@ class Laboratory:
 
 
 def starts() -> list[Triple]:
-    """Return the initial angular velocities that the thesis shows, and our own (rad/s)."""
+    """Return the initial omegas (rad/s) that the thesis shows anywhere, and one of our own.
+
+    They are tried in the cases for which the thesis gives no initial omega.
+    """
     return [
         (float(a), float(b), float(c)) for a, b, c in (s["omega"] for s in facts("claims")["start"])
     ]
 
 
 def distance(first: Array, second: Array) -> float:
-    """Return the largest difference of any component over the common rows (rad/s)."""
+    """Return the largest difference of any omega component over the common rows (rad/s).
+
+    The arrays have the shape (rows, 3); the longer one is cut to the rows of the shorter one.
+    """
     n = min(len(first), len(second))
     with np.errstate(all="ignore"):
         return float(np.abs(first[:n] - second[:n]).max(initial=0.0))
 
 
 def ranges(truth: Reference) -> Array:
-    """Return the range of each component over the steps (rad/s)."""
+    """Return the range of each omega component of a reference solution (rad/s), shape (3,)."""
     return spread_of(truth.omega)
 
 
 def largest(truth: Reference) -> float:
-    """Return the largest magnitude of any component of omega (rad/s)."""
+    """Return the largest magnitude of any omega component of a reference solution (rad/s)."""
     return float(largest_of(truth.omega))
 
 
@@ -177,18 +204,22 @@ def _model(scene: Scene, terms: int, accumulates: bool, word: str) -> Array:
 
 
 LITERALS = ("DT=", "T=", "DT+")
-"""The step literals of the collocation decks: DT before the loop, interval end, growth of DT."""
+"""The places where the collocation decks have the step size as a literal number.
+
+They are DT before the loop, the end of the interval, and the growth of DT in every step.
+"""
 
 
 @cache
 def by_literals(
     scenes: tuple[Scene, ...], terms: int, changed: frozenset[str], parts: int
 ) -> Array:
-    """Run original collocation decks with the step's literals in `changed` divided by `parts`.
+    """Run an original collocation deck with some of its step literals divided by `parts`.
 
-    All scenes run at once and must have constant torque. Return omega (rad/s) of every scene at the
-    steps of the unchanged deck, shape (scenes, steps, 3); NaN from an overflow on. It agrees with
-    the decks but for rounding.
+    `terms` is 2 for the two-term deck and 4 for the four-term deck. `changed` has the names in
+    `LITERALS` of the literals that are divided. All scenes run at once and must have constant
+    torque. Return omega (rad/s) of every scene at the steps of the unchanged deck, shape (scenes,
+    steps, 3); NaN from an overflow on. It agrees with the decks but for rounding error.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
@@ -206,9 +237,11 @@ def march_models(
 ) -> Array:  # fmt: skip
     """Integrate collocation models of constant torque from n initial omegas at once.
 
-    `omega`, shape (n, 3), has the initial omegas (rad/s). The points are in (0, dt), where dt (s)
-    grows by `growth` with every step; each step is `end` long. Return omega, shape (n, steps, 3),
-    which agrees with the programs but for rounding; NaN from an overflow on.
+    `omega`, shape (n, 3), has the initial omegas (rad/s). `coefficients` are A, B and C of Euler's
+    equations, and `torque` is the constant torque divided by the moments (rad/s2). `terms` is the
+    number of terms of the trial functions. The collocation points are in (0, dt), where dt (s)
+    grows by `growth` (s) with every step; each step is `end` (s) long. Return omega, shape (n,
+    steps, 3), which agrees with the programs but for rounding error; NaN from an overflow on.
     """
     a, b, c = coefficients.T
 

@@ -19,7 +19,10 @@ _ROOMS = (verdicts, methods, theory)
 
 @dataclass(frozen=True)
 class Survival:
-    """The verdicts with one assumption changed, and whether both stay the same."""
+    """The verdicts on one claim, original and corrected, with one assumption changed.
+
+    `survives` is true if both verdicts are the same as with the adopted assumptions.
+    """
 
     assumption: str
     original: str
@@ -29,7 +32,10 @@ class Survival:
 
 @dataclass(frozen=True)
 class Judgement:
-    """A claim of `data/claims.toml` with its verdicts, also with each assumption changed."""
+    """A claim of `data/claims.toml` with its verdicts for the original and corrected programs.
+
+    `survivals` has the verdicts with each assumption changed, one at a time.
+    """
 
     claim: dict[str, Any]
     original: Judged
@@ -39,10 +45,11 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Assignment:
-    """An initial omega (rad/s) for a case without a given one, and the verdicts on its claims.
+    """An initial omega for a case in which the thesis gives none, and the verdicts on its claims.
 
-    The verdicts are on the original programs. `holds` is true if all of the claims are reproduced,
-    at least in part; claims that fail with every start do not count.
+    `start` is the initial omega (rad/s). The verdicts, by claim, are on the original programs.
+    `holds` is true if all claims about the case are reproduced, at least in part; claims that fail
+    with every start do not count.
     """
 
     case: int
@@ -58,7 +65,7 @@ def claims() -> list[dict[str, Any]]:
 
 
 def claim(identity: str) -> dict[str, Any]:
-    """Return one claim; raise InputError if no claim has that identifier."""
+    """Return the claim with an identifier; raise InputError if no claim has this identifier."""
     by_name = {each["id"]: each for each in claims()}
     if identity not in by_name:
         raise unknown("claim", identity, list(by_name))
@@ -66,7 +73,11 @@ def claim(identity: str) -> dict[str, Any]:
 
 
 def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
-    """Test one claim in the arithmetic `word`, as assumed and with each assumption changed."""
+    """Test one claim under the adopted assumptions, and again with each assumption changed.
+
+    Return all verdicts, for the original and the corrected programs. `entry` is the claim, as in
+    `data/claims.toml`, and `word` the name of the arithmetic in which the programs run.
+    """
 
     def verdicts(assumptions: Assumptions) -> tuple[Judged, Judged]:
         programs = outcome(entry, Laboratory(True, assumptions))
@@ -84,12 +95,18 @@ def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
 
 @cache
 def judgement(identity: str, word: str = BINARY64) -> Judgement:
-    """Return the judgement of the claim with that identifier, computed once in a process."""
+    """Return the verdicts of `judge` on the claim with an identifier, computed once in a process.
+
+    `word` is the name of the arithmetic in which the programs run.
+    """
     return judge(claim(identity), word)
 
 
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
-    """Run the test of a claim in one laboratory."""
+    """Return the verdict on a claim, by its test, with the programs that a laboratory runs.
+
+    `entry` is the claim, as in `data/claims.toml`.
+    """
     (test,) = (vars(room)[entry["test"]] for room in _ROOMS if entry["test"] in vars(room))
     judged: Judged = test(laboratory, **entry.get("parameters", {}))
     return judged
@@ -113,11 +130,11 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 
 
 def assignments() -> list[Assignment]:
-    """Return the assignments of initial omegas to the cases for which the thesis gives none.
+    """Return one assignment for each start and each case in which the thesis gives no omega(0).
 
-    The claims about a case do not depend on the start of another case. All claims therefore hold at
-    once if every case has a start with which its own claims hold. Claims that fail with every start
-    do not count.
+    The starts are those of `starts`. The claims about a case do not depend on the start of another
+    case. All claims therefore hold at once if every case has a start with which its own claims
+    hold. Claims that fail with every start do not count.
     """
     found = []
     for case in facts("claims")["assumed"]["cases"]:

@@ -1,4 +1,9 @@
-"""Tests of the claims about programs and methods over several cases; see `verdicts`."""
+"""Tests of the claims about programs and methods over several cases.
+
+Each function is the `test` of one or more claims in `data/claims.toml`, with arguments, errors and
+verdicts as in `verdicts`. `cases` are numbers of cases of Table 1. A test of weighted residual
+methods that the thesis does not list has the verdict "not testable" for the original programs.
+"""
 
 import math
 from collections.abc import Sequence
@@ -36,9 +41,11 @@ _OTHERS = WEIGHTINGS[1:]
 
 
 def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
-    """Compare collocation with Runge-Kutta, at the steps that all three programs ran.
+    """Judge the claim that collocation is superior to Runge-Kutta, at the steps that all ran.
 
-    The numbers of the cases in `shown` are reported, but do not affect the verdict.
+    A case counts if both collocation errors are below the Runge-Kutta error. Reproduced if all
+    `cases` count, in part if some do, otherwise false. The error ratios of the cases in `shown`
+    are reported too, but do not affect the verdict.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):
@@ -54,7 +61,13 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 
 
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Compare the program's quotient with the norm of the Jacobian, its upper bound by eq. 19."""
+    """Judge the claim that eq. 19, the Lipschitz condition, is what ends unbounded runs.
+
+    The program's stop test forms a quotient, the change of the slopes over the change of omega. By
+    eq. 19 it is at most the norm of the Jacobian. The ratio of the largest quotient to the largest
+    norm along the solution and the run is computed in each case. Reproduced if no ratio exceeds
+    1.05, in part if none exceeds 2, otherwise false.
+    """
     numbers: dict[str, float] = {}
     for case in cases:
         a, b, c = lab.scene(case).euler_coefficients
@@ -76,7 +89,11 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
 
 
 def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Measure how much models of more than four terms reduce the error."""
+    """Judge the claim that collocation models of more than four terms improve little on four.
+
+    `terms` are the numbers of terms above four. The error of four terms is divided by the error of
+    each of these models. Reproduced if no ratio exceeds 2, in part if none exceeds 10.
+    """
     numbers = {}
     for case in cases:
         truth = lab.truth(case).omega
@@ -90,13 +107,22 @@ def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
 
 
 def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Find the smallest Lipschitz constants with which every step passes the stop test."""
+    """Judge the claim that some case needs a Lipschitz constant above that of the deck.
+
+    The numbers are the smallest constants (1/s) with which every step passes the stop test.
+    """
     numbers = {f"case {n}: constant needed (1/s)": lab.required_constant(n) for n in cases}
     return graded(numbers, max(numbers.values()) > facts("cases")["deck"]["lipschitz"])
 
 
 def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
-    """Count the bounded and the unbounded runs of the cases that the stop test ends."""
+    """Judge the claim that the stop test ends the runs that are unbounded, and no others.
+
+    A Runge-Kutta run without the test counts as unbounded if omega overflows, or exceeds `bounded`
+    times the largest omega of the solution. Reproduced if the test ends all unbounded runs and no
+    bounded run, in part if it ends some unbounded run, otherwise false. Not testable if no run is
+    unbounded, and no bounded run is ended.
+    """
     alarms = unbounded = caught = 0
     for case in cases:
         run = lab.run("runge-kutta", case)
@@ -123,7 +149,11 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 
 
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
-    """Measure how much a tenth of the step reduces the errors of the collocation programs."""
+    """Judge the claim that collocation improves with a tenth of the step, by `rules.small_step`.
+
+    The exception is the two-term program in the case `exception`. For the original programs the
+    numbers also show the effect of changing each literal of the step on the cards.
+    """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
         constant = [case for case in cases if not lab.scene(case).torque.varies]
@@ -132,7 +162,10 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
 
 
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
-    """Count the cases that improve, for each subset of the step's literals divided by ten."""
+    """Count the cases whose error falls to half when literals of the step are divided by ten.
+
+    Return the counts for each collocation program and each subset of `LITERALS`, by description.
+    """
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
     for program, terms in zip(COLLOCATION, (2, 4), strict=True):
@@ -149,14 +182,22 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
 
 
 def small_step_runge_kutta(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Measure how much a tenth of the step reduces Runge-Kutta's error, without the stop test."""
+    """Judge the claim that Runge-Kutta does not improve with a tenth of the step.
+
+    The rule is `rules.small_step_runge_kutta`; the runs are without the stop test.
+    """
     return judged(rules.small_step_runge_kutta(lab, cases))
 
 
 def suffices(
     lab: Laboratory, cases: Sequence[int], terms: Sequence[int], share: float, enough: int
 ) -> Judged:
-    """Count the cases in which the models of three and four terms stay near the reference."""
+    """Judge the claim that a three- or four-term model suffices for most problems.
+
+    A case counts if the errors of the four-term program and of the model with `terms[0]` terms are
+    at most the fraction `share` of the largest omega. Reproduced if at least `enough` cases count,
+    in part if at least three do. The original model is left out if the torque varies.
+    """
     numbers, good = {}, 0
     for case in cases:
         truth = lab.truth(case)
@@ -171,7 +212,12 @@ def suffices(
 
 
 def execution_time(lab: Laboratory, low: float, high: float) -> Judged:
-    """Count the floating-point operations per step on the cards and in our own LEQT1F."""
+    """Judge the claim that collocation takes about twice the time of Runge-Kutta.
+
+    The time is measured by the floating-point operations of one step on the cards and in our own
+    LEQT1F, counted as written and with common terms once. Reproduced if the ratio to Runge-Kutta is
+    from `low` to `high` for both programs and both counts, in part if for some.
+    """
     counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
     numbers, inside = {}, []
     for way, told in (("written", "as written"), ("once", "common terms once")):
@@ -186,7 +232,10 @@ def execution_time(lab: Laboratory, low: float, high: float) -> Judged:
 
 
 def seconds(lab: Laboratory) -> Judged:
-    """Count operations, because run times today say nothing about the original machine."""
+    """Count the floating-point operations of 100 steps of each program; not testable.
+
+    The claim is about seconds, and run times today say nothing about the original machine.
+    """
     counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
     numbers = {
         f"{program}: operations in 100 steps": 100.0 * each.written
@@ -196,7 +245,13 @@ def seconds(lab: Laboratory) -> Judged:
 
 
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
-    """Count the cards of each deck, without a matrix subroutine and with our own LEQT1F."""
+    """Judge the claim that the programs are about equally long, by the number of their cards.
+
+    The cards of each collocation deck are divided by those of Runge-Kutta, without LEQT1F and with
+    our own LEQT1F. `factors` are two thresholds for the largest ratio. Reproduced if every ratio is
+    at most both thresholds. Not reproduced if the largest ratio exceeds both thresholds, and every
+    ratio the lower one. Otherwise undecided.
+    """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
     numbers["LEQT1F, ours: cards"] = float(solver_cards())
@@ -214,7 +269,12 @@ def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
 
 
 def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Measure the errors of the other weightings in the cases with a known solution."""
+    """Judge the claim that the weightings other than collocation failed, in `cases`.
+
+    These are the cases with a known solution, and `terms` the numbers of terms that are tried.
+    Reproduced if some error exceeds the largest omega, in part if some error exceeds ten times the
+    error of collocation.
+    """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers, useless, worst = {}, False, 0.0
@@ -234,10 +294,12 @@ def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
 def computer_error(
     lab: Laboratory, limit: float, words: Sequence[str], cases: Sequence[int]
 ) -> Judged:
-    """Measure rounding error alone, in Case 1, at ever smaller steps.
+    """Judge the claim that rounding error makes the weightings other than collocation fail.
 
-    Every member of the family solves Case 1 exactly but for rounding. Also compare the methods as
-    IV.2 describes them, run in words of the machine, with binary64.
+    The numbers are the errors in Case 1, which every method solves exactly but for rounding, at
+    ever smaller steps. They are also the differences between binary64 and the arithmetics named in
+    `words`, for the methods as IV.2 describes them, in `cases`. Reproduced if the largest number
+    reaches `limit` (rad/s), otherwise false.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -260,7 +322,12 @@ def computer_error(
 
 
 def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Measure the error of every other weighting, divided by the error of collocation."""
+    """Judge the claim that of the four weightings only collocation succeeds.
+
+    The largest error of each other weighting is divided by the error of collocation, in `cases`
+    and with the numbers of terms in `terms`. Reproduced if every ratio exceeds 10, in part if some
+    ratio does, otherwise false.
+    """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers = {}
@@ -277,7 +344,12 @@ def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]
 def all_succeed(
     lab: Laboratory, cases: Sequence[int], terms: Sequence[int], share: float
 ) -> Judged:
-    """Measure the error of every weighting, divided by the largest omega."""
+    """Judge the claim that the weighted residual methods integrate the rigid body problem.
+
+    Reproduced if the error of every weighting, in all `cases` and with all numbers of terms in
+    `terms`, is at most the fraction `share` of the largest omega. In part if the error of some
+    weighting is, otherwise false.
+    """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers = {
@@ -293,9 +365,10 @@ def all_succeed(
 
 
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Compare the corrected programs with collocation members that make one correction.
+    """Compare the corrected programs with collocation by a first estimate and one correction.
 
-    Also measure the error of four-term collocation with zero to three corrections.
+    The numbers also show the error of four-term collocation with zero to three corrections. The
+    claim is a recommendation, so the verdict is always "not testable".
     """
     best = Laboratory(False, lab.assumptions)
     numbers = {}

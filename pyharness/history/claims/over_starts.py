@@ -1,8 +1,8 @@
-"""Verdicts on claims from many initial omegas at once, by the rules of the ledger on arrays.
+"""Verdicts on claims from many initial omegas at once, by the functions in `rules` on arrays.
 
-A sweep supplies the starts (values of omega(0)), the listing, the readings and the steps. Each
-start is used in all cases in which the thesis gives none. A sweep calls the attribute of this
-module with the name of a claim in `JUDGED`; `__getattr__` returns the function.
+A sweep supplies the starts (values of omega(0)), the listing with its readings, and the number of
+steps. Each start is used in all cases in which the thesis gives none. A sweep calls the attribute
+of this module with the name of a claim in `JUDGED`; `__getattr__` returns the function.
 """
 
 from collections.abc import Callable
@@ -34,13 +34,14 @@ _EFFORT = 1e9  # work limit, in effect none: a sweep reports its expected time b
 
 
 class Starts:
-    """A bench of n starts for the cases without a given one; all else is as in `one`.
+    """A bench (see `rules`) with n starts for the cases in which the thesis gives no omega(0).
 
-    The Taylor series integrates the reference solution from row to row, each row to 1e-12.
+    Programs, cases and assumptions are those of the laboratory `one`. The reference solution is
+    integrated by Taylor series from row to row, each row to a relative tolerance of 1e-12.
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
-        """Store the laboratory and the starts, without running anything yet."""
+        """Store the laboratory and the starts `omega0`, shape (n, 3), rad/s; nothing runs yet."""
         self._one, self._omega0 = one, omega0
         self._solution = cache(self._marched)
         self._error = cache(partial(rules.largest_error, self))
@@ -48,11 +49,17 @@ class Starts:
         self._models = cache(self._modelled)
 
     def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return the scene of a case; its omega(0) is not a start of the bench."""
+        """Return the scene of a case, its step size divided by `parts`.
+
+        Its omega(0) is not a start of the bench where the thesis gives none.
+        """
         return self._one.scene(case, parts)
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program on a case; shape (n, steps, 3), or (steps, 3) if the start is given."""
+        """Run a program on a case from every start, with arguments as in `rules.Bench`.
+
+        The shape of omega is (n, steps, 3), or (steps, 3) if the thesis gives the case's omega(0).
+        """
         # Runs with smaller steps are requested once, for their error, which is cached.
         return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
 
@@ -61,11 +68,17 @@ class Starts:
         return self._solution(case)
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Any:
-        """Return the largest errors of omega (rad/s) at the steps of the case; inf on overflow."""
+        """Return the largest errors of omega (rad/s) at the steps of the case, for each start.
+
+        An error is infinite after an overflow. The arguments are as in `rules.Bench`.
+        """
         return self._error(program, case, may_stop, parts)
 
     def models(self, case: int, terms: int) -> Array:
-        """Return omega of the collocation models, equal to `Laboratory.models` but for rounding."""
+        """Return omega (rad/s) of the collocation models whose trial functions have `terms` terms.
+
+        From the same start it equals `Laboratory.models` but for rounding error.
+        """
         return self._models(case, terms)
 
     def _starts(self, case: int) -> Array:
@@ -124,11 +137,11 @@ def __getattr__(name: str) -> Callable[[Batch], NDArray[np.int8]]:
 
 
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
-    """Return the verdict code of a claim about the programs for each start of a sweep.
+    """Return the verdict code of a claim about the programs for each start in a batch of a sweep.
 
-    The code is SILENT if the sweep's scene is no case of Table 1, or if the sweep varies more than
-    starts, readings and steps. The claim itself determines which cases are run, whatever the case
-    of the sweep.
+    The code is FAILS, HOLDS, IN_PART or SILENT, shape (n,). It is SILENT if the sweep's scene is no
+    case of Table 1, or if the sweep varies more than starts, readings and steps. The claim itself
+    determines which cases are run, whatever the case of the sweep.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
@@ -141,7 +154,10 @@ def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
 
 
 def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
-    """Return the verdict codes of a claim from the n starts of a bench."""
+    """Return the verdict codes of a claim from the n starts of a bench, shape (n,).
+
+    `entry` is the claim, as in `data/claims.toml`. A code is FAILS, HOLDS or IN_PART.
+    """
     grade = vars(rules)[entry["test"]](bench, **entry["parameters"])
     found = np.where(grade.whole, HOLDS, np.where(grade.part, IN_PART, FAILS))
     return np.broadcast_to(found, (n,)).astype(np.int8)
@@ -154,7 +170,12 @@ def _bench(one: Laboratory, batch: Batch) -> Starts:
 
 
 def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
-    """Return the laboratory that tests claims for a sweep; None if claims do not apply to it."""
+    """Return the laboratory that runs the programs of a sweep under the assumptions.
+
+    Return None if the claims do not apply to the sweep, because its program is neither the original
+    nor the corrected one, its scene is no case of Table 1, it varies body or torque, or its stop
+    test is not the deck's.
+    """
     if batch.listing is None or batch.arrays.keys() & _OF_CASES:
         return None
     deck = facts("cases")["deck"]

@@ -40,7 +40,7 @@ KINDS = {
 
 
 def claims_report(judgements: Sequence[Judgement]) -> Report:
-    """Report the ledger, one line for each claim."""
+    """Return the report of all claims with their verdicts, one line for each claim."""
     rows = [
         [
             each.claim["id"], each.claim["kind"], each.claim["where"], each.original.verdict,
@@ -66,7 +66,10 @@ def claims_report(judgements: Sequence[Judgement]) -> Report:
 
 
 def kinds_table(judgements: Sequence[Judgement]) -> Table:
-    """Return how many claims of each kind have each verdict: original / corrected."""
+    """Return a table of the number of claims with each verdict, one row for each kind of claim.
+
+    A cell has two numbers: for the original programs and, after a slash, for the corrected ones.
+    """
     columns = [*words("kind"), Column("claims"), *map(Column, _VERDICTS)]
     rows = []
     for kind in KINDS:
@@ -82,7 +85,7 @@ def kinds_table(judgements: Sequence[Judgement]) -> Table:
 
 
 def explanation(judgement: Judgement) -> Report:
-    """Report one claim: its quotation, its rule, its verdicts and the numbers behind them."""
+    """Return the report of one claim: its quotation, its rule, its verdicts and their numbers."""
     entry = judgement.claim
     text: list[Section] = [
         [f'{entry["id"]} ({entry["where"]}): "{entry["quote"]}"'],
@@ -108,7 +111,11 @@ def explanation(judgement: Judgement) -> Report:
 
 
 def assignments_report(assignments: Sequence[Assignment]) -> Report:
-    """Report with which initial omegas the claims on each case hold for the original programs."""
+    """Return the report on the initial omegas with which the claims about each case hold.
+
+    The verdicts are on the original programs. An assignment is one initial omega for one case in
+    which the thesis gives none.
+    """
     text: list[Section] = [
         [
             "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis "
@@ -151,7 +158,7 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def _hangs_on(judgement: Judgement) -> list[str]:
-    """Return the assumptions on which a verdict depends, each once."""
+    """Return, each once, the assumptions whose change alters a verdict on a claim."""
     turning = (
         each.assumption.replace("conjecture ", "").replace("reading ", "")
         for each in judgement.survivals
@@ -161,7 +168,7 @@ def _hangs_on(judgement: Judgement) -> list[str]:
 
 
 def written(x: float) -> str:
-    """Return a number of a claim as text for readers."""
+    """Return a number behind a verdict as text: a whole number in full, else three digits."""
     if not math.isfinite(x):
         return short(x)
     return f"{x:.0f}" if x == int(x) and abs(x) < 1e6 else f"{x:.3g}"

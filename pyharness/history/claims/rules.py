@@ -2,7 +2,9 @@
 
 A bench supplies runs and solutions: `Laboratory` for one start, `Starts` for n starts. Their arrays
 have the shape (..., steps, 3), where ... is the shape of the starts, () or (n,). A rule returns
-numbers of this shape, and flags that say where the claim is reproduced as a whole, or in part.
+numbers of the shape ..., and flags that say from which starts the claim is reproduced as a whole,
+or in part. Unless a docstring says otherwise, an error is the largest error of any component of
+omega over the steps that the program ran, against the reference solution.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,9 +22,10 @@ Flags = NDArray[np.bool_]
 
 
 class Runs(NamedTuple):
-    """The runs of a program from one start or many.
+    """The runs of a program on one case, from one start or many.
 
-    `omega` (rad/s), shape (..., steps, 3), is NaN where a run has no row. `steps` counts the rows.
+    `omega` (rad/s), shape (..., steps, 3), is NaN where a run has no row. `steps` is the number of
+    rows of each run. `complete` and `overflow` say of each run whether it ended in this way.
     """
 
     omega: Array
@@ -32,7 +35,11 @@ class Runs(NamedTuple):
 
 
 class Grade(NamedTuple):
-    """The result of a rule: its numbers, where the claim is reproduced, and where in part."""
+    """The result of a rule for one claim, from one start or many.
+
+    `numbers` has the computed numbers by description. The flags `whole` and `part` say from which
+    starts the claim is reproduced as a whole, and from which in part.
+    """
 
     numbers: Mapping[str, Any]
     whole: Any
@@ -40,41 +47,58 @@ class Grade(NamedTuple):
 
 
 class Bench(Protocol):
-    """The runs and solutions that rules need.
+    """The interface through which a rule obtains the runs and reference solutions of its starts.
 
-    `parts` divides the step size by this factor; the rows are still at the steps of the case.
+    A step size is divided by the factor `parts`; the rows of omega are still at the steps of the
+    case. Without `may_stop` the stop test of the Runge-Kutta program is skipped.
     """
 
     def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return the scene of a case; its omega(0) need not be a start of the bench."""
+        """Return the scene of a case, with its step size divided by `parts`.
+
+        The omega(0) of the scene need not be a start of the bench.
+        """
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program on a case."""
+        """Run a program on a case from every start."""
 
     def solution(self, case: int) -> Array:
-        """Return the reference omega (rad/s) of a case at its steps."""
+        """Return the reference omega (rad/s) of a case at its steps, shape (..., steps, 3)."""
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Any:
-        """Return the result of `largest_error`."""
+        """Return the largest errors of omega (rad/s), shape (...), by `largest_error`."""
 
     def models(self, case: int, terms: int) -> Array:
-        """Return omega of the collocation model with `terms` terms; NaN from an overflow on."""
+        """Return omega (rad/s) of the collocation model whose trial functions have `terms` terms.
+
+        The shape is (..., steps, 3); omega is NaN from an overflow on.
+        """
 
 
 def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
-    """Measure the range of omega3."""
+    """Grade the claim that omega3 varies: reproduced if its range exceeds `limit` (rad/s).
+
+    The range is of the reference solution over the run.
+    """
     moved = spread_of(bench.solution(case))[..., 2]
     return Grade({"range of omega3 (rad/s)": moved}, moved > limit)
 
 
 def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
-    """Compare all programs with the known solution, at the precision of the printed page."""
+    """Grade the claim that all three programs coincide with the known solution.
+
+    Reproduced if every error is below `limit` (rad/s), half a unit of the last printed digit.
+    """
     numbers = {f"{name}: largest error (rad/s)": bench.error(name, case) for name in PROGRAMS}
     return Grade(numbers, _most(numbers) < limit)
 
 
 def concur(bench: Bench, case: int, share: float) -> Grade:
-    """Compare the two collocation programs with each other."""
+    """Grade the claim that the two-term and the four-term program agree.
+
+    In part if both runs are complete and differ by at most the fraction `share` of the largest
+    omega. Reproduced if they also differ in each component by at most a tenth of its range.
+    """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
     apart = _farthest(two.omega, four.omega)
@@ -93,7 +117,11 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 
 
 def fails(bench: Bench, case: int, share: float) -> Grade:
-    """Find how the Runge-Kutta program ended, and how large its error is."""
+    """Grade the claim that the Runge-Kutta program fails.
+
+    Reproduced if the run ended early and the error of a component exceeds the fraction `share` of
+    its range; in part if only one of the two is true.
+    """
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
     ended, far = ~runs.complete, error > share
@@ -102,14 +130,21 @@ def fails(bench: Bench, case: int, share: float) -> Grade:
 
 
 def diverged(bench: Bench, case: int) -> Grade:
-    """Test whether the two-term run diverged."""
+    """Grade the claim that the two-term run diverged.
+
+    Reproduced if the run overflowed, or if its error exceeds the largest omega of the solution.
+    """
     runs, error = bench.runs("two-term", case), bench.error("two-term", case)
     numbers = {"steps": runs.steps, "largest error (rad/s)": error}
     return Grade(numbers, runs.overflow | (error > largest_of(bench.solution(case))))
 
 
 def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -> Grade:
-    """Compare models with different numbers of terms."""
+    """Grade the claim that collocation models with different numbers of terms agree.
+
+    Reproduced if the models with the later numbers in `terms` all differ from the model with the
+    first number by at most the fraction `share` of the largest omega.
+    """
     first, *others = terms
     model, largest = bench.models(case, first), largest_of(bench.solution(case))
     numbers = {}
@@ -123,7 +158,11 @@ def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -
 
 
 def dynamic(bench: Bench, case: int, factor: float) -> Grade:
-    """Measure the largest angular acceleration of the four-term run in each case."""
+    """Grade the claim that the motion of a case is the liveliest of all seven cases.
+
+    Reproduced if the largest angular acceleration of its four-term run is at least `factor` times
+    the largest angular acceleration in every other case.
+    """
     rates = {}
     for each in range(1, 8):
         omega = bench.runs("four-term", each).omega
@@ -137,7 +176,13 @@ def dynamic(bench: Bench, case: int, factor: float) -> Grade:
 
 
 def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
-    """Measure how much a tenth of the step reduces the errors of the collocation programs."""
+    """Grade the claim that collocation improves with a tenth of the step size, with one exception.
+
+    The exception is the two-term program in the case `exception`. A run improves if its error falls
+    at least to half; a run that overflowed before does not count as improved. Reproduced if at
+    least four fifths of the other pairs of program and case improve, and the exception does not; in
+    part if at least half of the other pairs improve.
+    """
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:
         for case in cases:
@@ -155,7 +200,11 @@ def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
 
 
 def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
-    """Measure how much a tenth of the step reduces Runge-Kutta's error, without the stop test."""
+    """Grade the claim that the Runge-Kutta program does not improve with a tenth of the step size.
+
+    A run improves if its error falls at least to half. Reproduced if no case improves, in part if
+    at most a third of the cases do. The runs are without the stop test.
+    """
     numbers = {}
     for case in cases:
         before, after = (
@@ -170,14 +219,21 @@ def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
 def largest_error(
     bench: Bench, program: str, case: int, may_stop: bool = True, parts: int = 1
 ) -> Array:
-    """Return the largest error of omega (rad/s) at the steps of the case; inf on overflow."""
+    """Return the largest error of any omega component (rad/s), one number for each start.
+
+    Only rows at the steps of the case count; the error is infinite after an overflow. `may_stop`
+    and `parts` are as in `Bench`.
+    """
     runs = bench.runs(program, case, may_stop, parts)
     error = _farthest(runs.omega, bench.solution(case)).max(axis=-1)
     return np.where(runs.overflow, np.inf, error)
 
 
 def share_of_range(omega: Array, truth: Array) -> Array:
-    """Return the largest error of any varying component, divided by the range of the component."""
+    """Return the largest error of any varying component, divided by the range of the component.
+
+    `truth` is the reference omega of a case. The result has one number for each start, shape (...).
+    """
     spread = spread_of(truth)
     moving = spread > 1e-12 * largest_of(truth)[..., None]
     with np.errstate(all="ignore"):
@@ -186,17 +242,20 @@ def share_of_range(omega: Array, truth: Array) -> Array:
 
 
 def spread_of(omega: Array) -> Array:
-    """Return the range of each component over the steps (rad/s), shape (..., 3)."""
+    """Return the range of each omega component over the steps (rad/s), shape (..., 3)."""
     return np.moveaxis(np.ptp(_by_component(omega), axis=-1), 0, -1)
 
 
 def largest_of(omega: Array) -> Array:
-    """Return the largest magnitude of any component of omega (rad/s), shape (...)."""
+    """Return the largest magnitude of any omega component over the steps (rad/s), shape (...)."""
     return np.asarray(np.abs(omega).max(axis=(-1, -2)))
 
 
 def _farthest(first: Array, second: Array) -> Array:
-    """Return the largest difference of each component over the common rows, shape (..., 3)."""
+    """Return the largest difference of each omega component (rad/s), shape (..., 3).
+
+    Steps at which an omega is NaN, because a run has no row there, do not count.
+    """
     with np.errstate(all="ignore"):
         apart = _by_component(first - second)
         np.abs(apart, out=apart)
@@ -204,7 +263,10 @@ def _farthest(first: Array, second: Array) -> Array:
 
 
 def _by_component(omega: Array) -> Array:
-    """Return omega as a contiguous (3, ..., steps) array, which NumPy reduces ten times as fast."""
+    """Return omega, shape (..., steps, 3), as a contiguous array of the shape (3, ..., steps).
+
+    NumPy reduces this array over the steps ten times as fast.
+    """
     return np.ascontiguousarray(np.moveaxis(omega, -1, 0))
 
 

@@ -6,7 +6,7 @@ from pyharness.model.facts import facts
 
 
 class Sentence(NamedTuple):
-    """A sentence of the thesis; fields that do not apply are empty.
+    """A sentence of the thesis with the claims that it makes; fields that do not apply are empty.
 
     Attributes
     ----------

@@ -1,6 +1,8 @@
 """Tests of the claims about history, theory and orders, most of them in sections I to IV.
 
-Each function is the `test` of entries in `data/claims.toml`, as in `verdicts`.
+Each function is the `test` of one or more claims in `data/claims.toml`, with arguments, errors and
+verdicts as in `verdicts`. `cases` are numbers of cases of Table 1. A `limit` is on the largest
+error, as a fraction of the largest omega.
 """
 
 import math
@@ -25,9 +27,10 @@ Weights = Sequence[Callable[[Array], Any]]
 
 
 def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Compare Jacobi's elliptic functions with the reference.
+    """Judge the claim that the solutions of some cases are not known.
 
-    The thesis says that the solutions of these cases are not known.
+    False if Jacobi's elliptic functions solve every case with an error, against the reference and
+    relative to the largest omega, of at most `limit`.
     """
     numbers = {}
     for case in cases:
@@ -40,12 +43,19 @@ def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Jud
 
 
 def by_sources(lab: Laboratory, holds: bool) -> Judged:
-    """Return the verdict of the sources on a statement of history, which no run can test."""
+    """Return the verdict of the sources on a statement of history, which no run can test.
+
+    The verdict is reproduced if the statement `holds`, otherwise false.
+    """
     return Judged(REPRODUCED if holds else FALSE, {})
 
 
 def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Integrate Hamilton's equations in Euler angles as six ordinary differential equations."""
+    """Judge the claim that Hamilton's equations of a rigid body are partial differential equations.
+
+    False if six ordinary differential equations in Euler angles and momenta solve the case with an
+    error, relative to the largest omega, of at most `limit`.
+    """
     from scipy.integrate import solve_ivp
 
     (case,) = cases
@@ -66,7 +76,7 @@ def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
 
 def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
-    """Return the matrix that maps the rates of the 3-1-3 angles to omega in body axes."""
+    """Return the matrix that maps the rates of the 3-1-3 angles (rad/s) to omega in body axes."""
     _, theta, psi = angles
     return np.array(
         [
@@ -78,14 +88,17 @@ def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
 
 
 def _omega(moments: Triple, state: Array) -> Array:
-    """Return omega (rad/s) from the 3-1-3 angles and their conjugate momenta."""
+    """Return omega (rad/s) from the 3-1-3 angles and their conjugate momenta, which are `state`."""
     momentum = np.linalg.solve(_angle_rates_to_omega(state[:3]).T, np.asarray(state[3:]))
     rates: Array = momentum / np.array(moments)
     return rates
 
 
 def _hamilton(moments: Triple, state: Array) -> Array:
-    """Return dH/dp and -dH/dq of the Hamiltonian H = sum I omega**2 / 2."""
+    """Return dH/dp and -dH/dq, the rates of `state`: three 3-1-3 angles q and their momenta p.
+
+    The Hamiltonian is H = sum I omega**2 / 2, with the principal `moments` I (kg m2).
+    """
     theta, psi = float(state[1]), float(state[2])
     omega = _omega(moments, state)
     matrix = _angle_rates_to_omega(state[:3])
@@ -111,7 +124,11 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 
 
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
-    """Compute quotients (f(y) - f(x)) / (y - x) of the square root on (0, 1), ever nearer to 0."""
+    """Judge the claim that a bounded function satisfies a Lipschitz condition.
+
+    The quotients (f(y) - f(x)) / (y - x) are computed for the square root f, which is bounded on
+    (0, 1), with x from 1e-2 to 10**-decades and y = 2 x. False if a quotient exceeds `above`.
+    """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
     numbers = {"bound of the function": 1.0, "largest quotient": float(quotients.max())}
@@ -121,7 +138,11 @@ def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judg
 def local_error(
     lab: Laboratory, cases: list[int], method: str, power: float, within: float
 ) -> Judged:
-    """Measure the power p for which the error of one step of size h is O(h**p)."""
+    """Judge the claim that the error of one step of a method falls with a power of the step size.
+
+    The power p, for which the error of one step of size h is O(h**p), is measured in each case.
+    Reproduced if every p differs from `power` by at most `within`, in part if some p does.
+    """
     numbers = {}
     for case in cases:
         numbers[f"case {case}: power of the step"] = _power(
@@ -132,7 +153,11 @@ def local_error(
 
 
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
-    """Compare one step of Runge-Kutta with the Taylor series up to h**4."""
+    """Judge the claim that Runge-Kutta and the Taylor series up to h**4 are the same method.
+
+    Reproduced if one step of size h has the same result with both, to 1e-14 of the largest omega.
+    In part if the difference is O(h**p), with a measured p that differs from 5 by at most `within`.
+    """
     numbers, same, near = {}, True, True
     for case in cases:
         scene = lab.scene(case)
@@ -160,7 +185,11 @@ def _power(
     method: Callable[[Scene], Array],
     truth: Callable[[Scene], Array] | None = None,
 ) -> float:
-    """Return the power of the step size with which one step of a method approaches the truth."""
+    """Return p, the power with which a method's error in one step of size h falls as O(h**p).
+
+    The power is measured by halving the step size. `method` and `truth` return omega at the end of
+    a scene of one step; the default of `truth` is the reference solution.
+    """
     apart = []
     for step_size in (scene.step_size, scene.step_size / 2.0):
         short = replace(scene, step_size=step_size, steps=1)
@@ -170,7 +199,10 @@ def _power(
 
 
 def _taylor_step(scene: Scene, order: int) -> Array:
-    """Return omega after one step of its Taylor series; the torque must be constant."""
+    """Return omega after one step of its Taylor series up to h**order, where h is the step size.
+
+    The torque must be constant.
+    """
     coefficients = np.array(scene.euler_coefficients)
     torque = np.array(scene.normalized_torque(0.0))
     terms = [np.array(scene.omega)]
@@ -186,7 +218,12 @@ def _taylor_step(scene: Scene, order: int) -> Array:
 
 
 def crandall_example(lab: Laboratory, best: list[str]) -> Judged:
-    """Solve dx/dt = -x, x(0) = 1 on (0, 1) with 1 + c1 t + c2 t**2, by four weightings."""
+    """Judge the claim that in Crandall's example four weightings are better than the Taylor series.
+
+    The example is dx/dt = -x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2. In
+    part if the largest error of each weighting is below half the error of the series. Reproduced if
+    also the two weightings in `best` have the smallest errors.
+    """
     t, weight = np.polynomial.legendre.leggauss(12)
     t, weight = (t + 1.0) / 2.0, weight / 2.0
     # The residual is R = base + c1 r1 + c2 r2; the columns are for r1, r2 and -base.
@@ -211,7 +248,12 @@ def crandall_example(lab: Laboratory, best: list[str]) -> Judged:
 
 
 def _weighted(t: Array, weight: Array, by: Weights) -> Array:
-    """Return the linear equations for c1 and c2, a row of integrals for each weight function."""
+    """Return the linear equations for c1 and c2, a row for each weight function in `by`.
+
+    A row has the weighted integrals over (0, 1) of the factors of c1 and c2 in the residual, and of
+    the right-hand side. `t` and `weight` are the nodes and weights of a quadrature on (0, 1), which
+    is applied to each half.
+    """
     halves = [(t / 2.0, weight / 2.0), ((t + 1.0) / 2.0, weight / 2.0)]
     rows = []
     for function in by:
@@ -224,7 +266,12 @@ def _weighted(t: Array, weight: Array, by: Weights) -> Array:
 
 
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
-    """Compare Re Q of eq. 32 with the growth rate of a perturbation of each steady rotation."""
+    """Judge the claim that the rates Q of eq. 32 tell whether a steady rotation is stable.
+
+    Each steady rotation is perturbed by 1e-8 of its size. Where Re Q is above 0, the perturbation
+    must grow at the rate Re Q, within the fraction `within`. Elsewhere it must stay within ten
+    times its initial size for ten periods. Reproduced if all do so, otherwise false.
+    """
     numbers, told = {}, True
     for case in cases:
         scene = lab.scene(case)
@@ -251,7 +298,11 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
 
 
 def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Compare trial solutions of eq. 32 about axis 3, at the initial omega3, with the reference."""
+    """Judge the claim that in some cases a trial solution of eq. 32 is the solution itself.
+
+    The trial solution is about the steady rotation about axis 3 with the initial omega3. Reproduced
+    if in some case its error against the reference, over the largest omega, is at most `limit`.
+    """
     numbers = {}
     for case in cases:
         scene, truth = lab.scene(case), lab.truth(case)
@@ -266,7 +317,11 @@ def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
 
 def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Integrate a linear top by the linear trial function, with one term."""
+    """Judge the claim that one-term collocation is enough for a linear top, as in Case 1.
+
+    Reproduced if its error against the reference, over the largest omega, is at most `limit`,
+    otherwise false.
+    """
     found = run(lab.scene(case), Member("collocation", 1))
     truth = lab.truth(case)
     share = distance(found.omega, truth.omega) / largest(truth)
@@ -275,7 +330,10 @@ def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
 
 
 def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
-    """Test whether the coefficients of the products vanish in symmetric bodies."""
+    """Judge the claim that the products vanish from Euler's equations of a symmetric body.
+
+    Reproduced if the coefficients of all products are 0 in all `cases`, in part if in some case.
+    """
     left = {
         f"case {case}: largest coefficient": max(map(abs, lab.scene(case).euler_coefficients))
         for case in cases
@@ -285,7 +343,7 @@ def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
 
 
 def step_on_cards(lab: Laboratory, step: float) -> Judged:
-    """Read the step that each deck sets before its loop."""
+    """Judge the claim that each of the three decks sets DT to `step` (s) before its loop."""
     numbers = {
         f"{program}: DT (s)": float(card.statement.partition("=")[2])
         for program in ("two-term", "four-term", "runge-kutta")
@@ -297,7 +355,11 @@ def step_on_cards(lab: Laboratory, step: float) -> Judged:
 
 
 def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
-    """Measure the fraction of steps whose collocation points are all inside the interval."""
+    """Judge the claim that the collocation points are inside the interval of the step.
+
+    The fraction of steps in which all points are inside is computed for both collocation programs.
+    Reproduced if it is 1, in part if it is at least 1/2 for both, otherwise false.
+    """
     (case,) = cases
     numbers, shares = {}, []
     for program, last in (("two-term", 2.0 / 3.0), ("four-term", 0.8)):
@@ -311,7 +373,10 @@ def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
 
 
 def possible_bodies(lab: Laboratory, cases: list[int]) -> Judged:
-    """Test whether the moments of every case satisfy the triangle inequality of rigid bodies."""
+    """Judge the claim that every case is a possible rigid body.
+
+    Reproduced if in all `cases` no moment exceeds the sum of the other two, otherwise false.
+    """
     excess = {}
     for case in cases:
         first, second, third = sorted(lab.scene(case).moments or (), reverse=True)

@@ -1,8 +1,12 @@
 """Tests of the claims about one case; each test returns a verdict with its numbers.
 
-Each function is the `test` of one or more entries in `data/claims.toml`. The entry's `rule` says in
-words what the function decides, and its `parameters` are keyword arguments. All numbers are
-computed. The tests over several cases are in `methods`.
+Each function is the `test` of one or more claims in `data/claims.toml`. The `rule` of the claim
+describes what the function decides, and its `parameters` are the keyword arguments. `lab` runs the
+programs under the chosen assumptions, and `case` is the number of a case of Table 1. All numbers
+are computed. The tests over several cases are in `methods`.
+
+Unless a docstring says otherwise, an error is the largest error of any component of omega over the
+steps that the program ran, and a claim that fails has the verdict "not reproduced".
 """
 
 import math
@@ -28,7 +32,7 @@ UNDECIDED = "undecided"
 
 @dataclass(frozen=True)
 class Judged:
-    """A verdict with the numbers that support it."""
+    """The verdict on one claim, with the computed numbers that support it, by description."""
 
     verdict: str
     numbers: dict[str, float]
@@ -37,24 +41,37 @@ class Judged:
 def graded(
     numbers: dict[str, float], whole: bool, part: bool = False, otherwise: str = NOT_REPRODUCED
 ) -> Judged:
-    """Return the verdict: reproduced if `whole`, in part if `part`, else `otherwise`."""
+    """Return the verdict: reproduced if `whole`, in part if `part`, else `otherwise`.
+
+    `numbers` are the computed numbers that support the verdict, by description.
+    """
     return Judged(REPRODUCED if whole else IN_PART if part else otherwise, numbers)
 
 
 def judged(grade: rules.Grade, otherwise: str = NOT_REPRODUCED) -> Judged:
-    """Return the verdict that the grade of a rule gives for one start."""
+    """Return the verdict that corresponds to the grade of a rule for one initial omega.
+
+    `otherwise` is the verdict if the claim is reproduced neither as a whole nor in part.
+    """
     numbers = {name: float(each) for name, each in grade.numbers.items()}
     return graded(numbers, bool(grade.whole), bool(grade.part), otherwise)
 
 
 def constant_solution(lab: Laboratory, case: int) -> Judged:
-    """Measure by how much the solution varies."""
+    """Judge the claim that the solution of a case is constant; the verdict may be false.
+
+    Reproduced if every component of the reference omega varies by at most 1e-12 rad/s.
+    """
     moved = float(ranges(lab.truth(case)).max())
     return graded({"change over the run (rad/s)": moved}, moved <= 1e-12, otherwise=FALSE)
 
 
 def known_solution(lab: Laboratory, case: int) -> Judged:
-    """Compare the solution printed in the thesis with the reference."""
+    """Judge the claim that the solution of a case is (sin 5t, cos 5t, 10), as the thesis prints.
+
+    Reproduced if it differs from the reference solution by at most 1e-15 (1 + 5 t) rad/s in any
+    component, where t (s) is the end of the run; otherwise false.
+    """
     truth = lab.truth(case)
     t = truth.time
     printed = np.column_stack([np.sin(5 * t), np.cos(5 * t), np.full_like(t, 10.0)])
@@ -65,12 +82,19 @@ def known_solution(lab: Laboratory, case: int) -> Judged:
 
 
 def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Measure the range of omega3."""
+    """Judge the claim that omega3 varies: reproduced if its range exceeds `limit`, else false.
+
+    The range is of the reference solution over the run; the limit is in rad/s.
+    """
     return judged(rules.omega3_varies(lab, case, limit), FALSE)
 
 
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Compare all programs with the known solution, at the precision of the printed page."""
+    """Judge the claim that all three programs coincide with the known solution.
+
+    Reproduced if every error is below `limit` (rad/s), half a unit of the last printed digit. The
+    numbers also show how many steps the Runge-Kutta program runs from each start in `starts`.
+    """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
         other = replace(lab, assumptions=replace(lab.assumptions, start=start))
@@ -84,7 +108,11 @@ def _shown(start: Triple) -> str:
 
 
 def coincident(lab: Laboratory, case: int, share: float) -> Judged:
-    """Compare collocation with the known solution, on the scale of the graph."""
+    """Judge the claim that collocation coincides with the known solution on the thesis's graph.
+
+    Reproduced if, for both programs, the error of every varying component is at most the fraction
+    `share` of the component's range.
+    """
     numbers = {}
     for program in COLLOCATION:
         runs, truth = lab.runs(program, case), lab.solution(case)
@@ -94,7 +122,10 @@ def coincident(lab: Laboratory, case: int, share: float) -> Judged:
 
 
 def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
-    """Measure the largest error of collocation as a fraction of the amplitude."""
+    """Judge the claim that the collocation errors, over the amplitude, are from `low` to `high`.
+
+    The amplitude is half the largest range of a component of the reference omega.
+    """
     amplitude = float(ranges(lab.truth(case)).max()) / 2.0
     numbers = {
         f"{program}: largest error over the amplitude": lab.error(program, case) / amplitude
@@ -104,14 +135,22 @@ def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
 
 
 def poor(lab: Laboratory, case: int, share: float) -> Judged:
-    """Measure the largest error of the Runge-Kutta program as a fraction of the amplitude."""
+    """Judge the claim that the Runge-Kutta results are poor.
+
+    Reproduced if their error exceeds the fraction `share` of the amplitude, which is half the
+    largest range of a component of the reference omega.
+    """
     amplitude = float(ranges(lab.truth(case)).max()) / 2.0
     found = lab.error("runge-kutta", case) / amplitude
     return graded({"largest error over the amplitude": found}, found > share)
 
 
 def error_constant(lab: Laboratory, case: int) -> Judged:
-    """Compare the error in the last fifth of the run with the error in the first fifth."""
+    """Judge the claim that the error of collocation does not grow during the run.
+
+    Reproduced if, for both programs, the error in the last fifth of the steps is at most twice the
+    error in the first fifth.
+    """
     truth = lab.truth(case).omega
     numbers = {}
     for program in COLLOCATION:
@@ -123,7 +162,11 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 
 
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
-    """Find the step at which the stop test ended the run, and which other listings stop there."""
+    """Judge the claim that the stop test ended the Runge-Kutta run at step number `step`.
+
+    Reproduced if it did, in part if it ended the run at another step. The numbers also name the
+    subsets of the program's defects with which the stop test ends the run at `step`.
+    """
     stop = lab.run("runge-kutta", case).stop
     found = math.nan if stop is None else float(stop.step)
     every = [
@@ -148,7 +191,11 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
 
 
 def growing(lab: Laboratory, case: int) -> Judged:
-    """Compare omega1 at the end of the run with the solution at that time."""
+    """Judge the claim that omega1 of the Runge-Kutta program grows beyond the sine.
+
+    Reproduced if omega1 at the end of the run exceeds 1 rad/s, and exceeds omega1 of the reference
+    solution at that time by more than a thousandth.
+    """
     run = lab.run("runge-kutta", case)
     value, solution = float(run.omega[-1, 0]), float(lab.truth(case).omega[run.steps - 1, 0])
     numbers = {"omega1 at the end (rad/s)": value, "solution there (rad/s)": solution}
@@ -156,7 +203,11 @@ def growing(lab: Laboratory, case: int) -> Judged:
 
 
 def search(lab: Laboratory, case: int) -> Judged:
-    """Measure how much the corrected program reduces the error, at the steps that the run has."""
+    """Return the Runge-Kutta error divided by the error of the corrected Runge-Kutta program.
+
+    Both errors are over the steps that the run of `lab` has. The claim is about a search for a
+    mistake, which no run can test; the verdict is therefore always "not testable".
+    """
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
     truth = lab.truth(case).omega[: run.steps]
@@ -165,35 +216,53 @@ def search(lab: Laboratory, case: int) -> Judged:
 
 
 def concur(lab: Laboratory, case: int, share: float) -> Judged:
-    """Compare the two collocation programs with each other."""
+    """Judge the claim that the two collocation programs agree, by the rule `rules.concur`.
+
+    `share` is the largest difference that counts as agreement, as a fraction of the largest omega.
+    """
     return judged(rules.concur(lab, case, share))
 
 
 def fails(lab: Laboratory, case: int, share: float) -> Judged:
-    """Find how the Runge-Kutta program ended, and how large its error is."""
+    """Judge the claim that the Runge-Kutta program fails, by the rule `rules.fails`.
+
+    `share` is the error that the program must exceed, as a fraction of a component's range.
+    """
     return judged(rules.fails(lab, case, share))
 
 
 def differ(lab: Laboratory, case: int, share: float) -> Judged:
-    """Measure the difference of the collocation programs, relative to the largest omega."""
+    """Judge the claim that the two-term and the four-term program differ.
+
+    Reproduced if their omegas differ by more than the fraction `share` of the largest omega of the
+    reference solution.
+    """
     two, four = (lab.run(program, case).omega for program in COLLOCATION)
     apart = distance(two, four) / largest(lab.truth(case))
     return graded({"difference over the largest omega": apart}, apart > share)
 
 
 def more_reliable(lab: Laboratory, case: int) -> Judged:
-    """Measure the ratio of the four-term error to the two-term error."""
+    """Judge the claim that the four-term program is more accurate than the two-term program.
+
+    Reproduced if its error is at most 0.5 of the two-term error, in part if at most 0.8.
+    """
     ratio = lab.error("four-term", case) / lab.error("two-term", case)
     return graded({"four-term error over two-term error": ratio}, ratio <= 0.5, ratio <= 0.8)
 
 
 def diverged(lab: Laboratory, case: int) -> Judged:
-    """Test whether the two-term run diverged."""
+    """Judge the claim that the two-term run diverged, by the rule `rules.diverged`."""
     return judged(rules.diverged(lab, case))
 
 
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
-    """Compare the corrected models, to tell whether the motion or the program causes the error."""
+    """Judge the claim that the two-term error has its cause in a motion too fast for two terms.
+
+    The corrected programs run from each start in `starts`. Reproduced if the two-term error is
+    more than `worse` times the four-term error from every start, in part if it is more than `same`
+    times the four-term error from some start, otherwise false.
+    """
     numbers = {}
     for start in starts():
         best = Laboratory(False, replace(lab.assumptions, start=start))
@@ -204,10 +273,17 @@ def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
 
 
 def models_concur(lab: Laboratory, case: int, share: float, terms: Sequence[int]) -> Judged:
-    """Compare models with different numbers of terms."""
+    """Judge the claim that collocation models agree, by the rule `rules.models_concur`.
+
+    `terms` are their numbers of terms, and `share` is the largest difference that counts as
+    agreement, as a fraction of the largest omega.
+    """
     return judged(rules.models_concur(lab, case, share, terms))
 
 
 def dynamic(lab: Laboratory, case: int, factor: float) -> Judged:
-    """Measure the largest angular acceleration of the four-term run in each case."""
+    """Judge the claim that the motion of a case is the liveliest, by the rule `rules.dynamic`.
+
+    Its largest angular acceleration must be at least `factor` times that of every other case.
+    """
     return judged(rules.dynamic(lab, case, factor))

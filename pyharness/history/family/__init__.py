@@ -1,1 +1,1 @@
-"""The weighted residual methods as one family, with derived and measured orders."""
+"""The weighted residual methods as one family, with derived and measured orders of convergence."""

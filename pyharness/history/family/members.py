@@ -1,4 +1,6 @@
-"""The weighted residual family of III.1 and IV.2: any weighting, terms and corrections.
+"""The weighted residual family of III.1 and IV.2 of the thesis.
+
+A member of the family has any weighting, number of terms and number of corrections.
 
 One step of length h solves omega' = f(t, omega), equations 16-18, with a polynomial trial function
 omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant, with its value at the
@@ -78,7 +80,7 @@ class Member:
 
     @property
     def points_label(self) -> str:
-        """Return the name of the points in a table."""
+        """Return the collocation points as text for a table; a dash for the other weightings."""
         if self.points is None:
             return "-"
         if isinstance(self.points, str):
@@ -87,7 +89,10 @@ class Member:
 
 
 def converged_order(member: Member) -> int:
-    """Return the order of a member with enough corrections, as family.md derives it."""
+    """Return the order of a member's global error in the limit of many corrections.
+
+    docs/explanation/family.md derives these orders.
+    """
     n = member.terms
     if member.weighting == "galerkin":
         return n
@@ -106,18 +111,19 @@ def converged_order(member: Member) -> int:
 def predicted_order(member: Member) -> int:
     """Return the order of a member: for general motions its global error is O(h**order).
 
-    The first estimate has order 1. Each correction raises the order by one, up to the converged
-    order.
+    Here h is the step size. The first estimate has order 1. Each correction raises the order by
+    one, up to the converged order.
     """
     return min(member.corrections + 1, converged_order(member))
 
 
 def run(scene: Scene, member: Member) -> Trajectory:
-    """Integrate a scene with one member (Jacobs 1982, III.1, eq. 20-27, and IV.2); no velocity.
+    """Integrate a scene with one member (Jacobs 1982, III.1, eq. 20-27, and IV.2).
 
-    The first estimate evaluates the torque at the beginning of the step, and the corrections
-    evaluate it at the true times. The global error is O(h**p), with p from `predicted_order`. The
-    rounding error is about one unit in the last place per step.
+    Return the trajectory of omega, without translational velocity. The first estimate evaluates the
+    torque at the beginning of the step, and the corrections evaluate it at the times of the nodes.
+    The global error is O(h**p), with the step size h and p from `predicted_order`. The rounding
+    error is about one unit in the last place per step.
     """
     omega = march(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
@@ -136,9 +142,10 @@ def run(scene: Scene, member: Member) -> Trajectory:
 
 
 def march(scene: Scene, members: Sequence[Member]) -> Array:
-    """Integrate a scene with several members at once, at hardly more cost than with one.
+    """Integrate a scene with several members of the family at once.
 
-    Return omega (rad/s), shape (members, steps, 3). It is not finite from an overflow on.
+    Return omega (rad/s), shape (members, steps, 3). It is not finite from an overflow on. The cost
+    is hardly higher than for one member.
     """
     # Most corrections first: the members that still need one are then contiguous in memory.
     order = sorted(range(len(members)), key=lambda i: -members[i].corrections)
@@ -181,7 +188,11 @@ def march(scene: Scene, members: Sequence[Member]) -> Array:
 
 
 def _stages(matrix: Array, rates: Array) -> Array:
-    """Return the product of `_sums`, three times as fast; members are the matrix's last axis."""
+    """Return the product of `_sums` in a third of the time.
+
+    The last axis of `matrix`, shape (i, j, members), is the member. `rates` has the shape (members,
+    j, 3).
+    """
     side_by_side = np.ascontiguousarray(rates.transpose(1, 2, 0))
     total: Array = matrix[:, 0, None] * side_by_side[0]
     product = np.empty_like(total)
@@ -193,7 +204,11 @@ def _stages(matrix: Array, rates: Array) -> Array:
 
 
 def _sums(factors: Array, rates: Array) -> Array:
-    """Return the matrix product for every member, summed in order and not by a BLAS."""
+    """Return for every member the matrix product of factors and rates, shape (members, i, 3).
+
+    The terms are summed in order, and not by a BLAS. The factors have the shape (members, i, j),
+    and the rates (members, j, 3).
+    """
     total: Array = np.einsum("mij,mjk->mik", factors, rates)
     return total
 
@@ -206,7 +221,11 @@ def _rates(scene: Scene, torque: Array, omega: Array) -> Array:
 
 
 def _torque(scene: Scene, times: Array) -> Array:
-    """Return the normalized torque at `times`, shape (..., 3), or (3,) if it is constant."""
+    """Return the torque divided by the moments (rad/s2) at `times`, which have any shape.
+
+    The shape is (..., 3), or (3,) if the torque is constant. A body without moments has its torque
+    in this form.
+    """
     law = scene.body_torque
     torque = np.array(law.constant)
     if law.varies:

@@ -1,4 +1,4 @@
-"""The errors of the family's members, and their measured and derived orders."""
+"""The errors of the family's members, and their measured and derived orders of convergence."""
 
 import math
 from collections.abc import Sequence
@@ -36,11 +36,12 @@ MOST_STEPS = 2_000
 
 @dataclass(frozen=True)
 class OrderFinding:
-    """The order of one member in one scene, as family.md derives it and as measured.
+    """The order of one member in one scene, derived and measured, and the error of the member.
 
-    `measured` is None if the error is rounding error alone, or never gets small. `settled` is true
-    if the last two measured values of the order differ by at most a tenth. `error` is the largest
-    error of any omega over the scene's own steps (rad/s), infinite after an overflow.
+    docs/explanation/family.md derives the order `predicted`. `measured` is None if the error is
+    rounding error alone, or never gets small. `settled` is true if the last two measured values of
+    the order differ by at most a tenth. `error` is the largest error of any omega component over
+    the scene's own steps (rad/s), infinite after an overflow.
     """
 
     member: Member
@@ -56,14 +57,20 @@ class OrderFinding:
 
     @property
     def misses(self) -> bool:
-        """Return whether the order settled below the derived one; special scenes may exceed it."""
+        """Return whether the measured order settled below the derived order by more than `SLACK`.
+
+        A measured order above the derived order is no miss, because it occurs in special scenes.
+        """
         return self.settled and self.deviation < -SLACK
 
 
 def family_members(
     terms: Sequence[int] = range(1, 6), corrections: Sequence[int] = range(1, 9)
 ) -> list[Member]:
-    """Return a member for every scheme, number of terms and number of corrections."""
+    """Return a member for every number of `terms` and of `corrections` in every scheme.
+
+    A scheme, in `SCHEMES`, is a weighting with its collocation points.
+    """
     return [Member(w, n, p, k) for w, p in SCHEMES for n in terms for k in corrections]
 
 
@@ -74,6 +81,7 @@ def order_table(
 ) -> list[OrderFinding]:
     """Measure the orders and errors of many members at once, by default of `family_members()`.
 
+    Return an `OrderFinding` for each member. `progress` is called before each phase of the work.
     Raise InputError if the solution itself becomes unbounded, or if the scene has too many steps.
     """
     if scene.steps > MOST_STEPS:
@@ -116,7 +124,11 @@ def order_table(
 
 
 def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array) -> Array:
-    """Return the errors at the horizon for ever smaller steps, shape (step sizes, members)."""
+    """Return the members' errors at the time `horizon` (s) for ever smaller step sizes.
+
+    The shape is (step sizes, members). An error is the norm of the difference from `end`, the true
+    omega at the horizon (rad/s), divided by the largest component of `end`.
+    """
     scale = float(np.abs(end).max()) or 1.0
     rungs = []
     for steps in _LADDER:
@@ -129,7 +141,11 @@ def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array)
 
 
 def _slopes(errors: Array) -> list[float]:
-    """Return the orders that each halving of the step shows, where both errors are in range."""
+    """Return the order that each halving of the step size shows, where both errors are in range.
+
+    `errors` are those of one member from `_ladder`. Each error belongs to half the step size of the
+    error two places before it.
+    """
     return [
         math.log2(coarse / fine)
         for coarse, fine in zip(errors[:-2], errors[2:], strict=True)

@@ -1,4 +1,4 @@
-"""The report of `family`: the orders and errors of its members."""
+"""The report of `family`: the orders and errors of the weighted residual methods, its members."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -12,7 +12,11 @@ from pyharness.model.scene_report import heading
 
 
 def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
-    """Report orders and errors, with one row for each weighting, set of points and n."""
+    """Return the report of the members' orders and errors in a scene.
+
+    The tables have a row for each weighting, choice of collocation points and number of terms n,
+    and a column for each number of corrections k.
+    """
     names = ("predicted", "measured", "settled", "error")
     measures = [{name: getattr(each, name) for name in names} for each in found]
     data = [
@@ -37,7 +41,10 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
 
 
 def verdict(found: Sequence[OrderFinding]) -> list[str]:
-    """Return sentences that compare the measured orders with the derived orders."""
+    """Return sentences that compare the members' measured orders with the derived orders.
+
+    There is one sentence if no member misses its derived order, else one for each that does.
+    """
     unexpected = _unexpected(found)
     if unexpected:
         return [f"UNEXPECTED: {each}" for each in unexpected]

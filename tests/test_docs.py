@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from pyharness import read_scene
 from pyharness.cli.main import VERBS, main
@@ -15,6 +16,7 @@ from pyharness.history import figures
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.views.csv import csv_text
 from tests.conftest import Printed
+from tests.json_reference import SCHEMA, render, schema_of
 
 ROOT = Path(__file__).parent.parent
 DOCS = sorted((ROOT / "docs").rglob("*.md"))
@@ -128,22 +130,37 @@ def test_reference_lists_every_method_with_its_tolerances() -> None:
 @pytest.mark.parametrize(
     "command",
     [
-        "run --case 3 --program two-term", "run --case 3 --program two-term --word cdc48",
-        "compare --case 3", "compare --case 3 --program two-term --ablate", "plan --case 5",
-        "claims --assignments", "defects", "defects stage-base", "defects 1660", "cards 1040",
-        "cards --classes", "cards --collate", "deck --program two-term", "limits --case 5",
-        "family --case 5 --terms 1 --weighting galerkin", "rotations --case 4", "doctor",
-        "verify --only orders", "stress --only matrices",
+        "run --case 3 --program runge-kutta", "run --case 3 --program two-term --word cdc48",
+        "run --scene docs/space-torque.toml --method auto --times 1 --attitude matrix",
+        "run --case 6 --program two-term", "compare --case 3",
+        "compare --case 3 --program two-term --attitude --word cdc48",
+        "compare --case 3 --program two-term --ablate", "plan --case 3", "plan --case 5",
+        "claims --explain abstract-superior", "claims --assignments", "defects",
+        "defects stage-base", "defects 1660", "cards runge-kutta", "cards --classes",
+        "cards --collate", "deck --program two-term --dialect ftn", "limits --case 5",
+        "limits --case 6", "family --case 5 --terms 1 --weighting galerkin", "family --lost",
+        "rotations --case 4", "rotations --case 6", "doctor", "words --case 2 --program two-term",
+        "verify --only orders", "verify --only random --draws 3", "stress --only matrices",
     ],
 )  # fmt: skip
-def test_reference_lists_every_field_of_json(command: str, printed: Printed) -> None:
-    """The fields are those that the row of the verb names, all of them in one of its parts."""
-    text = (ROOT / "docs/reference/output.md").read_text()
-    verb = command.split()[0]
-    (row,) = re.findall(rf"^\| `{verb}` \| (.*) \|$", text, re.MULTILINE)
-    parts = [set(re.findall(r"`(\w+)`", part)) for part in row.split("; ")]
-    found = set(json.loads(printed(f"{command} --format json"))) - {"schema"}
-    assert any(found | {"word"} == part | {"word"} for part in parts), found
+def test_json_has_the_documented_fields(
+    command: str, printed: Printed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(ROOT)
+    record = json.loads(printed(f"{command} --format json"))
+    Draft202012Validator(schema_of(command.split()[0])).validate(record)
+
+
+def test_fields_of_json_are_a_page_of_the_schema() -> None:
+    Draft202012Validator.check_schema(SCHEMA)
+    assert {f"verb-{verb}" for verb in VERBS} <= set(SCHEMA["$defs"])
+    assert (ROOT / "docs/reference/json.md").read_text() == render()
+
+
+def test_a_field_that_is_not_documented_is_found(printed: Printed) -> None:
+    record = json.loads(printed("doctor --format json"))
+    for changed in (record | {"more": 1}, record | {"missing": None}, {"schema": 1}):
+        assert not Draft202012Validator(schema_of("doctor")).is_valid(changed)
 
 
 def write_anew() -> None:
@@ -153,6 +170,7 @@ def write_anew() -> None:
     import os
 
     os.environ["COLUMNS"] = "100"
+    (ROOT / "docs/reference/json.md").write_text(render())
     for path in DOCS:
 
         def anew(match: re.Match[str]) -> str:

@@ -194,8 +194,9 @@ contains
       call estimate_truncation(s, order, 1.0_dp/max(allowed, tiny(h)), left)
       if (found%steps < FEW_STEPS) then
         from_rest = found%steps == 0 .and. .not. maxval(abs(omega)) > 0.0_dp
-        if (from_rest) &
+        if (from_rest) then
           call estimate_truncation_from_rest(s, order, 1.0_dp/max(allowed, tiny(h)), left)
+        end if
         found%least = max(found%least, likely_remainder(order, s%terms)/max(now%scale, tiny(h)))
       end if
       if (with_attitude) then

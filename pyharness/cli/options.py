@@ -34,13 +34,16 @@ LISTING = {
     "--listing L": "Which listing to run: original (all defects active) or corrected (none).",
     "--fix NAME,...": "Correct these defects, readings or conjectures of the original listing.",
     "--keep NAME,...": "Keep these active in the corrected listing, and correct all others.",
-    "--reading NAME,...": "Read cards of the original in the way that is not adopted.",
-    "--conjecture NAME,...": "Choose what the original assumes where no card exists, or none.",
-    "--lipschitz L": "Constant of the stop test, 1/s (default 500, as on the cards).",
-    "--no-stop": "Continue where the stop test would end the run.",
+    "--reading NAME,...": "Read the cards of these readings in the way that we do not adopt.",
+    "--conjecture NAME,...": "Assume these where cards of the original are missing; none: nothing.",
+    "--lipschitz L": "Stop a run if a slope changes by more than L times the change of its "
+    "variable, L in 1/s (default 500, as on the cards).",
+    "--no-stop": "Run without the stop test of the Runge-Kutta program.",
 }
 EFFORT = {"--effort F": "Multiply the work limit by this factor (default 1, about ten seconds)."}
-STRICT = {"--strict": "Exit with status 1 if rounding errors, amplified, exceed the tolerance."}
+STRICT = {
+    "--strict": "Exit with status 1 if the motion amplifies rounding errors beyond the tolerance."
+}
 _NEGATIVE = re.compile(r"-[.\d]")
 
 

@@ -29,9 +29,9 @@ OPTIONS = {
     "--bodies N": f"Number of bodies of --ensemble (default {_BODIES}).",
     "--seed S": "Seed of the random scenes or bodies (default: year and week).",
     "--attitude": "Measure omega and attitude together.",
-    "--methods A,B": "Measure these of our methods alone, or none; an unknown name names them all.",
-    "--peers X,Y": "Measure these third-party packages alone, or none.",
-    "--plan": "Measure what each computation that the plan leaves out would cost.",
+    "--methods A,B": "Measure these of our methods alone; none measures none of them.",
+    "--peers X,Y": "Measure these third-party packages alone; none measures none of them.",
+    "--plan": "Measure what each computation would cost that `pyharness plan` leaves out.",
     "--growth": "Measure the error of the Taylor method up to 1e5 s in Cases 3 and 4.",
     **shared.outputs(),
 }

@@ -19,9 +19,9 @@ _LARGEST_SCAN = 1 << 24  # bytes
 FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
     "cards CARDS": "Show these cards: two-term, 1660, 1040-1090 or two-term:1660 (default: all).",
-    "--classes": "Count the differences between the scan and our reading by their class.",
+    "--classes": "Count, by class, the differences between the text of the scan and our reading.",
     "--collate": "Compare the three decks with each other and with sections II to V of the thesis.",
-    "--scan FILE": "Compare our reading with the text of a scan, character by character.",
+    "--scan FILE": "Compare our reading with the text of this scan, character by character.",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "cards runge-kutta:860"

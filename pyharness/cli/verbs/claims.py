@@ -10,13 +10,14 @@ from pyharness.original.programs import BINARY64, WORD_NAMES
 
 OPTIONS = {
     "--explain ID": "Explain the verdict on this claim with its numbers.",
-    "--assignments": "Show with which initial conditions all claims hold.",
+    "--assignments": "Show with which initial conditions of the cases all claims hold.",
     "--word W": "Judge the programs in this arithmetic: "
     f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
     "--evidence": "Score every combination of initial conditions, readings, conjectures and steps.",
-    "--atlas STORE": "Report a sweep of the claims over initial conditions; needs --sweep.",
-    "--sweep FILE.toml": "The sweep file from which the store of --atlas was made.",
-    **shared.outputs(plot="Draw the claims that tell choices apart (--evidence, --atlas)"),
+    "--atlas STORE": "Report for which initial conditions the claims hold, from this store of a "
+    "sweep; needs --sweep.",
+    "--sweep FILE.toml": "The sweep file that made the store of --atlas.",
+    **shared.outputs(plot="With --evidence or --atlas, draw the claims with differing verdicts"),
 }
 EXAMPLE = "claims --explain abstract-superior"
 

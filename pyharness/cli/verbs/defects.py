@@ -10,7 +10,7 @@ FORMATS = ("table", "json")
 OPTIONS = {
     "name NAME": "Show this entry and its effect in every case: a name from the list, or a card "
     "as in 1660 or two-term:1660 (default: list all entries).",
-    "--kind K": "List the entries of this kind alone; an unknown kind names them all.",
+    "--kind K": "List the entries of this kind alone, as defect, reading or conjecture.",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "defects stage-base"

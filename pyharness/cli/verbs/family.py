@@ -12,12 +12,13 @@ _OF_A_MEMBER = ("weighting", "terms", "points", "corrections")
 _DEFAULT_CASE = "5"
 OPTIONS = {
     **shared.SCENE,
-    "--weighting W": f"Measure one method with this weighting: {', '.join(WEIGHTINGS)}.",
-    "--terms N": "Number of terms of the trial solution of that method (default 2).",
-    "--points P": "Collocation points of that method: thesis, gauss, or fractions of the step, as "
-    "in 0.3,0.6.",
-    "--corrections K": "Number of corrections of that method in each step (default 1).",
-    "--lost": "Rank the mistakes with which the three failed programs of section IV.2 could fail.",
+    "--weighting W": "Measure the order and the error of one method, with this weighting of its "
+    f"residual: {', '.join(WEIGHTINGS)}.",
+    "--terms N": "Number of terms of the method's trial solution (default 2).",
+    "--points P": "Collocation points, with --weighting collocation: thesis, gauss, or fractions "
+    "of the step as in 0.3,0.6.",
+    "--corrections K": "Number of corrections of the method in each step (default 1).",
+    "--lost": "Rank the mistakes that may have made the three programs of section IV.2 fail.",
     "--word W": "Arithmetic of the programs that --lost runs: "
     f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
     **shared.outputs(plot=""),

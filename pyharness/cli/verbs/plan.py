@@ -9,7 +9,7 @@ from pyharness.methods.solver import PREPARED
 
 OPTIONS = {
     **shared.SCENE,
-    "--method M": "Plan for this method (default auto); an unknown name names them all.",
+    "--method M": "Plan for this method, as in docs/reference/methods.md (default auto).",
     "--tolerance E": "Relative tolerance (default: the method's own, 1e-12 for auto).",
     "--velocity": "Plan for the translational velocity too.",
     "--rows": "Plan for intermediate output too, as `run --times` requests it.",

@@ -29,8 +29,8 @@ OPTIONS = {
     "--implementation I": "Run the program in fortran (default) or in python.",
     "--word W": f"Run the program in this arithmetic: {', '.join(WORD_NAMES)} (default "
     f"{WORD_NAMES[0]}). Fortran has {', '.join(COMPILED_WORDS)}; the others run in Python.",
-    "--method M": "Run this method in place of a program: auto, taylor, closed-form, dop853, ...; "
-    "an unknown name names them all.",
+    "--method M": "Run this method in place of a program: auto, taylor, closed-form, dop853 and "
+    "others (docs/reference/methods.md).",
     **shared.LISTING,
     "--times T1,T2,...": "Times of the results of a method, s; strictly monotonic, of either sign.",
     "--attitude FORM": "Compute the attitude too, with a method, and print it in this form: "

@@ -27,7 +27,8 @@ OPTIONS = {
     f"(default {EXECUTORS[0]}: in this process).",
     "--workers N": "Number of processes of the executors processes and dask (default: one for each "
     "processor).",
-    "--scheduler ADDRESS": "Use this Dask cluster, as in tcp://host:8786 (default: a local one).",
+    "--scheduler ADDRESS": "Scheduler of a Dask cluster, as in tcp://host:8786 (default: a local "
+    "cluster).",
     "--quantity NAME": "The reduction that --plot draws (default: the first).",
     **{key: help for key, help in shared.outputs().items() if key != "--out FILE"},
 }

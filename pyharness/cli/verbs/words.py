@@ -20,7 +20,7 @@ FORMATS = ("table", "json", "csv", "markdown")
 OPTIONS = {
     "--case N": "Run this case alone, 1 to 7 (default: all).",
     "--program P": f"Run this program alone: {', '.join(PROGRAMS)} (default: all three).",
-    "--all": f"Take every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits; takes twelve minutes.",
+    "--all": f"Run every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits; takes twelve minutes.",
     "--vectors FILE": "Check our arithmetic of the CDC against the operations in a JSON file.",
     **shared.outputs(FORMATS, plot="Draw the error against the precision (needs --case)"),
 }

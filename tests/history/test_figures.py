@@ -156,7 +156,7 @@ def test_list_of_files(capsys: Capture, tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     assert main(["figures", "--out", str(tmp_path), "--format", "json"]) == 0
     captured = capsys.readouterr()
-    assert "figures: 16 of 16" in captured.err
+    assert "/16 [" in captured.err
     record = json.loads(captured.out, parse_constant=pytest.fail)
     assert record["schema"] == 1
     assert "numpy" in record["build"]

@@ -151,7 +151,7 @@ def _as_on_card(statement: str) -> str:
         (["9000-9100"], "the range is empty; the decks have two-term 100-1680"),
         (["1090-1040"], "the range is empty"),
         (["three-term"], "neither a program"),
-        (["three-term:100"], "no program 'three-term'"),
+        (["three-term:100"], "unknown program 'three-term'"),
     ],
 )
 def test_cards_that_are_not_there(asked: list[str], told: str) -> None:

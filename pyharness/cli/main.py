@@ -9,34 +9,37 @@ from pyharness.cli import say
 from pyharness.cli.interruption import came, report
 from pyharness.model.errors import InputError, NotBuiltError, unknown
 
-# Each verb is a module of pyharness.cli.verbs, imported only when the verb is used.
-VERBS = {
-    "compare": "compare original and corrected programs, Fortran and Python, and solve_ivp",
-    "run": "compute one trajectory with a program of the appendix or with a method",
-    "cards": "show the listings card by card with scan, port, twin and apparatus",
-    "deck": "write a program as a deck of cards in fixed-form FORTRAN",
-    "defects": "list the defects and readings with their evidence and effect",
-    "limits": "show what the original programs converge to as the step goes to zero",
-    "figures": "redraw Figures 6 to 12 of the thesis, original and corrected",
-    "claims": "judge the statements of the thesis for the original and the corrected programs",
-    "family": "derive and measure the orders of the weighted residual methods",
-    "plan": "show what a scene requires, what is not computed, and why",
-    "rotations": "find the steady rotations of a scene, their stability and the time between flips",
-    "words": "run the programs in the CDC's arithmetic and in other word lengths",
-    "bench": "measure run time against error of our and of third-party integrators",
-    "sweep": "solve a grid of scenes on this machine or a cluster and store the results",
-    "verify": "check all programs and methods against each other and against the truth",
-    "stress": "test the numerical stability of every method against derived bounds",
-    "edition": "write the whole edition as a static web site with a laboratory",
-    "doctor": "report the build, its compiler and flags, and what is missing",
-}
-# The groups of the overview, in the order in which a reader looks for a verb.
+# The verbs in the order of the overview. Each is a module of pyharness.cli.verbs, which is imported
+# only when the verb is used.
 _GROUPS = {
-    "for everyone": ("compare", "run", "plan", "doctor"),
-    "the thesis": ("claims", "figures", "cards", "defects", "deck", "limits", "family", "words"),
-    "rigid bodies": ("rotations", "sweep"),
-    "checks and publication": ("verify", "stress", "bench", "edition"),
+    "for everyone": {
+        "compare": "compare original and corrected programs, Fortran and Python, and solve_ivp",
+        "run": "compute one trajectory with a program of the appendix or with a method",
+        "plan": "show what a scene requires, what is not computed, and why",
+        "doctor": "report the build, its compiler and flags, and what is missing",
+    },
+    "the thesis": {
+        "claims": "judge the statements of the thesis for the original and the corrected programs",
+        "figures": "redraw Figures 6 to 12 of the thesis, original and corrected",
+        "cards": "show the listings card by card with scan, port, twin and apparatus",
+        "defects": "list the defects and readings with their evidence and effect",
+        "deck": "write a program as a deck of cards in fixed-form FORTRAN",
+        "limits": "show what the original programs converge to as the step goes to zero",
+        "family": "derive and measure the orders of the weighted residual methods",
+        "words": "run the programs in the CDC's arithmetic and in other word lengths",
+    },
+    "rigid bodies": {
+        "rotations": "find steady rotations of a scene, their stability and the time between flips",
+        "sweep": "solve a grid of scenes on this machine or a cluster and store the results",
+    },
+    "checks and publication": {
+        "verify": "check all programs and methods against each other and against the truth",
+        "stress": "test the numerical stability of every method against derived bounds",
+        "bench": "measure run time against error of our and of third-party integrators",
+        "edition": "write the whole edition as a static web site with a laboratory",
+    },
 }
+VERBS = {verb: about for group in _GROUPS.values() for verb, about in group.items()}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -81,12 +84,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
-    if not arguments or arguments[0] in ("-h", "--help") or arguments == ["help"]:
+    verb, *rest = arguments or ["--help"]
+    if verb == "help":
+        verb, rest = (*rest, "--help")[0], ["--help"]
+    if verb in ("-h", "--help"):
         sys.stdout.write(_overview())
         return 0
-    verb, *rest = arguments
-    if verb == "help":
-        verb, rest = rest[0], ["--help"]
     if verb == "--version":
         from pyharness import __version__
 
@@ -94,7 +97,7 @@ def _run(arguments: list[str]) -> int:
         return 0
     if verb not in VERBS:
         raise unknown("verb", verb, VERBS)
-    from pyharness.cli.options import Parser
+    from pyharness.cli.parser import Parser
 
     parser = Parser(verb, VERBS[verb])
     if {"-h", "--help"} & {*rest}:
@@ -121,7 +124,7 @@ def _complete() -> int:
     verb = typed[first] if len(typed) > first else ""
     parser = ArgumentParser("pyharness", add_help=False)
     if verb in VERBS:
-        from pyharness.cli.options import Parser
+        from pyharness.cli.parser import Parser
 
         parser = Parser(verb, VERBS[verb])
     else:
@@ -135,7 +138,7 @@ def _complete() -> int:
 def _overview() -> str:
     lines = ["usage: pyharness VERB [options]", "       pyharness help VERB"]
     for title, verbs in _GROUPS.items():
-        lines += ["", f"{title}:", *(f"  {verb:10s}{VERBS[verb]}" for verb in verbs)]
+        lines += ["", f"{title}:", *(f"  {verb:10s}{about}" for verb, about in verbs.items())]
     lines += ["", "example:", "  pyharness compare --case 3"]
     return "\n".join(lines) + "\n"
 

@@ -2,12 +2,10 @@
 
 import argparse
 import math
-import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from importlib import import_module
-from typing import Any, NoReturn
+from typing import Any
 
 from pyharness.cli import say, shown, write_text
 from pyharness.cli.progress import end_progress as end_progress
@@ -44,104 +42,6 @@ EFFORT = {"--effort F": "Multiply the work limit by this factor (default 1, abou
 STRICT = {
     "--strict": "Exit with status 1 if the motion amplifies rounding errors beyond the tolerance."
 }
-_NEGATIVE = re.compile(r"-[.\d]")
-
-
-_GROUPS = {**dict.fromkeys(SCENE, "scene"), **dict.fromkeys(LISTING, "listing")}
-_OUTPUTS = ("--format", "--plot", "--out", "--strict")
-_NARROWEST, _WIDEST = 80, 100  # columns
-
-
-class _Formatter(argparse.HelpFormatter):
-    """A help formatter that keeps the lines of the example and names no option in the usage."""
-
-    def _fill_text(self, text: str, width: int, indent: str) -> str:
-        if text.startswith("example:"):
-            return text
-        return super()._fill_text(text, width, indent)
-
-    def _format_usage(self, *arguments: Any) -> str:
-        _, actions, *_ = arguments
-        places = "".join(f" [{each.metavar}]" for each in actions if not each.option_strings)
-        return f"usage: {self._prog}{places} [options]\n\n"
-
-
-class Parser(argparse.ArgumentParser):
-    """The parser of one verb, whose error messages are one line and suggest the nearest name."""
-
-    def __init__(self, verb: str, description: str = "") -> None:
-        """Declare the options of a verb, which are the OPTIONS of its module.
-
-        `description` is the line of the overview about the verb.
-        """
-        self._width = _WIDEST
-        self.module = import_module(f"pyharness.cli.verbs.{verb}")
-        super().__init__(
-            prog=f"pyharness {verb}",
-            description=f"{description[:1].upper()}{description[1:]}.",
-            epilog=f"example:\n  pyharness {self.module.EXAMPLE}",
-            allow_abbrev=False,
-            add_help=False,
-            # Without a width, argparse would import `shutil` for every command.
-            formatter_class=lambda prog: _Formatter(prog, width=self._width),
-        )
-        titles = ["arguments", *dict.fromkeys([*_GROUPS.values(), "options", "output"])]
-        groups = {title: self.add_argument_group(title) for title in titles}
-        for option, text in self.module.OPTIONS.items():
-            name, _, metavar = option.partition(" ")
-            if not name.startswith("--"):
-                groups["arguments"].add_argument(name, nargs="?", metavar=metavar, help=text)
-                continue
-            group = groups[_GROUPS.get(option, "output" if name in _OUTPUTS else "options")]
-            if metavar:
-                group.add_argument(name, metavar=metavar, help=text)
-            else:
-                group.add_argument(name, action="store_true", help=text)
-        groups["output"].add_argument("-h", "--help", action="help", help="Print this help.")
-
-    def format_help(self) -> str:
-        """Return the help text in the width of the terminal, but from 80 to 100 columns wide."""
-        from shutil import get_terminal_size
-
-        self._width = min(max(get_terminal_size().columns, _NARROWEST), _WIDEST)
-        return super().format_help()
-
-    def error(self, message: str) -> NoReturn:
-        """Raise InputError with the message, because argparse would print the usage too."""
-        raise InputError(message)
-
-    def option_names(self) -> list[str]:
-        """Return the names of all options of the verb, as in ``--case``."""
-        return [name for name in self._option_string_actions if name.startswith("--")]
-
-    def read(self, verb: str, arguments: Sequence[str]) -> argparse.Namespace:
-        """Return the parsed options of a command line.
-
-        `arguments` are those after the name of the verb. Raise InputError if an option or the
-        output format is unknown.
-        """
-        options, rest = self.parse_known_args(self._joined(arguments))
-        if rest:
-            raise unknown("option", rest[0], self.option_names(), verb)
-        for name, value in vars(options).items():
-            # For `--name=--`, argparse returns a list.
-            if isinstance(value, list):
-                raise InputError(f"--{name.replace('_', '-')}: '--' is no value; give one")
-        check_known("format", options.format, getattr(self.module, "FORMATS", FORMATS))
-        return options
-
-    def _joined(self, arguments: Sequence[str]) -> list[str]:
-        """Return the arguments with each negative number joined to its option, as in --x=-1.
-
-        Otherwise argparse would take the number for an option.
-        """
-        result: list[str] = []
-        for argument in arguments:
-            if result and result[-1] in self.option_names() and _NEGATIVE.match(argument):
-                result[-1] += "=" + argument
-            else:
-                result.append(argument)
-        return result
 
 
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "Draw a picture") -> dict[str, str]:

@@ -18,7 +18,7 @@ import pytest
 
 from pyharness import case_scene, solve
 from pyharness.cli.main import VERBS, main
-from pyharness.cli.options import Parser
+from pyharness.cli.parser import Parser
 from pyharness.model import extension
 from pyharness.model.errors import NotBuiltError
 from pyharness.model.listing import original
@@ -76,6 +76,8 @@ def test_overview_names_every_verb_once(printed: Printed) -> None:
     named = [line.split()[0] for line in lines if re.match(r"  \w", line)]
     assert sorted(named) == sorted([*VERBS, "pyharness"])
     assert max(map(len, lines)) <= 100
+    for other in ("", "-h", "--help", "help -h", "help --help"):
+        assert printed(other).splitlines() == lines, other
 
 
 def _record(printed: Printed, command: str) -> dict[str, Any]:

@@ -7,7 +7,8 @@ from pathlib import Path
 from random import Random
 
 from pyharness.cli.main import VERBS
-from pyharness.cli.options import FORMATS, Parser
+from pyharness.cli.options import FORMATS
+from pyharness.cli.parser import Parser
 from pyharness.history.ablation import entries
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solver import PREPARED

@@ -7,8 +7,8 @@ from urllib.parse import parse_qs
 
 import pytest
 
-from pyharness.cli import options
 from pyharness.cli.main import VERBS, main
+from pyharness.cli.parser import Parser
 from pyharness.history.claims.ledger import claims
 from pyharness.history.claims.sentences import Sentence, sentences
 
@@ -111,7 +111,7 @@ def test_state_is_of_the_case_that_the_sentence_is_about() -> None:
 def test_command_is_one(command: str) -> None:
     verb, *rest = shlex.split(command)
     assert verb in VERBS
-    options.Parser(verb).read(verb, rest)
+    Parser(verb).read(verb, rest)
 
 
 @pytest.mark.parametrize(

@@ -125,5 +125,11 @@ def test_scenes_that_do_not_go_side_by_side() -> None:
         with pytest.raises(InputError) as raised:
             solve_many(scenes, 1.0)
         assert str(raised.value).startswith(said)
-    with pytest.raises(InputError, match="omega0 is given beside many scenes"):
-        solve_many([TOP], 1.0, omega0=[1.0, 2.0, 3.0])
+
+
+@pytest.mark.parametrize(
+    "name", ["omega0", "moments", "coefficients", "torque_constant", "torque_rate"]
+)
+def test_arrays_beside_many_scenes_are_refused(name: str) -> None:
+    with pytest.raises(InputError, match=f"^{name} is given beside many scenes"):
+        solve_many([TOP, TOP], 1.0, **{name: [1.0, 2.0, 3.0]})  # type: ignore[arg-type]

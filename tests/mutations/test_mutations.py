@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.mutations import python_source, text_source
+from tests.mutations import python_source, sample, text_source
 from tests.mutations.__main__ import caught_share, table
 from tests.mutations.ci import PLANTED, find
+from tests.mutations.reach import Check
 from tests.mutations.sample import (
     Mutation,
     draw,
@@ -20,7 +21,7 @@ from tests.mutations.sample import (
 )
 from tests.mutations.text_source import FORTRAN, JAVASCRIPT, C, language_of
 from tests.mutations.tree import ROOT
-from tests.mutations.trial import Verdict
+from tests.mutations.trial import Verdict, near
 
 
 def _of_text(text: str, language: str) -> dict[str, list[str]]:
@@ -119,6 +120,15 @@ def test_a_seed_gives_the_same_draw_and_another_seed_another() -> None:
     assert len(set(first)) == 4
 
 
+def test_a_file_without_changes_is_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = find(*PLANTED[2][:2])
+    changes = {"empty.py": [], "full.py": [one]}
+    monkeypatch.setattr(sample, "files", lambda: [*changes])
+    monkeypatch.setattr(sample, "lines_of_code", lambda file: 1000 if file == "empty.py" else 1)
+    monkeypatch.setattr(sample, "mutations", changes.__getitem__)
+    assert _drawn("a", 1) == [one]
+
+
 def test_every_language_has_its_share() -> None:
     lines: Counter[str] = Counter()
     for file in files():
@@ -145,6 +155,15 @@ def test_the_function_around_a_mutation_is_known() -> None:
         PLANTED, ("factor", "evaluate", "_ordinal", "factor"), strict=True
     ):
         assert find(file, id).function() == wanted
+
+
+def test_tests_of_a_module_that_is_compiled_for_each_instruction_set_are_near() -> None:
+    mutation = next(
+        each for each in mutations("fortran/modern/taylor_march.f90") if each.function()
+    )
+    entered = Check("a", 1.0, frozenset({f"taylor_march_hot:{mutation.function()}"}))
+    other = Check("b", 1.0, frozenset({f"taylor_rows_hot:{mutation.function()}"}))
+    assert [each.name for each in near(mutation, [other, entered])] == ["a"]
 
 
 def test_planted_mutations_and_their_tests_are_there() -> None:

@@ -105,7 +105,7 @@ def explanation(judgement: Judgement) -> Report:
         lines = [Line("without its assumptions (original, corrected):")]
         for each in judgement.survivals:
             mark = "same" if each.survives else "CHANGES"
-            lines.append(Line(f"  {mark:7s}{each.assumption}: {each.original}, {each.corrected}"))
+            lines.append(Line(f"  {mark:9s}{each.assumption}: {each.original}, {each.corrected}"))
         text.append(lines)
     return claims_report([judgement])._replace(text=text)
 

@@ -1,0 +1,42 @@
+"""`tests/style.py`: what it reads of each kind of file, and what it leaves alone."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.style import TERMS, files, findings
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "lines"),
+    [
+        ("a.md", "A text.\nIt hangs on the scene.\n", [2]),
+        ("a.md", "It hangs\non the scene.\n", [1]),
+        ("a.md", '```sh\nhangs on\n```\n`hangs on` and "hangs on"\n', []),
+        ("a.py", '"""Return it.\n\nIt hangs on the scene.\n"""\n', [3]),
+        ("a.py", "x = 1  # it hangs on the scene\n", [1]),
+        ("a.py", 'text = "it hangs on the scene"\n', []),
+        ("a.py", 'def f():\n    """What it returns."""\n', [2]),
+        ("a.py", 'def f():\n    """Return what it is."""\n', []),
+        ("a.f90", "x = 1\n!! It hangs on the scene.\n", [2]),
+        ("a.f90", "x = 1  ! it hangs on the scene\n", [1]),
+        ("a.f90", "call hangs_on(the)\n", []),
+        ("a.c", "int a;\n/* It\n   hangs on the scene. */\n", [3]),
+        ("a.js", "let a = 1;  // it hangs on the scene\n", [1]),
+        ("a.js", "let a = 'hangs on';\n", []),
+    ],
+)
+def test_expressions_are_found_in_prose_alone(
+    tmp_path: Path, name: str, text: str, lines: list[int]
+) -> None:
+    path = tmp_path / name
+    path.write_text(text)
+    assert [line for line, *_ in findings(path)] == lines
+
+
+def test_each_expression_has_its_replacement() -> None:
+    assert all(instead.strip() for part in TERMS.values() for instead in part.values())
+
+
+def test_sources_and_documents_of_every_language_are_read() -> None:
+    assert {path.suffix for path in files()} == {".py", ".f90", ".fypp", ".c", ".js", ".md"}

@@ -24,6 +24,11 @@ _CODE = re.compile(
     r"|^ *(>>>|\.\.\.) .*?$",
     re.DOTALL | re.MULTILINE,
 )
+# An expression may continue on the next line.
+PATTERNS = [
+    (re.compile(rf"\b({each})\b".replace(" ", r"\s+"), re.IGNORECASE), instead)
+    for each, instead in TERMS["instead"].items()
+]
 
 
 def files() -> list[Path]:
@@ -67,9 +72,8 @@ def findings(path: Path) -> Iterator[tuple[int, str, str]]:
     for first, passage in prose(path):
         # What is code or quoted is blanked, and keeps its lines.
         plain = _CODE.sub(lambda m: re.sub(r"[^\n]", " ", m[0]), passage)
-        for pattern, instead in TERMS["instead"].items():
-            pattern = rf"\b({pattern})\b".replace(" ", r"\s+")
-            for found in re.finditer(pattern, plain, re.IGNORECASE):
+        for pattern, instead in PATTERNS:
+            for found in pattern.finditer(plain):
                 yield first + plain.count("\n", 0, found.start()), found[0], instead
         for pattern, instead in TERMS["begin"].items():
             if begin := re.match(rf"\0({pattern})\b", plain):

@@ -44,7 +44,9 @@ def growth(
     method. Raise InputError if the scene has no closed form.
     """
     if closed_form(scene) is None:
-        raise InputError("growth: the scene has no closed form to compare with")
+        raise InputError(
+            "growth: the scene has no closed form to compare with; give a scene without torque"
+        )
     series = prepare(scene, "taylor", tolerance)
     exact = prepare(scene, "closed-form")
     rate = scene.right_hand_side()

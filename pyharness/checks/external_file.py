@@ -121,7 +121,10 @@ def _problem(data: dict[str, Any], name: str, given: str | None) -> Problem:
     check_written_schema(data, "external file")
     check_keys(data, ("schema", *_TEXTS, "unit", "sequence", *_SCENE, "value"), "top level")
     if not re.fullmatch(r"[\w.-]+", name):
-        raise InputError("the name of the file names its checks; allowed: letters, digits, - _ .")
+        raise InputError(
+            "the name of the file is the name of its checks; allowed: letters, digits, '-', "
+            "'_' and '.'"
+        )
     texts = {}
     for key in _TEXTS:
         text = data.get(key)
@@ -144,7 +147,7 @@ def _problem(data: dict[str, Any], name: str, given: str | None) -> Problem:
     for entry in entries:
         value = _value(entry, data.get("sequence"))
         if float(value.time) in values:
-            raise InputError(f"[[value]] time {value.time} is given twice")
+            raise InputError(f"[[value]] time {value.time} is given twice; give each time once")
         values[float(value.time)] = value
     told = tuple(values.values())
     return Problem(
@@ -167,20 +170,26 @@ def _value(entry: object, sequence: object) -> Value:
     check_keys(entry, ("time", "omega", "attitude", "angles_deg", "good_to"), "[[value]]")
     time = figure("[[value]] time", entry.get("time", "")).print
     if float(time) == 0.0:
-        raise InputError("[[value]] time is 0: that is where it starts; give another")
+        raise InputError("[[value]] time is 0, the time of the initial state; give another time")
     where = f"[[value]] time {time}"
     good_to = number(f"{where}: good_to", entry.get("good_to", 0.0))
     if not (math.isfinite(good_to) and good_to >= 0.0):
-        raise InputError(f"{where}: good_to is {good_to:g}; allowed: an error in the print's unit")
+        raise InputError(
+            f"{where}: good_to is {good_to:g}; allowed: a positive error, in the unit of the "
+            "printed numbers"
+        )
     pointing = _pointing(where, entry, sequence, good_to)
     prints = entry.get("omega", ["", "", ""] if pointing else None)
     if not isinstance(prints, list) or len(prints) != 3:
-        raise InputError(f"{where}: omega must be a list of three texts, '' where none is printed")
+        raise InputError(
+            f"{where}: omega must be a list of three texts; '' means that the component is "
+            "not printed"
+        )
     omega = tuple(
         None if text == "" else figure(f"{where}: omega", text, good_to) for text in prints
     )
     if not any(omega) and pointing is None:
-        raise InputError(f"{where}: omega has nothing printed; give at least one number")
+        raise InputError(f"{where}: no component of omega is given; give at least one")
     return Value(time, omega, pointing)
 
 

@@ -140,7 +140,7 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
         try:
             file = toml_of(read_input(path, "file", _LARGEST, "a record"), "file")
         except InputError as error:
-            raise InputError(f"'{path}': is no record ({error}); {_ANEW}") from None
+            raise InputError(f"'{path}': is not a golden record ({error}); {_ANEW}") from None
         check_schema(f"'{path}'", "golden record", file.get("schema"), _ANEW)
         try:
             for entry in file["trajectory"]:
@@ -150,7 +150,8 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
             found[path.stem] = file
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InputError(
-                f"'{path}': is no record ({' '.join(str(error).split()) or 'empty'}); {_ANEW}"
+                f"'{path}': is not a golden record "
+                f"({' '.join(str(error).split()) or 'empty'}); {_ANEW}"
             ) from None
     return found
 

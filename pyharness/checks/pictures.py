@@ -74,7 +74,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
     drawn = [check for check in checks if check.name.circumstance and check.value is not None]
     if not drawn:
         raise InputError(
-            "--plot: none of these checks has a number to draw; choose others by --only"
+            "--plot: none of the chosen checks has a number to draw; choose others with --only"
         )
     marks = list(map(_mark, drawn))
     places = _places(marks)

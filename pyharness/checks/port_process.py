@@ -40,7 +40,7 @@ def split_command(command: str) -> list[str]:
     except ValueError as error:
         raise InputError(f"--port {command}: {error}") from None
     if not words or not words[0] or "\0" in command:
-        raise InputError("--port: no command; give one, as in --port 'node web/port.js'")
+        raise InputError("--port: no command is given; give one, as in --port 'node web/port.js'")
     return words
 
 

@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except NotBuiltError as error:
         return _complain(str(error), 3)
     except MemoryError:
-        return _complain("not enough memory; take fewer steps", 2)
+        return _complain("not enough memory; use fewer steps", 2)
     except BrokenPipeError:
         # The reader of the pipe closed it, as `head` does.
         _leave_stdout()

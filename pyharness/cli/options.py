@@ -75,7 +75,9 @@ def chosen_seed(options: argparse.Namespace) -> str | None:
     Raise InputError if the seed has unprintable characters.
     """
     if options.seed is not None and not options.seed.isprintable():
-        raise InputError("--seed: has letters that can't be printed; allowed: any others")
+        raise InputError(
+            "--seed: contains characters that can't be printed; allowed: printable characters"
+        )
     seed: str | None = options.seed
     return seed
 
@@ -159,9 +161,9 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
         options.program,
         options.listing,
         names(options.fix),
-        names(options.keep),
-        names(options.reading),
-        None if options.conjecture is None else names(options.conjecture),
+        keep=names(options.keep),
+        readings=names(options.reading),
+        conjectures=None if options.conjecture is None else names(options.conjecture),
     )
     tell_inactive(options, [listing])
     return listing

@@ -66,7 +66,7 @@ def check_apart(picture: str, out: str) -> None:
     for path, what in ((picture, "the picture"), (numbers_beside(picture), "its numbers")):
         if os.path.realpath(path) == os.path.realpath(out):
             raise InputError(
-                f"--out '{out}': there --plot '{picture}' puts {what}; give a file of another name"
+                f"--out '{out}': --plot '{picture}' writes {what} to this file; give another name"
             )
 
 

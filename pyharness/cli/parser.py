@@ -89,7 +89,7 @@ class Parser(argparse.ArgumentParser):
         for name, value in vars(options).items():
             # For `--name=--`, argparse returns a list.
             if isinstance(value, list):
-                raise InputError(f"--{name.replace('_', '-')}: '--' is no value; give one")
+                raise InputError(f"--{name.replace('_', '-')}: '--' is not a value; give a value")
         check_known("format", options.format, getattr(self.module, "FORMATS", FORMATS))
         return options
 

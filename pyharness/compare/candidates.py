@@ -91,10 +91,11 @@ def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candid
 
     def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
         times = scene.times() if times is None else times
-        return solve(scene, times, name, tolerance, effort, scene.attitude is not None)
+        attitude = scene.attitude is not None
+        return solve(scene, times, name, tolerance, effort=effort, attitude=attitude)
 
     def ready(scene: Scene, time: float) -> Ready:
-        return Ready(partial(solve, scene, [time], name, tolerance, effort), _last)
+        return Ready(partial(solve, scene, [time], name, tolerance, effort=effort), _last)
 
     return Candidate(name, ready, rows)
 
@@ -137,7 +138,7 @@ def attitude_candidate(name: str, tolerance: float | None, primed: bool = False)
 
 
 def _no_rows(scene: Scene) -> Trajectory:
-    raise InputError("a prepared solver gives the end alone")
+    raise InputError("a prepared solver returns the state at one time only; give one time")
 
 
 def program_candidate(
@@ -158,7 +159,11 @@ def program_candidate(
     def ready(scene: Scene, time: float) -> Ready:
         last = scene.step_size * scene.steps
         if abs(last - time) > _SAME * abs(time):
-            raise InputError(f"{listing.program}: its steps end at {last:g} s, not at {time:g} s")
+            raise InputError(
+                f"{listing.program}: its last step ends at {last:g} s, not at {time:g} s; "
+                "give a time that is a whole "
+                "number of steps"
+            )
         if implementation != "fortran":
             return Ready(partial(rows, scene), _last)
         given = program_arguments(scene, listing, *options)

@@ -164,6 +164,7 @@ class Comparison:
 def compare_programs(
     scene: Scene,
     listings: Sequence[Listing] | None = None,
+    *,
     lipschitz: float = 500.0,
     may_stop: bool = True,
     tolerance: float | None = None,
@@ -286,15 +287,16 @@ def listings_for(
             if name not in allowed:
                 raise unknown(kind, name, sorted(allowed), option)
     for name in sorted(set(fix) & set(keep)):
-        raise InputError(f"'{name}' is given to both --fix and --keep; give it to one")
+        raise InputError(f"'{name}' is given to both --fix and --keep; give it to one of them")
     result = []
     for program in chosen:
         own = switchable(program)
         fixed, kept, selected = ([n for n in names if n in own] for names in (fix, keep, readings))
         bases = [base] if base and not (fix or keep) else ["original", "corrected"]
-        rows = [subset(program, each, (), (), selected, conjectures) for each in bases]
+        listing = partial(subset, program, readings=selected, conjectures=conjectures)
+        rows = [listing(each) for each in bases]
         if fixed or kept:
-            rows.insert(1, subset(program, base, fixed, kept, selected, conjectures))
+            rows.insert(1, listing(base, fixed, keep=kept))
         result += rows
     return result
 

@@ -26,10 +26,13 @@ def documents_folder(given: str | None = None) -> Path:
         return folder
     if given is None:
         raise InputError(
-            "edition: an installed package has no documents; give --docs DIR, the folder 'docs' of "
+            "edition: an installed package does not contain the documents; give --docs DIR, "
+            "the folder 'docs' of "
             "the source, or run it in a checkout"
         )
-    raise InputError(f"--docs '{given}': has no {missing[0]}; give the folder 'docs' of the source")
+    raise InputError(
+        f"--docs '{given}': does not contain {missing[0]}; give the folder 'docs' of the source"
+    )
 
 
 def documents(folder: Path) -> Iterator[tuple[str, Document]]:

@@ -149,13 +149,15 @@ def axis_of(table: object, number: int) -> Axis:
     where = f"{where} ({field})"
     dimension = table.get("dimension", _SAMPLE if "draw" in table else field)
     if not isinstance(dimension, str) or not dimension or not dimension.isprintable():
-        raise InputError(f"{where}: dimension: allowed: a name")
+        raise InputError(f"{where}: dimension must be text; allowed: a name")
     if "/" in dimension or dimension.startswith((".", "_")):
-        raise InputError(f"{where}: dimension '{dimension}'; allowed: letters, digits, dots within")
+        raise InputError(
+            f"{where}: dimension '{dimension}'; allowed: letters and digits, with dots between them"
+        )
     if "values" in table:
         return _listed(where, table, field, dimension)
     if field in CHOICES:
-        raise InputError(f"{where}: values is missing; a list of names belongs here")
+        raise InputError(f"{where}: values is missing; give a list of names")
     return _spread(where, table, field, dimension)
 
 
@@ -169,7 +171,7 @@ def _listed(where: str, table: dict[str, Any], field: str, dimension: str) -> Ax
             if not isinstance(each, str):
                 raise InputError(f"{where}: {kind_of(each)} where a name belongs")
         if len(set(values)) < len(values):
-            raise InputError(f"{where}: a name is given twice; allowed: each once")
+            raise InputError(f"{where}: a name is given twice; give each name once")
         return Axis(field, dimension, len(values), "listed", tuple(values))
     floats = tuple(finite(where, each) for each in values)
     return _checked(where, Axis(field, dimension, len(values), "listed", floats))
@@ -190,7 +192,7 @@ def _spread(where: str, table: dict[str, Any], field: str, dimension: str) -> Ax
         _refuse(where, table, "draw", ("spacing",))
         keys = DRAWS[how]
         if "seed" not in table:
-            raise InputError(f"{where}: seed is missing; a whole number from 0 belongs here")
+            raise InputError(f"{where}: seed is missing; give a whole number from 0")
     else:
         how = table.get("spacing", "linear")
         if not isinstance(how, str) or how not in SPACINGS:
@@ -208,7 +210,7 @@ def _spread(where: str, table: dict[str, Any], field: str, dimension: str) -> Ax
         raise InputError(f"{where}: deviation {ends[1]:g}; allowed: a number from 0")
     seed = integer(f"{where} seed", table.get("seed", 0))
     if not 0 <= seed < 2**63:
-        raise InputError(f"{where}: seed; allowed: a whole number from 0 to 2^63")
+        raise InputError(f"{where}: seed is out of range; allowed: a whole number from 0 to 2^63")
     return _checked(where, Axis(field, dimension, count, how, ends, seed))
 
 

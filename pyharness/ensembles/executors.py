@@ -88,8 +88,8 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
             deaths = 1 if len(left) < before else deaths + 1
             if deaths == _ATTEMPTS:
                 raise InputError(
-                    f"--executor processes: a process died {_ATTEMPTS} times; is there enough "
-                    "memory? The same command continues with what is missing"
+                    f"--executor processes: a process died {_ATTEMPTS} times, perhaps for "
+                    "lack of memory; the same command computes the missing chunks"
                 ) from None
 
 
@@ -189,7 +189,7 @@ def _connected(dask: Any, address: str) -> Any:
     allowed = "allowed: the address of a Dask scheduler with workers, as in tcp://host:8786"
     where = f"--scheduler '{address}'"
     if found is None or int(found["port"]) > 65535:
-        raise InputError(f"{where}: no address; {allowed}")
+        raise InputError(f"{where}: the address is empty; {allowed}")
     place = found["host"].strip("[]"), int(found["port"])
     answered: list[bool] = []
     try:
@@ -247,8 +247,8 @@ def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
             found = future.result()
         except dask.KilledWorker:
             raise InputError(
-                "--executor dask: the workers that took a chunk died, one after the other; is "
-                "there enough memory? The same command continues with what is missing"
+                "--executor dask: every worker that computed a chunk died, perhaps for lack "
+                "of memory; the same command computes the missing chunks"
             ) from None
         except InputError:
             raise

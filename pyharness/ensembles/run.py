@@ -56,21 +56,22 @@ def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int
     free = shutil.disk_usage(Path(path).absolute().parent).free
     if n_bytes > free:
         raise InputError(
-            f"{shown} take up to {byte_count(n_bytes)}, and where '{path}' goes {byte_count(free)} "
-            "are free; take a smaller grid, or fewer reductions"
+            f"{shown} take up to {byte_count(n_bytes)}, and {byte_count(free)} are free where "
+            f"'{path}' is; use a smaller grid, or fewer reductions"
         )
     if sweep.n_chunks > _MOST_CHUNKS:
         raise InputError(
-            f"{shown}; allowed: {_MOST_CHUNKS} chunks, a file each; give larger ones by chunk, or "
-            "put axes of names first"
+            f"{shown}; allowed: {_MOST_CHUNKS} chunks, because each is a file; give a larger "
+            "chunk, or put axes of names first"
         )
     coordinates = 8 * sum(axis.count for axis in sweep.axes)
     needed = workers * (coordinates + math.prod(sweep.chunk_shape) * _scene_memory(sweep))
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if needed > memory // 2:
         raise InputError(
-            f"{shown} take {byte_count(needed)} of memory at once, and the half of it that is "
-            f"theirs is {byte_count(memory // 2)}; take smaller chunks, fewer workers or samples"
+            f"{shown} take {byte_count(needed)} of memory at once, and at most half of this "
+            f"machine's memory, {byte_count(memory // 2)}, is used; use smaller chunks, "
+            "fewer workers or samples"
         )
     return n_bytes, needed
 
@@ -106,8 +107,8 @@ def swept(
                 outcome = _completed(store, own, before, progress)
         except OSError as error:
             raise InputError(
-                f"--out '{path}': {error.strerror or error}; what is done stays, and the same "
-                "command continues from there"
+                f"--out '{path}': {error.strerror or error}; finished chunks are kept, and "
+                "the same command computes the others"
             ) from None
         yield store, outcome
 

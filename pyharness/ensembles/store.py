@@ -179,8 +179,8 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
             # Other errors come from file systems without locks, and are ignored.
             if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
                 raise InputError(
-                    f"--out '{path}': another sweep is writing to it; wait for its end, or give "
-                    "another --out"
+                    f"--out '{path}': another sweep is writing to it; wait until it ends, or "
+                    "give another --out"
                 ) from None
         try:
             _check_metadata(sweep, folder, repair)
@@ -221,7 +221,9 @@ def check_store(sweep: Sweep, path: str) -> bool:
         raise InputError(f"--out '{path}': {error.strerror or error}") from None
     ours, known = label(sweep), labels(folder)
     if not known:
-        raise InputError(f"--out '{path}': is not empty, and no store of a sweep; give a new name")
+        raise InputError(
+            f"--out '{path}': is not empty, and is not the store of a sweep; give a new name"
+        )
     # The store states its identity in two files. One of them may be damaged, which is found and
     # reported when the store is opened.
     if any(type(each.schema) is int and each == ours for each in known):
@@ -230,12 +232,12 @@ def check_store(sweep: Sweep, path: str) -> bool:
     check_schema(f"--out '{path}'", "sweep store", found.schema, _SAME_SWEEP)
     if found.fingerprint != ours.fingerprint:
         raise InputError(
-            f"--out '{path}': is the store of another sweep file (SHA-256 {found.fingerprint:.12}, "
-            f"and this one's is {ours.fingerprint:.12}); {_SAME_SWEEP}"
+            f"--out '{path}': is the store of another sweep file (SHA-256 {found.fingerprint:.12}; "
+            f"this file has {ours.fingerprint:.12}); {_SAME_SWEEP}"
         )
     raise InputError(
-        f"--out '{path}': was made by pyharness {found.version}, and this is {ours.version}, whose "
-        f"results may differ; {_SAME_SWEEP}"
+        f"--out '{path}': was written by pyharness {found.version}, and results of this "
+        f"version, {ours.version}, may differ; {_SAME_SWEEP}"
     )
 
 

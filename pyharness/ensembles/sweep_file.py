@@ -132,7 +132,7 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
     values = {axis.field: axis.values[0] for axis in axes if axis.is_choice}
     for field in values:
         if field in table:
-            raise InputError(f"[solve] {field}: an axis varies it; give it once")
+            raise InputError(f"[solve] {field}: it is given here and on an axis; give it once")
     given = {**table, **values}
     fields = {axis.field for axis in axes}
     for key in CHOICES:
@@ -152,7 +152,10 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
         )
     for key in ("method", "tolerance", "t_end"):
         if key in given or key in fields:
-            raise InputError(f"{key} has no meaning with a program; it goes in the scene's steps")
+            raise InputError(
+                f"{key} has no meaning with a program, which advances with the step size of "
+                "the scene; leave it out"
+            )
     lipschitz = number("[solve] lipschitz", given.get("lipschitz", 500.0))
     if not lipschitz >= 0.0:
         raise InputError(f"[solve] lipschitz is {lipschitz:g}; allowed: a number from 0")
@@ -171,31 +174,37 @@ def _check_axes(axes: tuple[Axis, ...], scene: Scene, solver: Solver) -> None:
     lengths: dict[str, Axis] = {}
     for axis in axes:
         if fields.count(axis.field) > 1:
-            raise InputError(f"{axis.field}: two axes vary it; give it one")
+            raise InputError(f"{axis.field}: two axes vary this field; give one axis")
         other = lengths.setdefault(axis.dimension, axis)
         if other.count != axis.count:
             raise InputError(
                 f"dimension {axis.dimension}: {other.field} has {other.count} values and "
-                f"{axis.field} {axis.count}; allowed: as many"
+                f"{axis.field} has {axis.count}; allowed: equal numbers of values"
             )
         along = [each.field for each in axes if each.dimension == axis.dimension]
         if axis.dimension in fields and axis.dimension not in along:
-            raise InputError(f"dimension {axis.dimension}: a field on another axis is called so")
+            raise InputError(
+                f"dimension {axis.dimension}: a field on another axis has this name; give "
+                "another name"
+            )
     for ours, theirs in RIVALS:
         one = [each for each in fields if each.startswith(ours)]
         two = [each for each in fields if each.startswith(theirs)]
         if one and two:
-            raise InputError(f"{one[0]} beside {two[0]}: allowed: one of them")
+            raise InputError(f"{one[0]} and {two[0]} are both given; give one of them")
     for field in fields:
         by_coefficients = scene.coefficients is not None
         if field.startswith("body.") and by_coefficients != ("coefficients" in field):
             has = "coefficients" if by_coefficients else "moments"
             raise InputError(f"axis {field}: the scene's body is given by {has}")
         if field in ("tilt", "azimuth") and scene.moments is None:
-            raise InputError(f"axis {field}: the body is given by coefficients; it takes moments")
+            raise InputError(f"axis {field}: the body is given by coefficients; give moments")
         has_direction = any(name in fields for name in ("tilt", "height", "longitude"))
         if field == "omega.magnitude" and not any(scene.omega) and not has_direction:
-            raise InputError(f"axis {field}: the scene's omega is 0 and has no direction")
+            raise InputError(
+                f"axis {field}: the omega of the scene is 0 and has no direction; give "
+                "another omega"
+            )
         if field == "lipschitz" and solver.program is None:
             raise InputError(f"axis {field} has no meaning without a program")
 
@@ -206,29 +215,40 @@ def _check_reductions(sweep: Sweep) -> None:
     taken = {*sweep.dimensions, *(axis.field for axis in sweep.axes)}
     for asked in sweep.reductions:
         if names.count(asked.name) > 1:
-            raise InputError(f"reductions: two are called {asked.name}; give one another 'as'")
+            raise InputError(
+                f"reductions: two have the name {asked.name}; give one of them another name "
+                "with 'as'"
+            )
         reduction = REDUCTIONS[asked.reduction]
         if asked.name in taken or asked.name in ("component", "invariant", "checksums"):
-            raise InputError(f"reductions: {asked.name} is the name of an axis; give another 'as'")
+            raise InputError(
+                f"reductions: {asked.name} is the name of an axis; give another name with 'as'"
+            )
         if reduction.dimension in taken:
-            raise InputError(f"dimension {reduction.dimension}: {asked.name} has one called so")
+            raise InputError(
+                f"dimension {reduction.dimension}: {asked.name} has a dimension with this "
+                "name; give another name"
+            )
         if reduction.only not in ("", kind):
             raise InputError(
-                f"reductions: {asked.reduction} is not what a {kind} can give; allowed with a "
-                f"{kind}: {', '.join(_given_by(kind))}"
+                f"reductions: {asked.reduction} can't be computed from a {kind}; allowed with "
+                f"a {kind}: {', '.join(_given_by(kind))}"
             )
         for method in _choices(sweep, "method", sweep.solver.method):
             if "attitude" in reduction.needs and method not in _WITH_ATTITUDE:
                 raise InputError(
-                    f"reductions: {asked.reduction} is not what {method} can give; allowed: "
+                    f"reductions: {asked.reduction} can't be computed with {method}; allowed: "
                     f"{', '.join(_WITH_ATTITUDE)}"
                 )
         if "moments" in reduction.needs and sweep.scene.moments is None:
-            raise InputError(f"reductions: {asked.reduction} takes a body of moments")
+            raise InputError(
+                f"reductions: {asked.reduction} needs the moments of the body; give moments"
+            )
         torque = any(axis.field.startswith("torque") for axis in sweep.axes)
         if "no torque" in reduction.needs and (torque or not sweep.scene.torque.is_zero):
             raise InputError(
-                f"reductions: {asked.reduction} says nothing under a torque, which changes both"
+                f"reductions: {asked.reduction} needs a scene without torque, because a "
+                "torque changes energy and momentum; leave it out"
             )
 
 
@@ -280,4 +300,4 @@ def _check_solvers(sweep: Sweep) -> None:
     if solver.t_end == 0.0 or any(
         axis.field == "t_end" and not axis.coordinates().all() for axis in sweep.axes
     ):
-        raise InputError("t_end is 0; allowed: times on either side of it")
+        raise InputError("t_end is 0; allowed: positive and negative times")

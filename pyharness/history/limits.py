@@ -209,7 +209,7 @@ def _solved(
             needed = effort * times[-1] / time if time else None
             raise InputError(
                 f"limits: no limit found beyond t = {time:.6g} s after {most:.0f} right-hand "
-                "sides; " + advice("take fewer or smaller steps", effort, needed)
+                "sides; " + advice("use fewer or smaller steps", effort, needed)
             )
         return rate(time, state)
 

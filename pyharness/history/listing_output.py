@@ -76,7 +76,9 @@ def read_page(path: str) -> list[list[str]]:
     content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
     found = _numbers(content.decode("ascii", "replace"))
     if not any(len(line) >= 6 for line in found):
-        raise InputError(f"{where}: no row of numbers; allowed: what a program printed to TAPE6")
+        raise InputError(
+            f"{where}: it has no row of numbers; give a page as a program printed it to TAPE6"
+        )
     return found
 
 
@@ -109,7 +111,8 @@ def fits(
     if not found:
         raise InputError(
             f"--listing-output: no page of {', '.join(programs)} in case "
-            f"{', '.join(map(str, cases))} has these moments, torques and columns"
+            f"{', '.join(map(str, cases))} has these moments, torques and columns; give a "
+            "page of one of these programs and cases"
         )
     return sorted(found, key=lambda each: len(each.differences))
 

@@ -66,11 +66,17 @@ def check_animation(path: str, scene: Scene) -> None:
     can be made before the scene is solved.
     """
     if _form(path) not in ANIMATIONS:
-        raise InputError(f"--animate '{path}': allowed: a file .gif or .html")
+        raise InputError(f"--animate '{path}': unknown format; allowed: .gif, .html")
     if scene.moments is None:
-        raise InputError("--animate: a brick takes moments, three numbers; this scene has none")
+        raise InputError(
+            "--animate: the scene has no moments, which determine the brick that is drawn; "
+            "give moments"
+        )
     if scene.is_impossible:
-        raise InputError("--animate: no brick has these moments, one exceeds the sum of the others")
+        raise InputError(
+            "--animate: one moment exceeds the sum of the others, so that no brick has these "
+            "moments; give others"
+        )
 
 
 def animation(scene: Scene, method: str, tolerance: float | None, end: float, path: str) -> bytes:
@@ -93,7 +99,7 @@ def animation(scene: Scene, method: str, tolerance: float | None, end: float, pa
     times = [end * n / (count - 1) for n in range(count)]
     found = solve(scene, times, method, tolerance, attitude=True)
     if not found.has_all_rows:
-        raise InputError("--animate: the motion overflows before the end; take a shorter time")
+        raise InputError("--animate: the motion overflows before the end; use a shorter time")
     assert found.attitude is not None
     figure = Figure(figsize=(4.6, 4.9), dpi=80)
     update = _scene_of_brick(figure, scene, found, abs(end) / seconds)

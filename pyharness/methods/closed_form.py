@@ -26,8 +26,8 @@ def known_solution(
     if scene.attitude is not None:
         if not scene.torque.is_zero or scene.moments is None:
             raise InputError(
-                "closed-form: attitude with torque, or of a body given by coefficients, has none; "
-                "allowed: moments, and no torque"
+                "closed-form: there is no closed form of the attitude with a torque, or of a "
+                "body given by coefficients; allowed: moments, and no torque"
             )
         rows, attitudes, n_rows, status = extension().torque_free_attitude_solution(
             scene.moments, scene.omega, scene.attitude, times, moments_low=scene.moments_low
@@ -39,12 +39,12 @@ def known_solution(
         if status == GAVE_UP:
             raise InputError(
                 f"closed-form: {waves(scene)} waves at {len(times)} times would take too long; "
-                + advice("take fewer times", effort, work[1])
+                + advice("use fewer times", effort, work[1])
             )
     elif not scene.torque.is_zero:
         raise InputError(
-            "closed-form: the scene has torque, and its body is no sphere; "
-            "allowed: a sphere, or no torque"
+            "closed-form: the scene has a torque, and its body is not a sphere; allowed: a "
+            "sphere, or no torque"
         )
     else:
         rows, n_rows, status = extension().torque_free_solution(
@@ -52,13 +52,14 @@ def known_solution(
         )
     if status == REFUSED:
         raise InputError(
-            "closed-form: no bounded motion, or a disturbance too faint to square; allowed: "
+            "closed-form: the motion is not bounded, or the square of a component "
+            "underflows; allowed: "
             "coefficients A, B, C not all of one sign, none of them zero between equal signs"
         )
     if status == GAVE_UP:
         raise TimedError(
-            "closed-form: at t = {time} s the phase is beyond 1e15 radians and has no digit left; "
-            "take a shorter time",
+            "closed-form: at t = {time} s the phase is above 1e15 radians and has no correct "
+            "digit; use a shorter time",
             times[n_rows],
         )
     if status != COMPLETE:

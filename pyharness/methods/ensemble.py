@@ -53,11 +53,14 @@ def place_for(out: "Ensemble | Array | None", n: int, with_attitude: bool) -> En
         attitude = np.empty((n, 4)) if with_attitude else None
         return Ensemble(omega, np.empty(n, np.int8), attitude)
     if not isinstance(out, Ensemble):
-        raise InputError("out: allowed: an Ensemble, or an array of float64")
+        raise InputError("out has the wrong type; allowed: an Ensemble, or an array of float64")
     buffer_of("out.omega", out.omega, shape, "d")
     buffer_of("out.status", out.status, (n,), "b")
     if (out.attitude is None) == with_attitude:
-        raise InputError("out.attitude: allowed: an array where attitude0 is given, else None")
+        raise InputError(
+            "out.attitude does not match attitude0; allowed: an array with attitude0, None "
+            "without it"
+        )
     if out.attitude is not None:
         buffer_of("out.attitude", out.attitude, (n, 4), "d")
     return out

@@ -32,8 +32,8 @@ def fixed_step(name: str) -> Integrator:
         )  # fmt: skip
         if status == GAVE_UP:
             raise TimedError(
-                f"{name}: {abs(times[-1]) / scene.step_size:.3g} steps of {{time}} s are too many; "
-                + advice("take a larger step or a shorter time", effort, work[1]),
+                f"{name}: {abs(times[-1]) / scene.step_size:.3g} steps of {{time}} s would "
+                "take too long; " + advice("use a larger step or a shorter time", effort, work[1]),
                 scene.step_size,
             )
         return trajectory_of(times, rows, n_rows, status, steps, evaluations)

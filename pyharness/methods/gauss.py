@@ -59,7 +59,7 @@ def gauss(stages: int) -> Integrator:
             if not step or spent + 2.0 * stages * steps > most:
                 needed = spent + steps * (pace * (more - 1.0) + 2.0 * stages * more)
                 enough = effort * max(needed, 0.5 * pace * more * steps) / most
-                remedies = "take a shorter time, a larger tolerance or more stages"
+                remedies = "use a shorter time, a larger tolerance or more stages"
                 raise TimedError(
                     f"gauss-{stages} exceeded its work limit at t = {{time}} s after {spent} "
                     "right-hand sides; " + advice(remedies, effort, enough),

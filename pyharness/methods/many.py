@@ -56,6 +56,7 @@ def solve_many(
     t_end: Any,
     *,
     omega0: Any = None,
+    attitude0: Any = None,
     moments: Any = None,
     coefficients: Any = None,
     inertia: Any = None,
@@ -63,7 +64,6 @@ def solve_many(
     torque_rate: Any = None,
     sines: Any = None,
     cosines: Any = None,
-    attitude0: Any = None,
     method: str = "auto",
     tolerance: Number | None = None,
     step: Number | None = None,
@@ -82,6 +82,9 @@ def solve_many(
         Time of each result, s; positive, negative or 0.
     omega0 : array, shape (n, 3) or (3,)
         Initial angular velocities, rad/s. An array of one row is shared by all bodies.
+    attitude0 : array, shape (n, 4) or (4,)
+        Quaternions at time 0, from body to space, scalar first; by default the scene's. Attitudes
+        are returned if there are initial ones.
     moments, coefficients : array, shape (n, 3) or (3,)
         Principal moments (kg m2), or Euler's coefficients A, B, C; not both.
     inertia : array, shape (n, 3, 3) or (3, 3)
@@ -93,9 +96,6 @@ def solve_many(
     sines, cosines : array, shape (n, k, 4) or (k, 4)
         Waves of torque: three components of the amplitude (units as in `torque_constant`), and the
         frequency (rad/s).
-    attitude0 : array, shape (n, 4) or (4,)
-        Quaternions at time 0, from body to space, scalar first; by default the scene's. Attitudes
-        are returned if there are initial ones.
     method : str
         A name in `pyharness.methods.solver.PREPARED`. `auto` takes the closed form for each body
         without torque and for each sphere, and the Taylor series for any other body.
@@ -267,11 +267,14 @@ class _Bodies:
         self.code, self.tolerance, self.effort = code, tolerance, effort
         torques = (self.constant, self.rate, self.sines[..., :3], self.cosines[..., :3])
         if code == Methods.CLOSED_FORM and any(each.any() for each in torques):
-            raise InputError("closed-form can't take a torque here; allowed: auto, taylor")
+            raise InputError(
+                "closed-form can't solve bodies with a torque, except spheres; allowed: "
+                "auto, taylor"
+            )
         if code == Methods.CLOSED_FORM and self.attitude is not None and not self.by_moments:
             raise InputError(
-                "closed-form can't take an attitude of bodies given by coefficients; allowed: "
-                "moments, or methods auto and taylor"
+                "closed-form can't compute the attitude of bodies given by coefficients; "
+                "allowed: moments, or methods auto and taylor"
             )
 
     def solve(self, threads: int, out: "Ensemble | Array | None") -> Ensemble:

@@ -120,9 +120,11 @@ def from_scene(scene: Scene) -> dict[str, Any]:
 def check_alike(scenes: Sequence[Scene]) -> None:
     """Raise InputError if only some scenes have an attitude, or if the step sizes differ."""
     if len({each.step_size for each in scenes}) > 1:
-        raise InputError("the scenes have more than one step size; allowed: one for all")
+        raise InputError("the scenes have different step sizes; allowed: one step size for all")
     if len({each.attitude is None for each in scenes}) > 1:
-        raise InputError("some scenes have an attitude and some have none; allowed: all or none")
+        raise InputError(
+            "some of the scenes have an attitude and others have none; allowed: all, or none"
+        )
 
 
 def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
@@ -131,11 +133,14 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
     Raise InputError if there is no scene, or if one call of the kernel can't solve all scenes.
     """
     if not scenes:
-        raise InputError("there is no scene; allowed: a scene, or some")
+        raise InputError("the sequence of scenes is empty; give at least one scene")
     check_alike(scenes)
     rows = [from_scene(each) for each in scenes]
     if len({row["by_moments"] for row in rows}) > 1:
-        raise InputError("the scenes have more than one kind of body; allowed: one for all")
+        raise InputError(
+            "the scenes give their bodies differently; allowed: moments, coefficients or "
+            "inertia, the same for all"
+        )
     return _stacked(rows)
 
 

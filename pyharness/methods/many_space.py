@@ -76,7 +76,7 @@ def solve_in_space(
                 return
             try:
                 body = scene_of_row(at_rest, rows, i)
-                solver = prepare(body, method, tolerance, effort, attitude=True)
+                solver = prepare(body, method, tolerance, effort=effort, attitude=True)
                 start, turn = row_of(starts, i), row_of(attitudes, i)
                 omega[i], attitude[i] = solver(start, float(row_of(times, i)), turn)
             except InputError:

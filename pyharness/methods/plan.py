@@ -10,7 +10,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 
 FINEST = REGISTRY["auto"].finest
-# For few digits Runge-Kutta may take fewer operations than a Taylor series. The kernel chooses.
+# For few digits Runge-Kutta may use fewer operations than a Taylor series. The kernel chooses.
 RK4_OR_TAYLOR = "quick or taylor"
 # Smallest tolerances at which Runge-Kutta may be faster than the Taylor series: with a constant
 # torque, and with a torque that varies with time.

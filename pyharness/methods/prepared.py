@@ -26,6 +26,7 @@ def prepare(
     scene: Scene,
     method: str = ...,
     tolerance: Number | None = ...,
+    *,
     effort: float = ...,
     attitude: Literal[False] = ...,
 ) -> Solver: ...
@@ -34,14 +35,15 @@ def prepare(
     scene: Scene,
     method: str = ...,
     tolerance: Number | None = ...,
-    effort: float = ...,
     *,
+    effort: float = ...,
     attitude: Literal[True],
 ) -> "AttitudeSolver": ...
 def prepare(
     scene: Scene,
     method: str = "auto",
     tolerance: Number | None = None,
+    *,
     effort: float = 1.0,
     attitude: bool = False,
 ) -> "Solver | AttitudeSolver":

@@ -15,8 +15,8 @@ from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.model.trajectory import WITH_ALL_ROWS, Array, Trajectory
 
 _NOT_FINITE = (
-    "A, B, C or torque over moment is not finite; take moments nearer to each other, or smaller "
-    "torques"
+    "a coefficient A, B, C or a torque divided by its moment is not finite; use moments nearer "
+    "to each other, or smaller torques"
 )
 
 

@@ -65,7 +65,9 @@ def _reference(
 
 
 def _no_rows(*given: object) -> Trajectory:
-    raise InputError("method 'quick' gives the end alone; prepare it, or take auto")
+    raise InputError(
+        "method 'quick' returns the state at one time only; use it with prepare, or give auto"
+    )
 
 
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
@@ -199,7 +201,7 @@ def check_attitude(method: str) -> None:
     """Raise InputError if the method with this name can't propagate the attitude."""
     if not REGISTRY[method].attitude:
         able = ", ".join(each.name for each in REGISTRY.values() if each.attitude)
-        raise InputError(f"method {method} carries no attitude; allowed: {able}")
+        raise InputError(f"method {method} does not compute attitudes; allowed: {able}")
 
 
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
@@ -213,7 +215,8 @@ def check_torque(scene: Scene, method: str, attitude: bool) -> None:
     if not REGISTRY[method].space_torque:
         able = ", ".join(each.name for each in REGISTRY.values() if each.space_torque)
         raise InputError(
-            f"method {method} takes no torque about the axes of space; allowed: {able}"
+            f"method {method} can't solve a scene with a torque about the axes of space; "
+            f"allowed: {able}"
         )
     if not attitude:
         raise InputError(

@@ -146,7 +146,7 @@ def scipy_method(name: str) -> Integrator:
                 # Omega is bounded, but its phase can't be computed any further.
                 raise TimedError(
                     f"{run.label} stopped at t = {{time}} s: beyond {_LARGEST_PHASE:.0e} radians "
-                    "the phase has hardly a digit left; take a shorter time",
+                    "the phase has hardly a digit left; use a shorter time",
                     float(result.t_events[0][0]) * run.unit,
                 )
         except _NoNumberError:
@@ -277,8 +277,8 @@ class _Run:
                 if "infs or NaNs" in str(error):
                     raise _NoNumberError from None
                 raise InputError(
-                    f"{self.label} failed: {error}; take a shorter time, slower motion or smaller "
-                    "torques"
+                    f"{self.label} failed: {error}; use a shorter time, slower motion or "
+                    "smaller torques"
                 ) from None
 
     def _scale_by_torque(self) -> float:
@@ -293,7 +293,7 @@ class _Run:
                 f"{self.label} exceeded its work limit at t = {{time}} s after {self.most} "
                 "right-hand sides; "
                 + advice(
-                    "take a shorter time or a larger tolerance",
+                    "use a shorter time or a larger tolerance",
                     self.effort,
                     self.effort * self.end / (time * self.unit) if time else None,
                 ),

@@ -41,6 +41,7 @@ def solve(
     times: Number | Numbers,
     method: str = "auto",
     tolerance: Number | None = None,
+    *,
     effort: float = 1.0,
     attitude: bool = False,
 ) -> Trajectory:
@@ -97,8 +98,8 @@ def solve(
     tolerance = requested_tolerance(method, tolerance)
     if chosen.is_fixed_step and tolerance != 1.0:
         raise InputError(
-            f"tolerance is {tolerance:g}; {method} takes none: it goes in the scene's steps, "
-            "whatever their error; give no tolerance, or 1"
+            f"tolerance is {tolerance:g}; {method} has a fixed step and no tolerance; give "
+            "none, or 1"
         )
     if not chosen.finest <= tolerance <= 1.0:
         raise InputError(
@@ -236,14 +237,16 @@ def _ascending(times: object) -> tuple[list[float], bool]:
     most = most_steps()
     values = [number("times", each) for each in itertools.islice(entries, most + 1)]
     if not values:
-        raise InputError("times: none given; give at least one")
+        raise InputError("times is empty; give at least one time")
     if len(values) > most:
-        raise InputError(f"times: more than {most}, what fits in this machine's memory")
+        raise InputError(
+            f"times: more than {most} times, which this machine's memory can't hold; use fewer"
+        )
     if not all(map(math.isfinite, values)):
-        raise InputError("times: one is not finite; allowed: finite numbers")
+        raise InputError("times has a number that is not finite; allowed: finite numbers")
     turned = values[0] > values[-1]
     if turned:
         values.reverse()
     if not all(t1 < t2 for t1, t2 in itertools.pairwise(values)):
-        raise InputError("times: not strictly monotonic; each must differ from the one before")
+        raise InputError("times is not strictly monotonic; give increasing or decreasing times")
     return values, turned

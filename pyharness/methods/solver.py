@@ -159,7 +159,7 @@ class Solver(LastCall, BoundKernel):
         method = "taylor" if asked == "quick" else asked
         # A method with a fixed step takes no tolerance: `solve` expects 1 for it.
         tolerance = max(tolerance, METHODS[method].finest)
-        return solve(scene, times, method, tolerance, effort)
+        return solve(scene, times, method, tolerance, effort=effort)
 
 
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:

@@ -39,7 +39,7 @@ def taylor(
         count = "1 step" if steps == 1 else f"{steps} steps"
         raise TimedError(
             f"taylor exceeded its work limit before t = {{time}} s after {count}; "
-            + advice("take a shorter time or a larger tolerance", effort, work[1]),
+            + advice("use a shorter time or a larger tolerance", effort, work[1]),
             times[n_rows],
         )
     error, growth = map(known, work[2:4])

@@ -55,7 +55,8 @@ def numbers_of(where: str, values: object) -> Array:
         found = np.asarray(values)
     except Exception as error:  # rows of different lengths, or a user-defined class
         raise InputError(
-            f"{where}: {kind_of(values)} that is no array of numbers; allowed: rows of one length"
+            f"{where}: {kind_of(values)} that is not an array of numbers; allowed: rows of "
+            "equal length"
         ) from error
     if found.dtype == np.float64:
         return found
@@ -96,9 +97,7 @@ def count_bodies(rows: Mapping[str, Array]) -> int:
 def check_rows(name: str, array: Array, n: int) -> None:
     """Raise InputError unless the array called `name` has one row, or `n` rows, one per body."""
     if len(array) not in (1, n):
-        raise InputError(
-            f"{name}: {len(array)} rows; allowed: 1, or as many as there are bodies, {n}"
-        )
+        raise InputError(f"{name}: {len(array)} rows; allowed: 1, or {n}, the number of bodies")
 
 
 def row_of(array: Array, i: int) -> Any:
@@ -114,7 +113,7 @@ def only_one(given: Mapping[str, object]) -> str:
     """
     names = [name for name, value in given.items() if value is not None]
     if len(names) > 1:
-        raise InputError(f"{' and '.join(names)} are both given; allowed: one of them")
+        raise InputError(f"{' and '.join(names)} are both given; give one of them")
     return names[0] if names else ""
 
 

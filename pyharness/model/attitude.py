@@ -34,7 +34,7 @@ def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
         raise InputError(f"{where}: {len(given)} numbers; {allowed}")
     largest = max(map(abs, given))
     if largest == 0.0:
-        raise InputError(f"{where}: all four are 0; {allowed}")
+        raise InputError(f"{where}: all four numbers are 0; {allowed}")
     # The numbers are scaled first, so that no square overflows or underflows.
     length = math.hypot(*(x / largest for x in given))
     whole = length * largest

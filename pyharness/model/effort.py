@@ -57,7 +57,7 @@ def checked_effort(effort: Number) -> float:
 def advice(instead: str, effort: float, needed: float | None = None) -> str:
     """Return the last part of a message about an exceeded work limit: what the user can do.
 
-    `instead` is a remedy that keeps within the limit, as in "take fewer steps". `effort` is the
+    `instead` is a remedy that keeps within the limit, as in "use fewer steps". `effort` is the
     present factor on the limit, and `needed` is an estimate of the factor that the computation
     takes, or None if there is no estimate.
     """
@@ -97,7 +97,7 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
         return
     raise InputError(
         f"{program} ({implementation}): {_load(scene)} would take too long; "
-        + advice("take fewer steps", effort, needed / _SLACK)
+        + advice("use fewer steps", effort, needed / _SLACK)
     )
 
 
@@ -113,7 +113,7 @@ def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> Non
     if needed > factor * _ROUNDING:
         raise InputError(
             f"{program}: {_load(scene)} of {bodies} bodies would take too long; "
-            + advice("take fewer", factor, needed / _SLACK)
+            + advice("use fewer", factor, needed / _SLACK)
         )
 
 

@@ -68,7 +68,7 @@ def checked_inertia(where: str, values: object) -> Matrix:
             if abs(given[i][j] - given[j][i]) > _ALIKE * largest:
                 raise InputError(
                     f"{where}: not symmetric, row {i + 1} column {j + 1} is {given[i][j]:g} and "
-                    f"row {j + 1} column {i + 1} is {given[j][i]:g}; allowed: both the same"
+                    f"row {j + 1} column {i + 1} is {given[j][i]:g}; allowed: equal numbers"
                 )
     half = [[0.5 * given[i][j] + 0.5 * given[j][i] for j in range(3)] for i in range(3)]
     (a, b, c), (d, e, f), (g, h, k) = half

@@ -164,6 +164,7 @@ def subset(
     program: str,
     base: str | None = None,
     fix: Iterable[str] = (),
+    *,
     keep: Iterable[str] = (),
     readings: Iterable[str] = (),
     conjectures: Iterable[str] | None = None,
@@ -210,11 +211,11 @@ def subset(
     _check_program(program)
     fixed, kept, chosen = _names("fix", fix), _names("keep", keep), _names("readings", readings)
     for name in sorted(fixed & kept):
-        raise InputError(f"'{name}' is given to both --fix and --keep; give it to one")
+        raise InputError(f"'{name}' is given to both --fix and --keep; give it to one of them")
     assumed = None if conjectures is None else _names("conjectures", conjectures)
     if assumed is not None and "none" in assumed:
         if len(assumed) > 1:
-            raise InputError("--conjecture: 'none' beside a name; give one of them")
+            raise InputError("--conjecture: 'none' and a name are both given; give one of them")
         assumed = frozenset()
     for option, kind, names in (
         ("--fix", "defect", fixed),

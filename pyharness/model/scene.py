@@ -269,7 +269,7 @@ class Scene:
                 f"allowed: 1 to {limit}, what fits in this machine's memory"
             )
         if not math.isfinite(self.step_size * self.steps):
-            raise InputError("step size times steps is not finite; take fewer or smaller steps")
+            raise InputError("step size times steps is not finite; use fewer or smaller steps")
         self._set("masses", _above_zero("masses", "m", self.masses))
         self._set("forces", three("forces", self.forces))
         if self.case is not None:
@@ -423,7 +423,7 @@ def _waves(where: str, values: object) -> tuple[Wave, ...]:
     for value in number_list(where, values, allowed):
         wave = list(itertools.islice(number_list(where, value, allowed), 3))
         if len(wave) != 2:
-            raise InputError(f"{where}: a wave is not two things; {allowed}")
+            raise InputError(f"{where}: a wave has an amplitude and a frequency; {allowed}")
         amplitude, frequency = wave
         waves.append(
             (three(f"{where} amplitude", amplitude), finite(f"{where} frequency", frequency))

@@ -183,14 +183,16 @@ class Trajectory:
 
     def _momentum(self) -> Array:
         if self.moments is None:
-            raise InputError("the body is given by coefficients; it takes moments to say that")
+            raise InputError(
+                "the body is given by coefficients, and the result needs its moments; give moments"
+            )
         axes = np.eye(3) if self.axes is None else self.axes
         momentum: Array = ((self.omega @ axes) * np.array(self.moments)) @ axes.T
         return momentum
 
     def _attitudes(self) -> Array:
         if self.attitude is None:
-            raise InputError("the trajectory has no attitude; ask for it: attitude=True")
+            raise InputError("the trajectory has no attitude; request it with attitude=True")
         return self.attitude
 
     @property

@@ -134,7 +134,7 @@ def _rounded(values: Exact) -> Triple:
         first, second, third = map(float, values)
     except OverflowError:
         raise InputError(
-            "[torque]: waves of one frequency have a sum beyond the range of numbers; allowed: "
+            "[torque]: the sum of waves of one frequency overflows; allowed: "
             f"amplitudes up to {math.ldexp(1.0, 1023):.2g} N m together"
         ) from None
     return first, second, third

@@ -200,7 +200,9 @@ def find(program: str, number: int) -> Card:
     if number not in cards:
         near = sorted(cards, key=lambda each: abs(each - number))[:2]
         told = " and ".join(str(each) for each in sorted(near))
-        raise InputError(f"card {number}: the {program} deck has none; the nearest are {told}")
+        raise InputError(
+            f"card {number}: the {program} deck has no such card; the nearest are {told}"
+        )
     return cards[number]
 
 
@@ -267,7 +269,7 @@ def _cards_of(asked: str) -> list[Card]:
         every = [card for each in programs for card in deck(each).cards.values()]
         near = sorted(every, key=lambda card: abs(card.number - first))[:2]
         told = " and ".join(card.name for card in sorted(near, key=lambda card: card.number))
-        raise InputError(f"card {first}: there is none; the nearest are {told}")
+        raise InputError(f"card {first}: there is no such card; the nearest are {told}")
     found = [
         card
         for each in programs

@@ -42,7 +42,10 @@ def unexplained(scan: str) -> list[str]:
     """
     _, heading, appendix = scan.rpartition(HEADING)
     if not heading or not re.search(r"^\s*\d+-", appendix, re.MULTILINE):
-        raise InputError(f"the scan has no line {HEADING!r} with cards after it: not this thesis")
+        raise InputError(
+            f"the scan has no line {HEADING!r} with cards after it, so that it is not a scan "
+            "of this thesis; give another file"
+        )
     first = scan.count("\n", 0, len(scan) - len(appendix)) + 1
     lines = [(n, tight(text)) for n, text in enumerate(appendix.split("\n"), first)]
     lines = [(n, text) for n, text in lines if text not in ("", "```")]

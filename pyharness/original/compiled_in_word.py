@@ -53,7 +53,7 @@ def run(
     )
     if status == REFUSED:
         raise InputError(
-            f"--word binary{8 * n_bytes(word)}: the compiler of this build has none; "
+            f"--word binary{8 * n_bytes(word)}: the compiler of this build does not have it; "
             "allowed: implementation python"
         )
     exact = from_bytes(rows[:, :, :n_rows], word).T

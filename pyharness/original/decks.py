@@ -83,7 +83,9 @@ def deck_text(
     if dialect not in DIALECTS:
         raise unknown("dialect", dialect, DIALECTS, "--dialect")
     if listing.has("initial-torque"):
-        raise InputError("no card holds 'initial-torque'; allowed: --conjecture torque-held, none")
+        raise InputError(
+            "'initial-torque' can't be written as cards; allowed: --conjecture torque-held, none"
+        )
     cards = {number: card.text for number, card in deck(listing.program).cards.items()}
     if terms is not None:
         cards = _model(terms, listing, scene)
@@ -158,7 +160,7 @@ def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
     if listing.program != "four-term" or terms not in MODELS:
         raise InputError(f"terms is {terms}; allowed: 3 or 5, with program four-term")
     if scene is not None and scene.torque.varies:
-        raise InputError("a model of other terms has no torque that varies; allowed: --case 1 to 6")
+        raise InputError("--terms writes no torque that varies with time; allowed: --case 1 to 6")
     cards = model_cards(terms)
     if not listing.has("dt-accumulates"):
         cards = {n: each for n, each in cards.items() if each.strip() != "DT=DT+.01"}

@@ -177,8 +177,8 @@ def run_many(
     wanted = _steps(at, scene.steps)
     if n * len(wanted) > most_steps():
         raise InputError(
-            f"at: {len(wanted)} rows of {n} bodies; allowed: {most_steps()} in all, what fits in "
-            "this machine's memory"
+            f"at: {len(wanted)} rows for each of {n} bodies; allowed: {most_steps()} rows in "
+            "all, which this machine's memory can hold"
         )
     first = np.zeros((1, 3))
     if listing.has("initial-torque"):
@@ -270,8 +270,8 @@ def _check_ends(step_size: Array, steps: int) -> None:
         ends = np.isfinite(step_size * steps)
     if not ends.all():
         raise InputError(
-            f"step_size[{int(np.argmin(ends))}] times steps is not finite; take fewer or smaller "
-            "steps"
+            f"step_size[{int(np.argmin(ends))}] times steps is not finite; use fewer or "
+            "smaller steps"
         )
 
 

@@ -44,7 +44,10 @@ def from_octal(text: str) -> Pair:
     if not bits:
         return 0, 0.0
     if m.bit_length() != BITS:
-        raise InputError(f"word {text!r}: its coefficient is not normalised")
+        raise InputError(
+            f"word {text!r}: its coefficient is not normalised; give a word of the machine as "
+            "it stores results"
+        )
     return sign * m, field - _BIAS + (field < _BIAS)
 
 

@@ -54,7 +54,10 @@ class Program:
             raise InputError(f"lipschitz is {lipschitz:g}; allowed: a number from 0")
         may_stop, velocity = boolean("may_stop", may_stop), boolean("velocity", velocity)
         if listing.program != self.name:
-            raise InputError(f"program {self.name}: the listing is that of {listing.program}")
+            raise InputError(
+                f"program {self.name}: the listing belongs to program {listing.program}; give "
+                f"the listing of {self.name}"
+            )
         if not isinstance(implementation, str) or implementation not in IMPLEMENTATIONS:
             raise unknown("implementation", implementation, IMPLEMENTATIONS)
         if checked_word(word, implementation) != BINARY64:
@@ -102,7 +105,7 @@ def checked_word(word: object, implementation: str) -> str:
         raise unknown("word", word, WORD_NAMES, "--word")
     if word not in COMPILED_WORDS and implementation == "fortran":
         raise InputError(
-            f"--word {word}: the compiled programs run in {', '.join(COMPILED_WORDS)} alone; "
+            f"--word {word}: the compiled programs run in {', '.join(COMPILED_WORDS)} only; "
             "allowed: implementation python"
         )
     return word
@@ -120,6 +123,7 @@ def run_program(
     scene: Scene,
     listing: Listing,
     implementation: str = "fortran",
+    *,
     lipschitz: float = 500.0,
     may_stop: bool = True,
     velocity: bool = True,

@@ -53,7 +53,7 @@ def answers(path: str | Path = OURS) -> list[Answer]:
     try:
         data = json.loads(content)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"vectors '{path}': no JSON: {error}; give a JSON file") from None
+        raise InputError(f"vectors '{path}': not JSON: {error}; give a JSON file") from None
     allowed = 'allowed: {"schema": 1, "vectors": [...]}'
     if not isinstance(data, dict):
         raise InputError(f"vectors '{path}': {kind_of(data)}; {allowed}")

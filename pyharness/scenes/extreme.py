@@ -34,7 +34,7 @@ def speed(scene: Scene, largest: float) -> float:
 def in_steps(scene: Scene, time: float) -> Scene:
     """Return the scene with a step size and a number of steps that end at `time` (s).
 
-    The step size times the rate that `speed` returns is .002, unless this would take fewer than 10
+    The step size times the rate that `speed` returns is .002, unless this would use fewer than 10
     or more than 20 000 steps; the number of steps is then 10 or 20 000.
     """
     rate = speed(scene, max(map(abs, scene.omega)))

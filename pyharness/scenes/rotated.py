@@ -43,7 +43,8 @@ def restarted_at(
     law = scene.torque
     if law.in_space and attitude is None:
         raise InputError(
-            "a torque about the axes of space: begun later, it takes the attitude then"
+            "a scene with a torque about the axes of space can't be restarted without the "
+            "attitude at that time"
         )
     sines: list[Wave] = []
     cosines: list[Wave] = []

@@ -86,7 +86,7 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     with np.errstate(all="ignore"):
         found = _along(scene, times, omega)
     if not (math.isfinite(found.amplification) and math.isfinite(found.rounding)):
-        raise InputError("conditioning: the flow amplifies beyond binary64")
+        raise InputError("conditioning: the error amplification overflows; use a shorter time")
     return found
 
 
@@ -117,7 +117,9 @@ def _nodes(scene: Scene, time: float) -> Array:
         wanted = largest * abs(time) * _NODES_PER_RADIAN
         # `wanted` is NaN if numbers are so large that their product is undefined.
         if not wanted <= _MOST_NODES:
-            raise InputError("conditioning: too long a time for so fast a motion")
+            raise InputError(
+                "conditioning: the motion is too fast for so long a time; use a shorter time"
+            )
         if count >= wanted:
             return times
         count = math.ceil(wanted)

@@ -87,7 +87,10 @@ def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
         )
     told, places = _places(scene)
     if not np.isfinite([omega for _, omega in places]).all():
-        raise InputError("rotations: a steady rotation is beyond binary64")
+        raise InputError(
+            "rotations: the omega of a steady rotation overflows; use moments nearer to "
+            "each other, or a smaller torque"
+        )
     found = tuple(_rotation(scene, place, omega, disturbance) for place, omega in places)
     return SteadyRotations(told, disturbance, found)
 
@@ -144,7 +147,10 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
         matrix = jacobians(scene, np.array([omega]))[0]
     found = rates(scene.euler_coefficients, omega)
     if not np.isfinite([*matrix.flat, *found]).all():
-        raise InputError("rotations: the rates of a steady rotation are beyond binary64")
+        raise InputError(
+            "rotations: the rates of a steady rotation overflow; use moments nearer to each "
+            "other, or a smaller torque"
+        )
     # The rates add up to 0. If all are 0 and the matrix is not, a perturbation grows with t.
     stable = found[0].real <= 0.0 and (any(found) or not matrix.any())
     flips: float | None = None
@@ -324,7 +330,10 @@ def _points(products: Sequence[float]) -> tuple[str, Places]:
         return "none: the square of a component would be below 0, for ABC M1 M2 M3 > 0", []
     roots = [math.sqrt(abs(each)) for each in products]
     if not all(roots):
-        raise InputError("rotations: a steady rotation is beyond binary64")
+        raise InputError(
+            "rotations: the omega of a steady rotation overflows; use moments nearer to "
+            "each other, or a smaller torque"
+        )
     signs = [1.0, math.copysign(1.0, products[2]), math.copysign(1.0, products[1])]
     x, y, z = (signs[axis] * roots[axis - 2] * roots[axis - 1] / roots[axis] for axis in range(3))
     told = (

@@ -25,7 +25,10 @@ def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
     law, moments = scene.body_torque, scene.moments
     vectors = [law.constant, law.rate, *(a for a, _ in law.sines + law.cosines)]
     if moments is None or moments[0] != moments[1] or any(v[0] or v[1] for v in vectors):
-        raise InputError("axial top: allowed are I1 = I2 and torque along axis 3 alone")
+        raise InputError(
+            "axial top: the scene has another body or torque; allowed: I1 = I2, and a torque "
+            "about axis 3 only"
+        )
     waves = law.sines + law.cosines
     with _arithmetic(times, scene.omega, [f for _, f in waves] + [1.0]):
         moment = Decimal(moments[2])

@@ -122,7 +122,7 @@ class _Limit:
 
     def _refuse(self, needed: Decimal) -> None:
         steps = float(min(Decimal("1e300"), needed))
-        instead = "take a shorter time, slower motion or slower torques"
+        instead = "use a shorter time, slower motion or slower torques"
         if self._effort is not None:
             instead = advice(instead, self._effort, steps / self._ordinary)
         raise InputError(

@@ -135,7 +135,7 @@ def _march(scene: Scene, times: Sequence[float], power: int) -> Path:
             try:
                 omega = np.array([[float(x * unit) for x in row] for row in rows])
             except OverflowError:
-                raise InputError("integer series: omega is beyond binary64") from None
+                raise InputError("integer series: omega overflows") from None
             return Path(np.array(times, dtype=float), omega, np.hstack(nodes), np.vstack(way))
         length = int(length * 2.0 ** min(1.0, -excess - 0.02)) or 1
     raise InputError(f"integer series: more than {_MOST_STEPS} steps would be needed")

@@ -197,9 +197,18 @@ def test_verb_judges_both_and_says_who_carries_none(scene: str, capsys: Capture)
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ("--attitude --methods rk4", "--methods: rk4 carries no attitude; allowed: auto, taylor"),
-        ("--attitude --peers numba", "--peers: numba-rk4 carries no attitude; allowed: heyoka"),
-        ("--peers orekit", "--peers: orekit gives omega with the attitude; add --attitude"),
+        (
+            "--attitude --methods rk4",
+            "--methods: rk4 does not compute attitudes; allowed: auto, taylor",
+        ),
+        (
+            "--attitude --peers numba",
+            "--peers: numba-rk4 does not compute attitudes; allowed: heyoka",
+        ),
+        (
+            "--peers orekit",
+            "--peers: orekit computes omega only together with the attitude; add --attitude",
+        ),
         ("--attitude --plan", "--attitude has no meaning with --plan"),
         ("--growth --attitude", "--attitude has no meaning with --growth"),
     ],

@@ -135,7 +135,10 @@ def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) 
         ("--ensemble --bodies x", "--bodies: 'x' where a whole number belongs"),
         ("--ensemble --case 4", "--case has no meaning with --ensemble"),
         ("--ensemble --peers heyoca", "unknown peer 'heyoca'; did you mean 'heyoka'"),
-        ("--ensemble --peers none --methods none", "no method and no peer is left"),
+        (
+            "--ensemble --peers none --methods none",
+            "no method and no third-party package is chosen",
+        ),
         ("--bodies 5", "--bodies has no meaning without --ensemble"),
     ],
 )

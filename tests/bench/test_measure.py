@@ -333,7 +333,7 @@ def test_verb_writes_json_csv_and_picture(tmp_path: Path, capsys: Capture) -> No
 MISTAKES = [
     ("--methods tailor", "unknown method 'tailor'; did you mean 'taylor'"),
     ("--peers heyoca", "unknown peer 'heyoca'; did you mean 'heyoka'"),
-    ("--methods none --peers none", "no method and no peer is left"),
+    ("--methods none --peers none", "no method and no third-party package is chosen"),
     (
         "--case 5 --methods closed-form --peers none",
         "nothing could be measured: closed-form: closed-form can't take this scene: it has torque",
@@ -351,7 +351,7 @@ MISTAKES = [
     ("--random 2 --plan", "--random has no meaning with --plan"),
     ("--growth --seed 5", "--seed has no meaning with --growth"),
     ("--seed 5", "--seed has no meaning without --random"),
-    ("--random 2 --seed \udcff", "--seed: has letters that can't be printed"),
+    ("--random 2 --seed \udcff", "--seed: contains characters that can't be printed"),
 ]
 
 

@@ -387,7 +387,7 @@ def test_attitudes_may_be_angles_and_stand_beside_omega(tmp_path: Path) -> None:
     [
         ("attitude = ['1', '0', '0']", "attitude must be a list of 4 texts"),
         ("attitude = [1, 0, 0, 0]", "allowed: the digits as text"),
-        ("attitude = ['0', '0', '0', '0']", "all four are 0"),
+        ("attitude = ['0', '0', '0', '0']", "all four numbers are 0"),
         ("angles_deg = ['1', '2']", "angles_deg must be a list of 3 texts"),
         ("attitude = ['1', '0', '0', '0']\nangles_deg = ['1', '2', '3']", "either attitude or"),
     ],

@@ -265,7 +265,7 @@ def test_record_that_is_none_is_told_in_one_line_and_mended(
     assert main(["verify", "--only", "golden", "--record", str(tmp_path)]) == 2
     captured = capsys.readouterr()
     assert captured.err.count("\n") == 1
-    assert re.search(r"two-term.toml': (is no record|schema is missing)", captured.err)
+    assert re.search(r"two-term.toml': (is not a golden record|schema is missing)", captured.err)
     (tmp_path / "rk9.toml").write_text(good)
     due = [each for each in recorded() if each.source == "two-term"]
     with patch("pyharness.checks.golden.recorded", return_value=due):

@@ -30,10 +30,12 @@ def test_the_javascript_has_the_twins_bits_in_random_scenes() -> None:
             drawn = draw("port", number)
             if drawn.scene.torque.sines or drawn.scene.torque.cosines:
                 continue
-            options = drawn.lipschitz, drawn.may_stop
-            line = process.ask(request(drawn.scene, drawn.listing, *options))
+            lipschitz, may_stop = drawn.lipschitz, drawn.may_stop
+            line = process.ask(request(drawn.scene, drawn.listing, lipschitz, may_stop))
             answer = read_answer(line, drawn.scene.steps)
-            twin = run_program(drawn.scene, drawn.listing, "python", *options)
+            twin = run_program(
+                drawn.scene, drawn.listing, "python", lipschitz=lipschitz, may_stop=may_stop
+            )
             assert differences(twin, answer) == [], number
             seen.add((drawn.listing.program, twin.ended))
     assert {ended for program, ended in seen if program == "runge-kutta"} == set(ENDINGS)

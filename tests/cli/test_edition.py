@@ -121,7 +121,7 @@ def test_without_the_documents_it_says_where_they_are(
 ) -> None:
     """An installed package has no documents, and the files beside it belong to other packages."""
     for given, told in (
-        ([], "an installed package has no documents; give --docs DIR"),
+        ([], "an installed package does not contain the documents; give --docs DIR"),
         (["--docs", str(tmp_path)], f"--docs '{tmp_path}': has no index.md"),
     ):
         monkeypatch.setattr("pyharness.edition.documents.shipped", lambda _: tmp_path)

@@ -107,7 +107,7 @@ def _piped(text: str) -> int:
 def test_record_and_list_of_an_edition_are_read_with_a_limit(capsys: Capture) -> None:
     Path("record").mkdir()
     os.mkfifo("record/taylor.toml")
-    assert "is no record" in _refusal("verify --only golden --record record", capsys)
+    assert "is not a golden record" in _refusal("verify --only golden --record record", capsys)
     Path("site").mkdir()
     os.mkfifo(f"site/{MARK}")
     # The list of pages can't be read, so every other file counts as one that `edition` did not

@@ -340,7 +340,7 @@ def test_two_digits_of_a_number(number: float | None, text: str) -> None:
     ("error", "code", "words"),
     [
         (KeyboardInterrupt(), 130, "interrupted"),
-        (MemoryError(), 2, "not enough memory; take fewer steps"),
+        (MemoryError(), 2, "not enough memory; use fewer steps"),
         (NotBuiltError("not built"), 3, "not built"),
     ],
 )

@@ -83,7 +83,7 @@ def test_claim_is_asked_by_its_name(printed: Printed, monkeypatch: pytest.Monkey
         "sweep sweep.toml --out store --plot a.bmp": "unknown picture format",
         "sweep huge.toml --out store": "1e+15 scenes",
         "sweep axis.toml --out store": "did you mean 'omega.1'",
-        "sweep stop.toml --out store": "not what a method can give",
+        "sweep stop.toml --out store": "can't be computed from a method",
     }.items(),
 )
 def test_mistake_is_one_line_and_loses_nothing(

@@ -39,9 +39,9 @@ def test_end_of_a_method_is_that_of_its_rows() -> None:
 
 
 def test_what_a_candidate_has_not_is_refused() -> None:
-    with pytest.raises(InputError, match=r"its steps end at 1 s, not at 2 s"):
+    with pytest.raises(InputError, match=r"its last step ends at 1 s, not at 2 s"):
         unstopped(original("two-term")).end(SCENE, 2.0)
-    with pytest.raises(InputError, match="the end alone"):
+    with pytest.raises(InputError, match="the state at one time only"):
         prepared_candidate("quick", 1e-3).rows(SCENE)
 
 

@@ -98,7 +98,7 @@ def test_disk_that_fills_ends_in_a_line_and_a_store_that_resumes(
     with monkeypatch.context() as patched:
         patched.setattr(_local, "_put", full)
         patched.setattr(run, "forecast", lambda *given: 0.0)
-        with pytest.raises(InputError, match="No space left on device; what is done stays"):
+        with pytest.raises(InputError, match="No space left on device; finished chunks are kept"):
             run_sweep(sweep, str(tmp_path / "full"))
     with opened(sweep, str(tmp_path / "full")) as found_store:
         done = found_store.done()
@@ -120,7 +120,7 @@ def test_files_that_may_not_grow_end_in_a_line(tmp_path: Path) -> None:
         [sys.executable, "-c", limited, *command], capture_output=True, text=True, check=False
     )
     assert found.returncode == 2
-    assert "File too large; what is done stays" in found.stderr.splitlines()[-1]
+    assert "File too large; finished chunks are kept" in found.stderr.splitlines()[-1]
     assert "Traceback" not in found.stderr
     subprocess.run(command, capture_output=True, check=True)
 
@@ -135,7 +135,7 @@ def test_store_of_another_sweep_stays_as_it_was(tmp_path: Path) -> None:
     assert files(tmp_path / "store") == before
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "letter").write_text("dear")
-    with pytest.raises(InputError, match="is not empty, and no store"):
+    with pytest.raises(InputError, match="is not empty, and is not the store of a sweep"):
         run_sweep(sweep, str(tmp_path / "folder"))
     assert files(tmp_path / "folder") == {"letter": b"dear"}
     with pytest.raises(InputError, match="is not a folder"):
@@ -185,7 +185,7 @@ def test_sweeps_that_start_at_once_leave_one_at_work(tmp_path: Path) -> None:
         if code:
             assert code == 2
             assert errors.count("\n") == 1
-            assert "another sweep is writing to it; wait for its end" in errors
+            assert "another sweep is writing to it; wait until it ends" in errors
     assert run_sweep(read_sweep(path), str(tmp_path / "store")).computed == 0
 
 

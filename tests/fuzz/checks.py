@@ -10,6 +10,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple
@@ -109,8 +110,8 @@ def _method(given: strategies.MethodInput, folder: Path) -> None:
 
 def _prepared(given: strategies.PreparedInput, folder: Path) -> None:
     try:
-        asked = given.scene, given.method, given.tolerance, given.effort
-        solver: Any = prepare(*asked, attitude=True) if given.attitude else prepare(*asked)
+        ready: Any = partial(prepare, given.scene, given.method, given.tolerance)
+        solver = ready(effort=given.effort, attitude=given.attitude)
     except InputError as error:
         _one_line(error)
         return
@@ -125,7 +126,9 @@ def _prepared(given: strategies.PreparedInput, folder: Path) -> None:
 
 def _listing(given: strategies.ListingInput, folder: Path) -> None:
     try:
-        found = subset(given.program, given.base, given.fix, given.keep, given.readings)
+        found = subset(
+            given.program, given.base, given.fix, keep=given.keep, readings=given.readings
+        )
     except InputError as error:
         _one_line(error)
     else:

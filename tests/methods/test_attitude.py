@@ -245,7 +245,7 @@ def test_body_of_coefficients_has_no_momentum() -> None:
 
 
 def test_methods_that_carry_none_say_so() -> None:
-    with pytest.raises(InputError, match="gauss-4 carries no attitude; allowed: auto"):
+    with pytest.raises(InputError, match="gauss-4 does not compute attitudes; allowed: auto"):
         solve(case_scene(3), [1.0], "gauss-4", 1e-9, attitude=True)
     with pytest.raises(InputError, match="frame 'earth'"):
         solve(case_scene(3), [1.0], attitude=True).angular_momentum("earth")
@@ -282,7 +282,7 @@ def test_prepared_solver_takes_another_start() -> None:
     _, attitude = solver((float("nan"), 2.0, 3.0), 1.0)
     assert solver.status == "overflow"
     assert np.isnan(attitude).all()
-    with pytest.raises(InputError, match="all four are 0"):
+    with pytest.raises(InputError, match="all four numbers are 0"):
         solver((1.0, 2.0, 3.0), 1.0, (0.0, 0.0, 0.0, 0.0))
     with pytest.raises(InputError, match="carries no attitude"):
         prepare(scene, "rk4", 1.0, attitude=True)

@@ -81,7 +81,9 @@ LONG: dict[str, Callable[[], object]] = {
     "rk4": _method(replace(PUSHED, step_size=1e-7), "rk4", 1e3, 1.0),
     "rk4-waves": _method(replace(CROWDED, step_size=1e-4), "rk4", 1e3, 1.0),
     "improved-euler": _method(replace(DRIVEN, step_size=1e-7), "improved-euler", 1e3, 1.0),
-    "rk4-short-steps": lambda: solve(replace(CROWDED, step_size=1.0), TIMES, "rk4", 1.0, 1e6),
+    "rk4-short-steps": lambda: solve(
+        replace(CROWDED, step_size=1.0), TIMES, "rk4", 1.0, effort=1e6
+    ),
     "gauss-1": _method(DRIVEN, "gauss-1", 1e3, 1e-8),
     "gauss-8": _method(CROWDED, "gauss-8", 1e5),
     "sphere": lambda: solve(SPHERE, TIMES, "closed-form", 1e-12, effort=1e6),

@@ -29,19 +29,19 @@ ALIKE: list[tuple[dict[str, Any], str]] = [
     ({"omega0": [10**400, 1, 1]}, "omega0: a number too large for binary64"),
     (
         {"omega0": [[1.0, 2.0, 3.0], [1.0]]},
-        "omega0: a list that is no array of numbers; allowed: rows of one length",
+        "omega0: a list that is not an array of numbers; allowed: rows of equal length",
     ),
     (
         {"omega0": np.ones((4, 3)), "moments": np.ones((3, 3))},
-        "moments: 3 rows; allowed: 1, or as many as there are bodies, 4",
+        "moments: 3 rows; allowed: 1, or 4, the number of bodies",
     ),
     (
         {"omega0": np.ones((4, 3)), "moments": np.ones((0, 3))},
-        "omega0: 4 rows; allowed: 1, or as many as there are bodies, 0",
+        "omega0: 4 rows; allowed: 1, or 0, the number of bodies",
     ),
     (
         {"moments": [1.0, 1, 1], "coefficients": [1.0, 1, 1]},
-        "moments and coefficients are both given; allowed: one of them",
+        "moments and coefficients are both given; give one of them",
     ),
     ({"threads": 0}, "threads is 0; allowed: 1 to 1024"),
     ({"threads": 1.5}, "threads is a number; it must be a whole number"),
@@ -90,7 +90,7 @@ def test_one_row_is_shared_and_fractions_are_numbers() -> None:
         ({"step": 0.0, "method": "rk4"}, "step is 0; allowed: above 0"),
         ({"out": READ_ONLY, "omega0": np.zeros((2, 3))}, "out: allowed: a writable"),
         ({"out": np.zeros((5, 3)), "omega0": np.zeros((2, 3))}, "out: allowed: a writable array"),
-        ({"out": "here"}, "out: allowed: an Ensemble, or an array of float64"),
+        ({"out": "here"}, "out has the wrong type; allowed: an Ensemble, or an array of float64"),
     ],
 )  # fmt: skip
 def test_bad_input_is_said_in_one_line(given: dict[str, Any], said: str) -> None:
@@ -104,7 +104,7 @@ def test_bad_starts_of_a_solver() -> None:
     solver = prepare(TOP)
     for omega0, t_end, said in (
         (np.zeros((2, 2)), 1.0, "omega0: shape (2, 2); allowed: (3,) or (n, 3)"),
-        (np.zeros((2, 3)), np.zeros(3), "t_end: 3 rows; allowed: 1, or as many as there are bod"),
+        (np.zeros((2, 3)), np.zeros(3), "t_end: 3 rows; allowed: 1, or"),
         (np.zeros((2, 3), complex), 1.0, "omega0: a complex number where a number belongs"),
     ):
         with pytest.raises(InputError) as raised:
@@ -116,10 +116,10 @@ def test_scenes_that_do_not_go_side_by_side() -> None:
     space = replace(TOP, torque=TorqueLaw((1.0, 0.0, 0.0), frame="space"))
     body = Scene("coefficients", (1.0, 1.0, 1.0), coefficients=(0.25, -0.5, 0.3))
     for scenes, said in (
-        ([], "there is no scene"),
-        ([TOP, body], "the scenes have more than one kind of body"),
-        ([TOP, replace(TOP, step_size=0.5)], "the scenes have more than one step size"),
-        ([TOP, replace(TOP, attitude=(1.0, 0.0, 0.0, 0.0))], "some scenes have an attitude"),
+        ([], "the sequence of scenes is empty"),
+        ([TOP, body], "the scenes give their bodies differently"),
+        ([TOP, replace(TOP, step_size=0.5)], "the scenes have different step sizes"),
+        ([TOP, replace(TOP, attitude=(1.0, 0.0, 0.0, 0.0))], "some of the scenes have an attitude"),
         (space, "the torque is about the axes of space"),
     ):
         with pytest.raises(InputError) as raised:

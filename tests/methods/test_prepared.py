@@ -497,7 +497,7 @@ def test_auto_solves_what_the_closed_form_refuses() -> None:
     assert solver.status == "complete"
     np.testing.assert_allclose(solver.trajectory(scene.omega, [5.0]).omega[0], wanted, rtol=1e-11)
     # If both refuse, the reason is the closed form's.
-    with pytest.raises(InputError, match="the phase is beyond"):
+    with pytest.raises(InputError, match="the phase is above"):
         solve(case_scene(4), [1e18])
 
 

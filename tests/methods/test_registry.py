@@ -23,7 +23,7 @@ def test_properties_of_the_registry_are_those_of_its_methods() -> None:
             with pytest.raises(InputError, match=f"{name} takes none"):
                 solve(case_scene(3), [1.0], name, 1e-3)
     assert [name for name in REGISTRY if name not in METHODS] == ["quick"]
-    with pytest.raises(InputError, match="gives the end alone"):
+    with pytest.raises(InputError, match="returns the state at one time only"):
         REGISTRY["quick"].solve(case_scene(3), [1.0], 1e-6)
 
 
@@ -82,7 +82,7 @@ def test_tolerance_is_checked(tolerance: float) -> None:
         ("dop853", r"exceeded its work limit at t = ([\d.e+-]+) s after 2000 right-hand sides"),
         ("closed-form", r"at t = ([\d.e+-]+) s the phase"),
         ("taylor", r"exceeded its work limit before t = ([\d.e+-]+) s after"),
-        ("rk4", r"steps of ([\d.e+-]+) s are too many"),
+        ("rk4", r"steps of ([\d.e+-]+) s would take too long"),
     ],
 )
 def test_time_of_a_refusal_is_in_the_seconds_of_the_scene(
@@ -137,5 +137,5 @@ def test_orders_of_the_programs_are_those_of_their_schemes() -> None:
 
 
 def test_steps_that_are_too_many_are_those_to_the_last_time() -> None:
-    with pytest.raises(InputError, match=r"rk4: 1e\+10 steps of 0\.01 s are too many"):
+    with pytest.raises(InputError, match=r"rk4: 1e\+10 steps of 0\.01 s would take too long"):
         solve(case_scene(3), [1.0, 1e8], "rk4", 1.0)

@@ -69,7 +69,7 @@ def test_attitude_is_divided_by_its_length(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("attitude = [0, 0, 0, 0]", "all four are 0"),
+        ("attitude = [0, 0, 0, 0]", "all four numbers are 0"),
         ("attitude = [nan, 0, 0, 1]", "not finite"),
         ("attitude = [1, 0, 0, 0, 0]", "5 numbers"),
         ("attitude = 3", "whole number"),

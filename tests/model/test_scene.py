@@ -96,7 +96,7 @@ def test_torque_about_the_axes_of_space_stays_as_the_axes_of_the_body_turn() -> 
     later = restarted_at(scene, np.ones(3), 0.5, (0.0, 0.0, 1.0, 0.0))
     assert later.torque.at(0.25) == pytest.approx(law.at(0.75))
     assert (later.torque.frame, later.attitude) == ("space", (0.0, 0.0, 1.0, 0.0))
-    with pytest.raises(InputError, match="begun later, it takes the attitude then"):
+    with pytest.raises(InputError, match="can't be restarted without the attitude"):
         restarted_at(scene, np.ones(3), 0.5)
 
 

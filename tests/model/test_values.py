@@ -293,7 +293,9 @@ def test_other_arguments_of_public_calls_are_checked(tmp_path: Path) -> None:
         _refused("fix: ", subset, "two-term", fix=bad)
         _refused("defects: ", Listing, "two-term", bad)
     assert Listing("two-term", ["dt-accumulates"]) == subset("two-term", keep=["dt-accumulates"])
-    with pytest.raises(InputError, match="program two-term: the listing is that of four-term"):
+    with pytest.raises(
+        InputError, match="program two-term: the listing belongs to program four-term"
+    ):
         program.run(PLAIN, subset("four-term"))
     for bad in ("3", 3.0, None, True, 10**5000, 0, [3]):
         with pytest.raises(InputError, match="case"):

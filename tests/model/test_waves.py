@@ -44,7 +44,7 @@ def test_the_sum_is_rounded_once_and_an_exact_zero_is_no_wave() -> None:
 
 def test_a_sum_beyond_the_range_of_numbers_is_refused() -> None:
     huge = (1.7e308, 0.0, 0.0)
-    with pytest.raises(InputError, match="have a sum beyond the range of numbers; allowed: ampl"):
+    with pytest.raises(InputError, match="overflows; allowed: ampl"):
         merged(TorqueLaw(cosines=[(huge, 1.0), (huge, 1.0)]))
 
 

@@ -179,7 +179,7 @@ def test_ranges() -> None:
 
 @pytest.mark.parametrize("text", ["", "no appendix", f"{HEADING}\nno cards"])
 def test_a_scan_that_is_none_is_refused(text: str) -> None:
-    with pytest.raises(InputError, match="not this thesis"):
+    with pytest.raises(InputError, match="not a scan of this thesis"):
         unexplained(text)
 
 

@@ -122,7 +122,9 @@ def test_words_that_are_not_here_are_one_line(monkeypatch: pytest.MonkeyPatch) -
         return entry(program, flags, by_moments, *short)
 
     monkeypatch.setattr(extension(), "run_program_in_word", without)
-    with pytest.raises(InputError, match="--word binary128: the compiler of this build has none"):
+    with pytest.raises(
+        InputError, match="--word binary128: the compiler of this build does not have it"
+    ):
         run_program(scene, listing, word="binary128")
 
 

@@ -60,7 +60,7 @@ BAD: dict[str, tuple[Options, str]] = {
     "no list": ({"at": 5}, "at: a whole number; allowed: a list of steps"),
     "work": (
         {"omega0": np.ones((200, 3)), "effort": 1e-5},
-        r"100 steps of 200 bodies would take too long; take fewer, or allow .* --effort 2",
+        r"100 steps of 200 bodies would take too long; use fewer, or allow .* --effort 2",
     ),
 }  # fmt: skip
 
@@ -89,7 +89,7 @@ REFUSED: dict[str, tuple[Callable[[], object], str]] = {
             replace(case_scene(3), steps=1000), corrected("two-term"), at=range(1, 1001),
             omega0=np.ones((most_steps() // 1000 + 1, 3)), effort=1e9,
         ),
-        "what fits in",
+        "this machine's memory can hold",
     ),
 }  # fmt: skip
 

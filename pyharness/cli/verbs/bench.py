@@ -99,7 +99,10 @@ def _present(
         )
     contenders = [*methods, *(each for each in others if each.is_installed)]
     if not contenders:
-        raise InputError("bench: no method and no peer is left; name one")
+        raise InputError(
+            "bench: no method and no third-party package is chosen; give at least one, with "
+            "--methods or --peers"
+        )
     return contenders, missing
 
 
@@ -143,9 +146,11 @@ def chosen(
     found = named(contenders, text, what, where)
     if attitude and (lacking := [each.name for each in found if not each.attitude]):
         able = ", ".join(each.name for each in contenders if each.attitude)
-        raise InputError(f"{where}: {lacking[0]} carries no attitude; allowed: {able}")
+        raise InputError(f"{where}: {lacking[0]} does not compute attitudes; allowed: {able}")
     if not attitude and (lacking := [each.name for each in found if not each.velocity]):
-        raise InputError(f"{where}: {lacking[0]} gives omega with the attitude; add --attitude")
+        raise InputError(
+            f"{where}: {lacking[0]} computes omega only together with the attitude; add --attitude"
+        )
     return found
 
 

@@ -74,7 +74,7 @@ def _text(path: str) -> str:
     try:
         return content.decode()
     except ValueError:
-        raise InputError(f"{where}: is no text; give the text of a scan") from None
+        raise InputError(f"{where}: is not text; give the text of a scan") from None
 
 
 def _no_card(options: argparse.Namespace, chosen: str) -> None:

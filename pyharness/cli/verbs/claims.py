@@ -76,11 +76,13 @@ def _atlas(options: argparse.Namespace) -> int:
     shared.check_outputs(options)
     sweep = read_sweep(options.sweep, over_starts.FUNCTIONS)
     if not check_store(sweep, options.atlas):
-        raise InputError(f"--atlas '{options.atlas}': is not there; 'sweep' makes it")
+        raise InputError(f"--atlas '{options.atlas}': does not exist; 'pyharness sweep' writes it")
     axes = {axis.dimension: axis.coordinates() for axis in reversed(sweep.axes)}
     with opened(sweep, options.atlas) as store:
         if not all(store.done()):
-            raise InputError(f"--atlas '{options.atlas}': is not finished; 'sweep' continues it")
+            raise InputError(
+                f"--atlas '{options.atlas}': is not finished; 'pyharness sweep' continues it"
+            )
         codes = {
             dict(asked.parameters)["id"]: store.array(asked.name)[...]
             for asked in sweep.reductions

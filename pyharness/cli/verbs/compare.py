@@ -59,12 +59,12 @@ def run(options: argparse.Namespace) -> int:
     found = compare_programs(
         scene,
         listings,
-        lipschitz,
-        not options.no_stop,
-        tolerance,
-        effort,
-        options.attitude,
-        options.word or BINARY64,
+        lipschitz=lipschitz,
+        may_stop=not options.no_stop,
+        tolerance=tolerance,
+        effort=effort,
+        attitude=options.attitude,
+        word=options.word or BINARY64,
     )
     shared.show(comparison_report(found), options)
     return 1 if found.unexpected or (options.strict and found.is_sensitive) else 0

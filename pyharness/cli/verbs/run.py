@@ -99,15 +99,19 @@ def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) 
     shared.refuse(options, f"--format {form}", ("attitude",))
     if form == "printer" and scene.moments is None:
         raise InputError(
-            "--format printer: the page begins with the moments, and this scene has only "
-            f"coefficients; give moments, or one of {', '.join(shared.FORMATS)}"
+            "--format printer prints the moments, and this scene has only coefficients; give "
+            f"moments, or one of {', '.join(shared.FORMATS)}"
         )
     if form == "tape5" and options.word not in (None, BINARY64):
         raise InputError(
-            f"--format tape5 has records of {BINARY64} alone, not of --word {options.word}"
+            f"--format tape5 has records of {BINARY64} only, not of --word {options.word}; "
+            "give another --format"
         )
     if form == "tape5" and options.out is None and sys.stdout.isatty():
-        raise InputError("--format tape5 is binary; give --out FILE, or a pipe")
+        raise InputError(
+            "--format tape5 is binary and can't be shown on a terminal; give --out FILE, or "
+            "pipe the output"
+        )
 
 
 def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, str, Trajectory]:
@@ -124,8 +128,8 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
         scene,
         listing,
         implementation,
-        lipschitz,
-        not options.no_stop,
+        lipschitz=lipschitz,
+        may_stop=not options.no_stop,
         effort=shared.chosen_effort(options),
         word=word,
     )
@@ -165,7 +169,7 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     if options.animate is not None:
         _check_animation(options, scene)
     effort, attitude = shared.chosen_effort(options), options.attitude is not None
-    trajectory = solve(scene, times, name, tolerance, effort, attitude)
+    trajectory = solve(scene, times, name, tolerance, effort=effort, attitude=attitude)
     if options.animate is not None:
         from pyharness.cli.output import write_files
         from pyharness.methods.attitude_picture import animation
@@ -184,7 +188,7 @@ def _check_animation(options: argparse.Namespace, scene: Scene) -> None:
     from pyharness.views.pictures import check_matplotlib
 
     if options.attitude is None:
-        raise InputError("--animate shows an attitude; ask for one, as in --attitude quaternion")
+        raise InputError("--animate needs an attitude; request one, as in --attitude quaternion")
     check_animation(options.animate, scene)
     check_matplotlib("--animate")
     check_writable(options.animate, "--animate")

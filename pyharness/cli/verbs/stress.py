@@ -26,7 +26,7 @@ def run(options: argparse.Namespace) -> int:
     """
     only = shared.chosen_names(options.only, "trial", tuple(TRIALS))
     if options.plot is not None and len(_chosen(only)) != 1:
-        raise InputError("--plot draws one trial: choose it by --only, as in --only separatrix")
+        raise InputError("--plot draws one trial; choose it with --only, as in --only separatrix")
     shared.check_outputs(options)
     if options.save is not None:
         from pyharness.cli.output import check_folder

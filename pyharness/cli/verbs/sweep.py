@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     if options.file is None:
         raise InputError("sweep: give a sweep file, as in 'sweep FILE.toml --out STORE'")
     if options.out is None:
-        raise InputError("sweep: give --out STORE, the folder that keeps the results")
+        raise InputError("sweep: give --out STORE, the folder for the results")
     check_zarr()
     executor = options.executor or EXECUTORS[0]
     shared.check_known("executor", executor, EXECUTORS)

@@ -62,11 +62,14 @@ def run(options: argparse.Namespace) -> int:
         shared.progress(kinds.index(check.suite), len(kinds), check.id)
     if not checks:
         if chosen.may_ask("decks") and compiler() is None:
-            raise InputError("decks are compiled, and there is no gfortran on the PATH")
+            raise InputError(
+                "the check needs gfortran to compile decks, and there is none on the PATH; "
+                "install it"
+            )
         if not chosen.record.is_dir() and chosen.may_ask("golden"):
             raise InputError("there is no golden record here; give --record DIR, or a checkout")
         asked = f"--only {options.only}" if options.only else "--draws 0"
-        raise InputError(f"{asked}: no such check; the kinds are {', '.join(KINDS)}")
+        raise InputError(f"{asked}: there is no such check; allowed {', '.join(KINDS)}")
     more = samples(checks, ROUNDING) if options.draws is not None else []
     text = summary([*_title(chosen), *_unjudged(chosen, checks)], checks, more=more)
     shared.show(checks_report("verify", checks, text, seed=chosen.seed), options)
@@ -92,7 +95,9 @@ def _port(options: argparse.Namespace) -> int:
     shared.refuse(options, "--port", _OF_THE_CHECKS)
     asked = port_cells(*_programs_and_cases(options), shared.names(options.cell))
     if not asked:
-        raise InputError(f"--cell {options.cell}: no such cell; give one as in two-term/case-3")
+        raise InputError(
+            f"--cell {options.cell}: there is no such cell; give one as in two-term/case-3"
+        )
     shared.check_outputs(options)
     checks = []
     for check in port(options.port, asked):
@@ -132,7 +137,9 @@ def _selection(options: argparse.Namespace) -> Selection:
 
         shared.refuse(options, "--external", ("seed", "draws", "record"))
         if any(each.partition("/")[0] != "external" for each in only):
-            raise InputError(f"--only {options.only}: with --external, external/... is allowed")
+            raise InputError(
+                f"--only {options.only}: allowed with --external: names that begin with external/"
+            )
         problems = [read_problem(options.external)]
         only = only or ["external"]
     shared.chosen_names(options.only, "kind", tuple(KINDS))
@@ -146,7 +153,9 @@ def _selection(options: argparse.Namespace) -> Selection:
     changes: dict[str, Any] = {} if seed is None else {"seed": seed}
     record = RECORD if options.record is None else Path(options.record)
     if options.record is not None and not options.update and not record.is_dir():
-        raise InputError(f"--record '{options.record}': is not a folder; verify --update makes one")
+        raise InputError(
+            f"--record '{options.record}': is not a folder; verify --update writes one"
+        )
     return Selection(only=only, draws=draws, record=record, problems=problems, **changes)
 
 

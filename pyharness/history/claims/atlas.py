@@ -93,9 +93,13 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
     """
     if tuple(axes) != (*CHOSEN, *WHERE) or not codes:
         allowed = ", ".join((*CHOSEN, *WHERE))
-        raise InputError(f"--atlas: the sweep must be of claims, along {allowed}")
+        raise InputError(
+            f"--atlas: the sweep must reduce to claims, and its axes must be {allowed}"
+        )
     if any((each < 0).any() for each in codes.values()):
-        raise InputError("--atlas: the store lacks chunks; let 'sweep' go on with it first")
+        raise InputError(
+            "--atlas: chunks of the store are missing; 'pyharness sweep' computes them"
+        )
     return Atlas(
         codes,
         [str(each) for each in axes["reading"]],

@@ -56,7 +56,7 @@ class Laboratory:
         readings = self.assumptions.readings & set(names_of("reading", program))
         assumed = self.assumptions.conjectures
         fixed = self.fixed & set(switchable(program))
-        return subset(program, "original", fixed, (), readings, assumed)
+        return subset(program, "original", fixed, readings=readings, conjectures=assumed)
 
     def scene(self, case: int, parts: int = 1) -> Scene:
         """Return the scene of a case under the assumptions, its step size divided by `parts`."""
@@ -174,7 +174,9 @@ def _scene(case: int, start: Triple | None, steps: int) -> Scene:
 @cache
 def _run(listing: Listing, scene: Scene, may_stop: bool, lipschitz: float, word: str) -> Trajectory:
     implementation = "fortran" if word == BINARY64 else "python"
-    return run_program(scene, listing, implementation, lipschitz, may_stop, word=word)
+    return run_program(
+        scene, listing, implementation, lipschitz=lipschitz, may_stop=may_stop, word=word
+    )
 
 
 @cache

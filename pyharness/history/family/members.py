@@ -72,11 +72,14 @@ class Member:
             raise InputError(text)
         for point in points:
             if not 0.0 <= point <= 1.0:
-                raise InputError(f"points: {point:g}; allowed: 0 to 1, in parts of the step")
+                raise InputError(f"points: {point:g}; allowed: 0 to 1, as fractions of the step")
         if len(set(points)) < len(points):
-            raise InputError("points: one is given twice; allowed: different points")
+            raise InputError("points: a collocation point is given twice; give different points")
         if np.linalg.cond(basis(np.array(points), self.terms)) > _WORST_CONDITION:
-            raise InputError("points: too close together for binary64; take them further apart")
+            raise InputError(
+                "points: the collocation points are too close together for double precision; "
+                "use points further apart"
+            )
 
     @property
     def points_label(self) -> str:

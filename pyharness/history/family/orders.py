@@ -95,7 +95,7 @@ def order_table(
     truth = reference(scene, wanted)
     if len(truth.time) < len(wanted):
         last = float(truth.time[-1]) if len(truth.time) else 0.0
-        raise InputError(f"the solution grows without bound after {last:g} s; take fewer steps")
+        raise InputError(f"the solution grows without bound after {last:g} s; use fewer steps")
     place = {time: row for row, time in enumerate(truth.time.tolist())}
     measured: list[float | None] = [None] * len(chosen)
     doubts = [math.inf] * len(chosen)

@@ -1,4 +1,8 @@
-"""An edition of three FORTRAN programs of 1982 on rigid bodies: original, corrected, checked."""
+"""Three FORTRAN programs of 1982 for rotating rigid bodies, their corrections, and fast solvers.
+
+The programs are from a thesis. The package has them as printed and as corrected, checks their
+results, and solves Euler's equations by other methods.
+"""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -51,7 +55,8 @@ __all__ = [
     "subset",
 ]
 
-# A name imports its module at its first use, so that a program loads only the modules it needs.
+# The public names by module. A module is imported at the first use of one of its names, so that a
+# program loads only the modules that it needs.
 _SUBMODULES = {
     "compare.comparison": ("Comparison", "compare_programs"),
     "model.errors": ("InputError", "NotBuiltError"),
@@ -71,7 +76,8 @@ _SUBMODULES = {
 }
 
 
-# Type checkers read the imports above. With this function they would accept any attribute name.
+# Type checkers read the imports above. This function is hidden from them, because with it they
+# would accept any attribute name.
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:

@@ -11,14 +11,17 @@ def _leave(*_: object) -> None:
         os._exit(130)
 
 
-# This comes before all other imports: until here, Ctrl-C ends in a traceback of the interpreter.
-# A shell starts background processes with SIGINT ignored; it then stays ignored.
+# The handler is set before all other imports, because before this line Ctrl-C prints a traceback of
+# the interpreter. A shell starts a background process with SIGINT ignored; it then remains ignored.
 if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, _leave)
 
 
 def start() -> None:
-    """Run the command line and exit with its exit status, promptly if it was interrupted."""
+    """Run the command line, and end this process with the exit status of the command.
+
+    After an interrupt (Ctrl-C) the process ends promptly, with exit status 130.
+    """
     from pyharness.cli import interruption
     from pyharness.cli.main import main
 

@@ -1,1 +1,1 @@
-"""Benchmarks of run time against error: our methods, the thesis programs, third-party solvers."""
+"""Benchmarks of run time against error, for our methods, the programs and other solvers."""

@@ -1,4 +1,4 @@
-"""Third-party contenders that numba compiles: fixed-step Runge-Kutta methods and numbalsoda.
+"""Third-party solvers of `bench` that numba compiles: Runge-Kutta methods and numbalsoda.
 
 For speed, the source text of each right-hand side contains the numbers of its scene, as in code
 written by hand. The stages of the fixed-step methods are written out in the same way.
@@ -23,16 +23,16 @@ RK4 = [[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6], [0
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Return a `Maker` of fixed-step Runge-Kutta runs on a scene, compiled by numba.
+    """Return a `Maker`, which prepares timed calls, for a fixed-step Runge-Kutta method on a scene.
 
-    `method` is "rk4" for the classical method, or "dop8" for the formula of order 8 from DOP853.
-    The setting of a run is its number of steps.
+    The method is compiled by numba. `method` is "rk4" for the classical method, or "dop8" for the
+    formula of order 8 of DOP853. The setting of a call is its number of steps.
     """
     import numba
 
     formula: Formula = RK4
     if method != "rk4":
-        # No public module of SciPy has these coefficients.
+        # A private module is imported, because no public module of SciPy has these coefficients.
         from scipy.integrate._ivp import dop853_coefficients as table  # noqa: PLC2701
 
         count = table.N_STAGES
@@ -54,9 +54,10 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
 
 
 def numbalsoda(name: str, scene: Scene) -> Maker:
-    """Return a `Maker` of runs on a scene by numbalsoda, with a compiled right-hand side.
+    """Return a `Maker`, which prepares timed calls, for the package numbalsoda on a scene.
 
-    `name` is the solver, "dop853" or "lsoda". The setting of a run is its relative tolerance.
+    The right-hand side is compiled by numba. `name` is the solver of the package, "dop853" or
+    "lsoda". The setting of a call is its relative tolerance.
     """
     import numba
     import numbalsoda as package
@@ -92,7 +93,7 @@ def numbalsoda(name: str, scene: Scene) -> Maker:
 
 
 def compiled_function(source: str) -> Any:
-    """Return the function named `function` that `source` defines, before numba compiles it."""
+    """Return the Python function named `function` that the source text `source` defines."""
     names: dict[str, Any] = {}
     exec(compile(source, "<bench>", "exec"), {"sin": np.sin, "cos": np.cos}, names)
     return names["function"]
@@ -103,9 +104,10 @@ def rates(
 ) -> list[str]:
     """Return the right-hand sides of a scene as Python source, one expression for each unknown.
 
-    `time` is the source text of the time. `state` has the names of the unknowns in the source: the
-    first three are omega's, and the last four of seven are the attitude's, with
-    q' = q (0, omega)/2. `coefficients` are A, B and C, by default the scene's.
+    `time` is the source text of the time. `state` has the names of the unknowns in the source. The
+    first three are components of omega. If there are seven names, the other four are components of
+    the attitude quaternion q, with q' = q (0, omega)/2. `coefficients` are A, B and C of Euler's
+    equations, by default those of the scene.
     """
     x, y, z, *attitude = state
     moments = scene.moments or (1.0, 1.0, 1.0)
@@ -138,15 +140,16 @@ def rates(
 
 
 def state_names(scene: Scene) -> str:
-    """Return a letter for each unknown of a scene: three for omega, four for an attitude if any."""
+    """Return a letter for each unknown of a scene: three for omega, and four for any attitude."""
     return "xyz" if scene.attitude is None else "xyzabcd"
 
 
 def end_of(state: Array, evaluations: int | None = None) -> End:
-    """Return the `End` of a call from `state`, its unknowns at time T.
+    """Return the result of a call, an `End`, from the unknowns `state` at the end time.
 
-    They are three components of omega and, if it was propagated, the attitude. `evaluations` is the
-    number of right-hand sides in the call, if it was counted.
+    The unknowns are three components of omega and, if it was computed, the attitude quaternion.
+    `evaluations` is the number of evaluations of the right-hand side in the call, if it was
+    counted.
     """
     found = plain(state)
     attitude = found[3:] if len(found) > 3 else None
@@ -154,11 +157,12 @@ def end_of(state: Array, evaluations: int | None = None) -> End:
 
 
 def steps_source(scene: Scene, formula: Formula) -> str:
-    """Return the Python source of a function that takes equal Runge-Kutta steps on a scene.
+    """Return the Python source of a function that integrates a scene by a Runge-Kutta method.
 
-    `formula` has the stage coefficients, the weights and the nodes of the Runge-Kutta method. The
-    function is called with the initial omega, the end time (s), the number of steps, and an array
-    that receives omega at the end. It has no loop over stages or components.
+    `formula` has the stage coefficients, the weights and the nodes of the method. The arguments of
+    the function are the initial omega, the end time (s), the number of equal steps, and an array
+    for the result. The function writes omega at the end time into this array. It has no loop over
+    stages or components.
     """
     stages, weights, nodes = formula
     lines = [
@@ -188,7 +192,7 @@ def _increment(factors: Sequence[float], name: str) -> str:
 def _callback_source(scene: Scene, counted: bool) -> str:
     """Return the Python source of a scene's right-hand side for numbalsoda.
 
-    If `counted`, the function adds 1 to its parameter `p` in each call.
+    If `counted`, the function counts its calls in the first element of its parameter `p`.
     """
     names = state_names(scene)
     lines = ["def function(t, u, du, p):"]

@@ -1,4 +1,4 @@
-"""Contenders of `bench`: their interface, our own methods, and the programs of the thesis."""
+"""Contenders (solvers to compare) of `bench`: their interface, our methods, and the programs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -18,10 +18,11 @@ from pyharness.model.listing import corrected, original
 from pyharness.model.scene import Scene
 from pyharness.original.programs import PROGRAM_REGISTRY
 
-# Three tolerances per decade: a method whose error is far below its tolerance is then compared by
-# its error, and not by its tolerance.
+# Three tolerances per decade. The tolerances are so close that a method is compared by its error,
+# even if its error is far below its tolerance.
 TOLERANCES = tuple(float(f"{part}e-{digits}") for digits in range(1, 16) for part in (5, 2, 1))
-# A function from the horizon (s) and the setting to a call.
+# A function that takes the end time (s) and the setting of an integration, and returns the prepared
+# integration.
 Maker = Callable[[float, float], Ready]
 
 
@@ -29,7 +30,8 @@ Maker = Callable[[float, float], Ready]
 class Contender:
     """A solver that takes part in a benchmark, either one of our own or a third-party solver.
 
-    Its setting trades time for accuracy: a tolerance or a number of steps. A closed form has none.
+    Its setting, a tolerance or a number of steps, determines run time and accuracy. A closed form
+    has no setting.
     """
 
     name: str
@@ -44,18 +46,21 @@ class Contender:
 
 @dataclass(frozen=True)
 class SceneContender(Contender):
-    """A contender that computes omega(T) of one scene, and its attitude if requested."""
+    """A contender (solver) that computes omega of one scene at a time T, or also the attitude."""
 
-    # Returns a `Maker` for a scene. All preparation takes place here, including compilation.
+    # Function that returns a `Maker` for a scene. It makes all preparations, including compilation.
     prepare: Callable[[Scene], Maker]
-    settings: tuple[float, ...] = ()  # empty for a fixed step: the scene determines the steps
-    order: int = 0  # of a method with a fixed step
-    attitude: bool = False  # whether the contender propagates the attitude of a scene
-    velocity: bool = True  # whether the contender takes a scene without an attitude
+    settings: tuple[float, ...] = ()  # empty for a fixed step: `ladder` then chooses the steps
+    order: int = 0  # order of convergence of a method with a fixed step
+    attitude: bool = False  # whether the contender can compute the attitude
+    velocity: bool = True  # whether the contender can compute omega without the attitude
 
 
 def own() -> list[SceneContender]:
-    """Return our methods and the three programs of the thesis, both original and corrected."""
+    """Return contenders for our methods, and for each program of the thesis in two versions.
+
+    The two versions are the original and the corrected program.
+    """
     both = partial(SceneContender, attitude=True)
     found = [
         both("auto", "tolerance", partial(_prepared, "auto"), TOLERANCES),
@@ -78,8 +83,9 @@ def own() -> list[SceneContender]:
 def refuse_rounding(solver: str, setting: float) -> None:
     """Raise InputError if a tolerance is below 100 eps, the smallest that SciPy and LSODA accept.
 
-    `setting` is the relative tolerance, and `solver` is the name that the message mentions. SciPy
-    would replace a smaller tolerance by 100 eps with a warning. LSODA calls it illegal.
+    `setting` is the relative tolerance, eps = 2**-52, and `solver` the name of the solver for the
+    message. With a smaller tolerance, SciPy would warn and use 100 eps, and LSODA
+    would reject it as illegal.
     """
     limit = 100 * 2.0**-52
     if setting < limit:

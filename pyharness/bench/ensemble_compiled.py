@@ -1,4 +1,4 @@
-"""Third-party contenders of `bench --ensemble` compiled at the first call: numba, JAX, diffrax."""
+"""Solvers of `bench --ensemble` that numba or JAX compiles at their first call."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -16,7 +16,8 @@ LANES = 64  # bodies in a block
 def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int) -> None:
     """Call `solve` for blocks of bodies, one after another or distributed over threads.
 
-    `solve` takes a slice of the indices of `n` bodies. `block` is the number of bodies in a block.
+    `solve` is called with a slice of the indices of the `n` bodies. `threads` is the number of
+    threads, and `block` the number of bodies in a block.
     """
     pieces = [slice(first, min(n, first + block)) for first in range(0, n, block)]
     if threads == 1:
@@ -30,10 +31,11 @@ def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int)
 def numba_rk4(
     in_blocks: bool, load: EnsembleLoad, setting: float, threads: int
 ) -> Callable[[], Array]:
-    """Return a function that runs RK4 compiled by numba, for blocks of bodies or body by body.
+    """Return a function that integrates all bodies of a load by RK4, compiled by numba.
 
-    If `in_blocks`, each step is a loop over the bodies of a block. `setting` is the number of
-    steps. The function returns omega of the bodies of `load` at the horizon, shape (n, 3).
+    If `in_blocks`, each step of RK4 is a loop over the bodies of a block; otherwise one body is
+    integrated after another. `setting` is the number of steps, and `threads` the number of threads.
+    The function returns omega of the bodies at `HORIZON` (rad/s), shape (n, 3).
     """
     blocks, bodies = _numba_kernels()
     kernel = blocks if in_blocks else bodies
@@ -80,8 +82,8 @@ def _numba_kernels() -> tuple[Any, Any]:
             z + sixth * (z1 + 2.0 * (z2 + z3) + z4),
         )
 
-    # A product and a sum may be contracted into one operation, as in our kernels. No other change
-    # of the arithmetic is allowed.
+    # The compiler may contract a product and a sum into one operation, as in our kernels. It may
+    # not change the arithmetic in any other way.
     step = numba.njit(inline="always", fastmath={"contract"})(step)
 
     def blocks(
@@ -121,10 +123,11 @@ def _numba_kernels() -> tuple[Any, Any]:
 
 
 def jax_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that runs RK4 compiled by JAX, with one array of all bodies per unknown.
+    """Return a function that integrates all bodies of a load by RK4, compiled by JAX.
 
-    `setting` is the number of steps. JAX chooses its threads itself, so that `threads` has no
-    effect. The function returns omega of the bodies of `load` at the horizon, shape (n, 3).
+    Each component of omega is an array with a value for each body. `setting` is the number of
+    steps. JAX chooses its threads itself, so that `threads` has no effect. The function returns
+    omega of the bodies at `HORIZON` (rad/s), shape (n, 3).
     """
     compiled, jnp = _jax_steps()
     steps = round(setting)
@@ -159,10 +162,11 @@ def _jax_steps() -> tuple[Any, Any]:
 
 
 def diffrax_vmap(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that runs diffrax's Dopri8, with steps chosen separately for each body.
+    """Return a function that integrates all bodies of a load by diffrax's method Dopri8.
 
-    `setting` is the tolerance. JAX chooses its threads itself, so that `threads` has no effect. The
-    function returns omega of the bodies of `load` at the horizon, shape (n, 3).
+    The step size is chosen separately for each body. `setting` is the relative and the absolute
+    tolerance. JAX chooses its threads itself, so that `threads` has no effect. The function returns
+    omega of the bodies at `HORIZON` (rad/s), shape (n, 3).
     """
     compiled, jnp = _diffrax_solve()
     given = jnp.array(load.omega0), jnp.array(load.acceleration), setting

@@ -1,4 +1,4 @@
-"""Contenders of `bench --ensemble`: the problem that they all solve, and our own methods."""
+"""The problem that all solvers of `bench --ensemble` solve, and our own of these solvers."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,9 +14,9 @@ from pyharness.truth.reference import exact_coefficients
 
 MOMENTS: Triple = (40.0, 30.0, 20.0)  # kg m2
 HORIZON = 3.0  # s
-SAMPLE = 200  # bodies whose error is measured
-_FASTEST = 2.0  # rad/s, about each axis
-_HARDEST = 1.0  # rad/s2, about each axis
+SAMPLE = 200  # number of bodies whose error is measured
+_FASTEST = 2.0  # largest component of the initial omega, rad/s
+_HARDEST = 1.0  # largest torque about an axis over the moment about this axis, rad/s2
 
 
 def coefficients() -> list[float]:
@@ -26,7 +26,7 @@ def coefficients() -> list[float]:
 
 @dataclass(frozen=True, eq=False)
 class EnsembleLoad:
-    """An ensemble of bodies with the same moments, each with its own initial omega and torque."""
+    """Many bodies with the moments `MOMENTS`, each with its own initial omega and torque."""
 
     name: str
     omega0: Array  # (n, 3), rad/s
@@ -34,12 +34,12 @@ class EnsembleLoad:
 
     @property
     def n(self) -> int:
-        """Return the number of bodies."""
+        """Return the number of bodies in the ensemble."""
         return len(self.omega0)
 
     @property
     def scene(self) -> Scene:
-        """Return the scene that all bodies share, at rest and without torque."""
+        """Return a scene with the moments that all bodies share, at rest and without torque."""
         return Scene(self.name, (0.0, 0.0, 0.0), MOMENTS)
 
     @property
@@ -51,14 +51,14 @@ class EnsembleLoad:
         return found
 
     def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
-        """Return a load of the bodies whose indices are in `rows`."""
+        """Return a load that consists of the bodies whose indices are in `rows`."""
         torque = None if self.torque is None else np.ascontiguousarray(self.torque[rows])
         return replace(self, omega0=np.ascontiguousarray(self.omega0[rows]), torque=torque)
 
     def ends(self) -> Array:
-        """Return omega of each body at `HORIZON` (rad/s, shape (n, 3)), to compare results with.
+        """Return the reference values of omega at `HORIZON` for all bodies, rad/s, shape (n, 3).
 
-        The bodies are solved one by one with tolerance 1e-15.
+        Our function `solve` computes them for one body after another, with the tolerance 1e-15.
         """
         found = np.empty_like(self.omega0)
         for i, start in enumerate(self.omega0.tolist()):
@@ -68,25 +68,27 @@ class EnsembleLoad:
         return found
 
 
-# A function from the bodies, the setting (a tolerance or a number of steps) and the number of
-# threads to a call. The call returns omega at the horizon, shape (n, 3).
+# A function that takes the bodies, the setting (a tolerance or a number of steps) and the number of
+# threads. It returns a function that integrates the bodies and returns omega at `HORIZON`, shape
+# (n, 3).
 EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 
 
 @dataclass(frozen=True)
 class EnsembleContender(Contender):
-    """A contender of `bench --ensemble`, which computes omega of many bodies at `HORIZON`."""
+    """A contender (solver) of `bench --ensemble`: it computes omega of many bodies at `HORIZON`."""
 
-    prepare: EnsembleMaker  # compilation may be left to the first call
+    prepare: EnsembleMaker  # the first call of the function that it returns may compile code
     # Numbers of threads to measure with; 0 means as many as the package uses.
     threads: tuple[int, ...] = (1, 2)
-    torque_free: bool = False  # whether it solves only bodies without torque
+    torque_free: bool = False  # whether the contender solves only bodies without torque
 
 
 def draw(seed: str, n: int) -> list[EnsembleLoad]:
-    """Return a load of n random bodies without torque, and a load of the same bodies with torques.
+    """Return two loads of n random bodies, the first without torque and the second with torques.
 
-    The text `seed` determines the random numbers.
+    The bodies have the same initial omegas in both loads. The text `seed` determines the random
+    numbers.
     """
     source = np.random.default_rng([ord(letter) for letter in f"ensemble/{seed}"])
     omega0 = source.uniform(-_FASTEST, _FASTEST, (n, 3))
@@ -98,7 +100,7 @@ def draw(seed: str, n: int) -> list[EnsembleLoad]:
 
 
 def own_ensembles() -> list[EnsembleContender]:
-    """Return our own contenders: the closed form, the Taylor method and RK4."""
+    """Return our own contenders of `bench --ensemble`: closed form, Taylor method and RK4."""
     return [
         EnsembleContender("closed-form", "none", _own("closed-form"), torque_free=True),
         EnsembleContender("taylor", "tolerance", _own("taylor")),

@@ -1,4 +1,4 @@
-"""Cost per body against the number of bodies in a call, and the memory that a call takes."""
+"""Time per body against the number of bodies in a call, and the memory that a call needs."""
 
 import subprocess
 import sys
@@ -19,13 +19,14 @@ from pyharness.compare.timing import seconds
 from pyharness.methods.prepared import prepare
 from pyharness.model.progress import Progress, no_progress
 
+# Setting of each of our methods: a tolerance, or the number of steps of RK4.
 SETTINGS = {"closed-form": 1e-12, "taylor": 1e-12, "rk4": float(STEPS)}
 _BATCH, _ROUNDS = 0.02, 5
 
 
 @dataclass(frozen=True)
 class Size:
-    """The time per body that each method needs on one core in a call with `bodies` bodies."""
+    """The time per body of each of our methods, on one core, in a call with `bodies` bodies."""
 
     bodies: int
     seconds: dict[str, float]  # s per body, by method
@@ -33,7 +34,10 @@ class Size:
 
 @dataclass(frozen=True)
 class Memory:
-    """The memory (bytes) that a process needed for one call, beyond what it had before the call."""
+    """The additional memory (bytes) that a process needed for one call of a method.
+
+    It is the growth of the process from its size before the call to its largest size.
+    """
 
     method: str
     bodies: int
@@ -47,10 +51,11 @@ class Memory:
 
 
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
-    """Measure the time per body in calls with 1, 10, ... up to `most` bodies, for each method.
+    """Measure the time per body of our methods in calls with 1, 10, 100, ... bodies.
 
-    `seed` determines the random bodies. The closed form is measured without torque, the other
-    methods with torque.
+    `most` is the largest number of bodies, and `seed` determines the random bodies. The closed form
+    is measured without torque, both by `solve_many` and as a prepared solver. The other methods are
+    measured with torque.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []
@@ -75,9 +80,10 @@ def _prepared(load: EnsembleLoad) -> Callable[[], object]:
 
 
 def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> list[Memory]:
-    """Measure the memory of a call with `bodies` bodies for each method, by default our own.
+    """Measure the memory that a call with `bodies` bodies needs, for each of `methods`.
 
-    Each method runs in a separate process, because the peak memory of a process never decreases.
+    By default these are our own methods. Each method runs in a separate process, because the peak
+    memory of a process never decreases.
     """
     found = []
     for method in own_ensembles() if methods is None else methods:
@@ -94,10 +100,10 @@ def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> l
 
 
 def needed(method: str, bodies: int) -> None:
-    """Print two numbers of bytes for a call of `method` with `bodies` bodies in this process.
+    """Print the memory that a call of `method` with `bodies` bodies needs in this process.
 
-    They are the size of the arrays that the call takes and returns, and the growth of the process
-    to its peak.
+    Two numbers of bytes are printed. The first is the size of the arrays that the call takes and
+    returns. The second is the peak memory of the process minus its memory before the call.
     """
     own = next(each for each in own_ensembles() if each.name == method)
     load = draw("memory", 512)[0 if own.torque_free else 1]
@@ -115,9 +121,9 @@ def needed(method: str, bodies: int) -> None:
 
 
 def _resident(name: str) -> int:
-    """Return the memory (bytes) that Linux reports for this process under `name`, as ``VmHWM``.
+    """Return the memory (bytes) that Linux reports for this process under `name`; 0 elsewhere.
 
-    It is 0 on other systems.
+    `name` is ``VmRSS`` for the present memory, or ``VmHWM`` for the peak memory.
     """
     try:
         with open("/proc/self/status", encoding="ascii") as file:

@@ -1,9 +1,10 @@
-"""Rates of ensembles: bodies per second at a target error, and steps of RK4 per second.
+"""Measurement of ensembles: bodies per second at a target error, and steps of RK4 per second.
 
-Each contender gets the coarsest setting whose error on a sample is at most the target. It then gets
-as many bodies as it can integrate in a fraction of a second. All contenders are called in turn, in
-rounds. The shortest time of a call counts, because other work of the machine can only lengthen it.
-Calls on one core are timed in processor time.
+Each contender (solver) uses the coarsest setting whose error on a sample of bodies is at most the
+target. The number of bodies in a call is chosen so that the call takes a fraction of a second. In
+each of several rounds, all contenders are called in turn. The shortest time of a call counts,
+because other work of the machine can only lengthen it. Calls on one core are timed in processor
+time.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -25,10 +26,11 @@ from pyharness.model.progress import Progress, no_progress
 from pyharness.model.trajectory import Array
 
 TARGETS = (1e-6, 1e-12)
-STEPS = 300  # of RK4, where the rate is in steps per second
+STEPS = 300  # number of steps of RK4, where the rate is in steps per second
 ROUNDS = 9
-# Durations of a call (s). A call shorter than the first duration gets more bodies. A call shorter
-# than the second one also does, as long as its bodies per second have grown by more than half.
+# Durations of a call (s). The number of bodies is increased if a call is shorter than the first
+# duration. If the last increase has raised the bodies per second by more than half, it is also
+# increased if the call is shorter than the second duration.
 _CALL, _LONG_CALL = 0.03, 0.5
 SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
 _BATCH = 0.02  # s; duration of the calls in a round
@@ -38,19 +40,20 @@ Say = Callable[[str], None]  # receives the current part of a task
 
 @dataclass(frozen=True)
 class Rate:
-    """The measured speed of one contender with one number of threads on one task.
+    """The measured speed of one contender (solver) with one number of threads on one task.
 
-    The task is to solve the bodies of a load to a target error, or in a prescribed number of steps.
+    The task is to solve the bodies of a load with at most a target error, or in a prescribed number
+    of steps of RK4.
     """
 
     load: str
     target: float | None  # requested error; None where the steps were prescribed
     method: str
-    threads: int  # 0 means as many as the package uses
-    setting: float | None
-    bodies: int  # in a call
+    threads: int  # number of threads; 0 means as many as the package uses
+    setting: float | None  # tolerance or number of steps; None for a closed form
+    bodies: int  # number of bodies in a call
     seconds: float  # the shortest time of a call
-    error: float  # largest error in the sample
+    error: float  # largest relative error of omega in the sample
 
     @property
     def bodies_a_second(self) -> float:
@@ -59,26 +62,31 @@ class Rate:
 
     @property
     def rate(self) -> float:
-        """Return the speed in bodies per second, or body-steps per second for prescribed steps."""
+        """Return the speed in bodies per second.
+
+        If the steps were prescribed, return it in steps per second, summed over all bodies.
+        """
         return self.bodies_a_second * (1 if self.target is not None else STEPS)
 
 
 @dataclass(frozen=True)
 class Rates:
-    """All speeds that a run of the benchmark measured, and the contenders that were refused."""
+    """All speeds that a run of the benchmark measured, and the reasons for missing speeds."""
 
     seed: str
     bodies: int
     rows: list[Rate] = field(default_factory=list)
-    refused: list[tuple[str, str, str]] = field(default_factory=list)  # (task, contender, reason)
+    # Tuples (task, contender, reason) for contenders that could not be measured.
+    refused: list[tuple[str, str, str]] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """A task for contenders: to solve the bodies of a load to a target error.
+    """A task for contenders: to solve the bodies of a load with at most a target error.
 
-    Without a target error, the bodies are solved in `STEPS` steps of RK4. The error is measured on
-    a sample. The sample consists of the first bodies, which are as random as the others.
+    Without a target error, the task is to solve the bodies in `STEPS` steps of RK4. The error is
+    measured on a sample, which consists of the first bodies of the load. Since all bodies are
+    random, the first bodies are a random sample.
     """
 
     load: EnsembleLoad
@@ -92,17 +100,19 @@ class _Task:
         return f"{self.load.name}, {f'{self.target:g}' if self.target else f'{STEPS} steps of RK4'}"
 
     def takes(self, each: EnsembleContender) -> bool:
-        """Return whether a contender can do the task.
+        """Return whether the contender `each` can do the task.
 
-        It must take the torques of the bodies and, without a target error, a number of steps.
+        It must be able to solve bodies with the torques of the load. Without a target error, it
+        must also be an RK4 solver, whose setting is the number of steps.
         """
         torque = self.load.torque is not None and each.torque_free
         return not torque and (self.target is not None or each.setting == "steps")
 
     def error(self, omega: Array) -> float:
-        """Return the largest error in the computed `omega` of the sample; infinite if not finite.
+        """Return the largest relative error of `omega`, the computed result for the sample.
 
         The error of a body is relative to its largest component of omega at the start and the end.
+        If a component of `omega` is not finite, the result is infinite.
         """
         n = min(len(omega), len(self.ends))
         ends, starts = self.ends[:n], self.sample.omega0[:n]
@@ -111,9 +121,10 @@ class _Task:
         return float(np.where(np.isfinite(errors), errors, np.inf).max())
 
     def setting(self, each: EnsembleContender) -> float | None:
-        """Return the coarsest setting with which a contender reaches the target error.
+        """Return the coarsest setting with which the contender `each` reaches the target error.
 
-        Return None if no setting does. Without a target error, return the prescribed `STEPS`.
+        Return None if no setting reaches it. Without a target error, return the prescribed number
+        of steps, `STEPS`.
         """
         if self.target is None:
             return float(STEPS)
@@ -133,10 +144,10 @@ def measure_ensembles(
     seed: str,
     progress: Progress = no_progress,
 ) -> Rates:
-    """Measure the speed of all contenders on all loads, at all target errors.
+    """Measure the speed of all contenders (solvers) on all loads, at all target errors.
 
-    On the last load, the contenders that run RK4 are also measured in `STEPS` steps. `seed` is only
-    recorded in the result.
+    On the last load, the contenders that run RK4 are also measured with `STEPS` steps. `seed`, from
+    which the loads were drawn, is only recorded in the result.
     """
     found = Rates(seed, loads[0].n)
     n_tasks, done = len(loads) * len(TARGETS) + 1, 0
@@ -183,8 +194,8 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
     if each.setting == "none":
         yield 1.0
     elif each.setting == "tolerance":
-        # No contender's error is below a hundredth of its tolerance, nor above a thousand times its
-        # tolerance.
+        # These tolerances suffice, because no contender has an error below a hundredth of its
+        # tolerance, or above a thousand times its tolerance.
         for digits in range(-2, 4):
             if target * 10.0**-digits >= FINEST:
                 yield float(f"{target * 10.0**-digits:.0e}")
@@ -198,11 +209,11 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
 def _enough(
     prepare: EnsembleMaker, load: EnsembleLoad, setting: float, threads: int
 ) -> tuple[EnsembleLoad, Callable[[], Array]]:
-    """Return the first bodies of `load`, and a function that solves them.
+    """Return a load with the first bodies of `load`, and a function that solves these bodies.
 
-    There are so many bodies that a call of the function takes long enough to be timed. If `load`
-    has too few bodies for this, all of them are returned. `prepare` makes the function for a
-    setting and a number of threads.
+    The number of bodies is chosen so that a call of the function takes long enough to be timed. If
+    `load` has too few bodies, all of them are used. `prepare` makes the function, for the setting
+    `setting` and the number of threads `threads`.
     """
     n, before = min(load.n, 64), 0.0
     while True:

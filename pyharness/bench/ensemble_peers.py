@@ -1,4 +1,4 @@
-"""Third-party contenders of `bench --ensemble`: NumPy, SciPy and heyoka, and the list of all."""
+"""Third-party solvers of `bench --ensemble`: NumPy, SciPy and heyoka, and a list of all."""
 
 from collections.abc import Callable
 from functools import cache, partial
@@ -20,7 +20,7 @@ _BLOCK = 4096  # bodies whose arrays fit into the cache
 
 
 def ensemble_peers() -> list[EnsembleContender]:
-    """Return all third-party contenders of `bench --ensemble`, installed or not."""
+    """Return all third-party contenders (solvers) of `bench --ensemble`, installed or not."""
     one = EnsembleContender
     blocks, alone = partial(compiled.numba_rk4, True), partial(compiled.numba_rk4, False)
     return [
@@ -36,10 +36,11 @@ def ensemble_peers() -> list[EnsembleContender]:
 
 
 def _heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that runs one heyoka integrator on all batches of bodies in turn.
+    """Return a function that integrates all bodies of a load with one heyoka batch integrator.
 
-    It sets the state and the torque of the integrator for each batch, and returns omega at the
-    horizon, shape (n, 3). `setting` is the tolerance. `threads` has no effect.
+    For each batch of bodies in turn, the function sets the state and the torque of the integrator.
+    It returns omega of the bodies at `HORIZON` (rad/s), shape (n, 3). `setting` is the tolerance,
+    and `threads` has no effect.
     """
     import heyoka
 
@@ -102,9 +103,10 @@ def _integrator(with_torque: bool, tolerance: float, size: int) -> Any:
 
 
 def _batches(rows: Array, size: int) -> Array:
-    """Return the rows of bodies as batches of `size` bodies, shape (batches, 3, size).
+    """Return rows of three numbers, one row for each body, as batches of `size` bodies.
 
-    The last batch is padded with copies of the last body.
+    The result has the shape (batches, 3, size). The last batch is padded with copies of the last
+    row.
     """
     lacking = -len(rows) % size
     filled = np.concatenate([rows, np.repeat(rows[-1:], lacking, axis=0)])
@@ -112,10 +114,11 @@ def _batches(rows: Array, size: int) -> Array:
 
 
 def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that runs RK4 in NumPy, with one array of a block of bodies per unknown.
+    """Return a function that integrates all bodies of a load by RK4 with NumPy arrays.
 
-    `setting` is the number of steps. The function returns omega of the bodies of `load` at the
-    horizon, shape (n, 3).
+    An array has one component of omega for a block of bodies. `setting` is the number of steps, and
+    `threads` the number of threads. The function returns omega of the bodies at `HORIZON` (rad/s),
+    shape (n, 3).
     """
     a, b, c = coefficients()
     starts, torques = load.omega0.T.copy(), load.acceleration.T.copy()
@@ -156,10 +159,11 @@ def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[],
 
 
 def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that runs SciPy's `solve_ivp` for one body after another.
+    """Return a function that runs SciPy's `solve_ivp` for one body of a load after another.
 
-    Its right-hand side computes with floats, not with arrays. `setting` is the relative tolerance.
-    `threads` has no effect. The function returns omega at the horizon, shape (n, 3).
+    The right-hand side computes with floats, not with arrays. `setting` is the relative tolerance,
+    and `threads` has no effect. The function returns omega of the bodies at `HORIZON` (rad/s),
+    shape (n, 3).
     """
     from scipy.integrate import solve_ivp
 

@@ -1,4 +1,4 @@
-"""The report of `bench --ensemble`: rates at a target error, cost against ensemble size, memory."""
+"""The report of `bench --ensemble`: bodies per second, time against their number, memory."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -27,7 +27,7 @@ _STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
 
 @dataclass(frozen=True)
 class Ensembles:
-    """The results of one run of `bench --ensemble`."""
+    """The results of one run of `bench --ensemble`: speeds, times by size, and memory."""
 
     rates: Rates
     sizes: Sequence[Size]
@@ -35,9 +35,11 @@ class Ensembles:
 
 
 def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> Report:
-    """Return the report: a table for each load and target error, then cost per body and memory.
+    """Return the report of `bench --ensemble`, which consists of tables and notes.
 
-    `packages` are the packages whose versions are listed. `command` produces the page again.
+    The tables show the speeds for each load and target error, the time per body against the number
+    of bodies, and the memory. `packages` are the packages whose
+    versions are listed. `command` is the command that produces the report again.
     """
     return measured_report(
         "## Ensembles",
@@ -53,10 +55,11 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
-    """Return our best rate divided by the rate in `row`, or None if we have none to compare.
+    """Return the speed of our fastest method divided by the speed in `row`.
 
-    `rows` has the rates of all contenders on the same task. Both rates are for the same number of
-    threads. A contender that takes all cores is compared with our rate on the most threads.
+    `rows` has the speeds of all contenders (solvers) on the same task. Both speeds are for the same
+    number of threads; a contender that chooses its threads itself is compared with our speed on the
+    most threads. Return None if none of our methods was measured with that number of threads.
     """
     ours = [each for each in rows if each.method in _STYLES]
     threads = row.threads or max((each.threads for each in ours), default=0)

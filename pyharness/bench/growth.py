@@ -1,7 +1,8 @@
 """Growth of errors with time: the Taylor method against the closed form, up to 1e5 s.
 
-The errors are compared with the conditioning of the closed form. A relative change of time, or of
-any rate, by one rounding (2**-53) changes the solution by 2**-53 t |omega'|, whatever the method.
+The errors are compared with the conditioning of the problem. A relative change of the time t, or of
+any angular rate, by one rounding (2**-53) changes the solution by 2**-53 t |omega'|. This change
+does not depend on the method.
 """
 
 from collections.abc import Sequence
@@ -21,9 +22,9 @@ _STARTS = 8
 
 @dataclass(frozen=True)
 class Growth:
-    """The error of the Taylor method at one time, and the effect there of a rounding of the time.
+    """The error of the Taylor method at one time, and the effect of a rounding of this time.
 
-    The effect is independent of the method, and therefore a yardstick for the error.
+    The effect does not depend on the method. It therefore serves as a measure for the error.
     """
 
     time: float  # s
@@ -32,16 +33,17 @@ class Growth:
     # `conditioning` is the change caused by one rounding of the time.
     error: float
     conditioning: float
-    steps: int  # of the Taylor method in one run
+    steps: int  # number of steps of the Taylor method in one integration
 
 
 def growth(
     scene: Scene, horizons: Sequence[float] = HORIZONS, tolerance: float = 1e-15
 ) -> list[Growth]:
-    """Measure the error of the Taylor method at `horizons`, times (s) of a torque-free motion.
+    """Measure the error of the Taylor method at several times of a torque-free motion.
 
-    The error is the difference from the closed form. `tolerance` is the tolerance of the Taylor
-    method. Raise InputError if the scene has no closed form.
+    `horizons` are the times (s), and the error is the difference from the closed form. `tolerance`
+    is the relative tolerance of the Taylor method. Raise InputError if the scene has no closed
+    form.
     """
     if closed_form(scene) is None:
         raise InputError(
@@ -50,7 +52,8 @@ def growth(
     series = prepare(scene, "taylor", tolerance)
     exact = prepare(scene, "closed-form")
     rate = scene.right_hand_side()
-    # Several starts of one motion, so that the result does not depend on a favourable phase.
+    # Several initial states of one motion are used, so that the result does not depend on a
+    # favourable phase.
     omega = np.array(scene.omega)
     starts = np.array([exact(omega, 0.37 * k).copy() for k in range(_STARTS)])
     found = []

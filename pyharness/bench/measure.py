@@ -1,9 +1,10 @@
-"""The benchmark: run time against error, of our and third-party methods, in one process and run.
+"""Measurement of run time against error, for our and third-party solvers, in one process.
 
-Every contender is called with a ladder of settings. Each call integrates omega from time 0 to T,
-and also the attitude if the scene has one. All calls are first prepared, made once, and compared
-with the reference. They are then timed in rounds, one batch of each in turn, so that other work of
-the machine affects all alike. The median time counts.
+Every contender (solver) is called with a series of settings, from coarse to fine. Each call
+integrates omega from time 0 to T, and also the attitude if the scene has one. All calls are first
+prepared, made once, and compared with the reference solution. They are then timed in rounds. In
+each round, a batch of each call is timed in turn, so that other work of the machine affects all
+calls alike. The median over the rounds counts.
 """
 
 import math
@@ -26,29 +27,32 @@ from pyharness.model.trajectory import Array
 from pyharness.truth.reference import Reference, reference
 
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
-HORIZON, LONG_HORIZON = 3.0, 100.0
+HORIZON, LONG_HORIZON = 3.0, 100.0  # end times T, s
 _CASES, _LONG_CASES = (2, 3, 4, 5, 6, 7), (3, 4)
-# Cases with attitude. For long times Case 6 is omitted: the reference would need too many steps.
+# Cases that are measured with attitude. Case 6 is not integrated to the long end time, because the
+# reference solution would need too many steps.
 _TURNING_CASES, _LONG_TURNING_CASES = (1, *_CASES), (1, 2, 3, 4, 5, 7)
 
-_LONGEST_CALL = 1.0  # s
+_LONGEST_CALL = 1.0  # s; settings for which a call would take longer are left out
 # Time (s) for the first calls of a contender in one case, by the quantity that is varied.
 _BUDGET = {"tolerance": 1.0, "steps": 0.15, "none": 1.0}
-_LARGEST_STEPS = 1 << 22
-_FAILURES = 12
-_ROUNDS = 9
+_LARGEST_STEPS = 1 << 22  # largest number of steps of a call
+_FAILURES = 12  # number of successive settings without result after which finer ones are left out
+_ROUNDS = 9  # number of rounds in which calls are timed
 _BATCH = 1e-3  # s; calls faster than this are batched
 
 
 @dataclass(frozen=True)
 class Workload:
-    """A task of the benchmark: a scene, and the time up to which it is integrated."""
+    """A task of the benchmark: a scene, and the time T up to which its motion is integrated."""
 
-    label: str  # `5`: Case 5 to T = 3; `3L`: Case 3 to T = 100; the number of a random scene
+    # For a case the label is its number, with an `L` if T = 100 s (`3L`), or with any other T that
+    # is not 3 s. For a random scene it is the number of the scene.
+    label: str
     scene: Scene
     horizon: float  # T, s
-    # For a random scene only: its kinds, its solution, the error amplification, and the revolutions
-    # of the body.
+    # Only for a random scene: its kinds, its solution, its error amplification, and the number of
+    # revolutions of the body.
     kinds: tuple[str, ...] = ()
     truth: Reference | None = None
     growth: float = 0.0
@@ -61,10 +65,10 @@ class Workload:
 
     @property
     def group(self) -> str:
-        """Return the name of the group of workloads over which ratios of times are averaged.
+        """Return the name of the group of workloads over which ratios of run times are averaged.
 
-        All workloads of a group have the same horizon. At the default horizon, and always with
-        attitude, scenes with a torque and scenes without one are in separate groups.
+        All workloads of a group have the same end time. Scenes with a torque and scenes without
+        torque are in separate groups, except without attitude at an end time other than 3 s.
         """
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"
@@ -73,42 +77,45 @@ class Workload:
 
 @dataclass(frozen=True)
 class Row:
-    """The time and error of one contender with one setting on one workload."""
+    """The run time and the error of one contender (solver) with one setting on one workload."""
 
     workload: Workload
     method: str  # name of the contender
     kind: str  # quantity that is varied: "tolerance", "steps" or "none"
-    setting: float | None
-    seconds: float | None  # median time of a call; None if the call failed
-    # Error of omega at T, relative to the largest component there, or the error of the attitude
-    # (rad) if that is larger. None if the call failed.
+    setting: float | None  # value of this quantity; None if the contender has no setting
+    seconds: float | None  # median time (s) of a call; None if the call failed
+    # Error of omega at T, relative to the largest component of the true omega at T, or the error of
+    # the attitude (rad) if it is larger. None if the call failed.
     error: float | None
-    evaluations: int | None  # number of right-hand sides in a call, where it can be counted
-    note: str = ""  # why the call failed
+    evaluations: int | None  # evaluations of the right-hand side in a call, if they are counted
+    note: str = ""  # reason why the call failed
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """The reason why a contender was not run on a workload, with one setting or at all.
+    """The reason why a contender (solver) has no result for a workload with some setting.
 
-    `setting` is None if the contender was not run at all, or if it has no setting.
+    `setting` is None if the contender was not run with any setting, or if it has no setting.
     """
 
     workload: Workload
-    method: str
+    method: str  # name of the contender
     setting: float | None
     reason: str
 
 
 @dataclass(frozen=True)
 class Finding:
-    """The results of one run of the benchmark."""
+    """The results of one run of the benchmark: times, errors, and reasons for missing results."""
 
     workloads: list[Workload]
     rows: list[Row]
     refused: list[Refusal]
-    preparation: dict[tuple[int | str, str], float]  # s, by (case or random scene, method)
-    doubt: dict[str, float]  # by label: error bound of the reference, measured like `Row.error`
+    # Time (s) of all preparations, by (number of the case or label of the random scene, contender).
+    preparation: dict[tuple[int | str, str], float]
+    # Error estimate of the reference solution, in the measure of `Row.error`, by label of the
+    # workload.
+    doubt: dict[str, float]
 
     @property
     def attitude(self) -> bool:
@@ -119,10 +126,11 @@ class Finding:
 def workloads(
     case: int | None = None, horizon: float | None = None, attitude: bool = False
 ) -> list[Workload]:
-    """Return the workloads, by default Cases 2 to 7 to T = 3 s and Cases 3 and 4 to T = 100 s.
+    """Return the workloads: by default Cases 2 to 7 to T = 3 s, and Cases 3 and 4 to T = 100 s.
 
-    With `attitude` they are Cases 1 to 7, whose attitude starts from the axes of space, and all but
-    Case 6 also to T = 100 s. `case` selects a single case, and `horizon` (s) a single time T.
+    With `attitude` the workloads are Cases 1 to 7 to T = 3 s, and all cases except 6 to T = 100 s.
+    The attitude then starts from the axes of space. `case` selects a single case, and `horizon` a
+    single end time T (s).
     """
     usual, long = (_TURNING_CASES, _LONG_TURNING_CASES) if attitude else (_CASES, _LONG_CASES)
     cases = usual if case is None else (case,)
@@ -142,7 +150,10 @@ def measure(
     contenders: Sequence[SceneContender],
     progress: Progress = no_progress,
 ) -> Finding:
-    """Run every contender on every workload in `loads`, and return the times and the errors."""
+    """Run every contender (solver) on every workload in `loads`; return the times and errors.
+
+    `progress` is called before each part of the work.
+    """
     found = Finding(list(loads), [], [], {}, {})
     makers: dict[tuple[int | str, str], Maker] = {}
     for number, load in enumerate(loads, 1):
@@ -163,7 +174,7 @@ def measure(
                 continue
             tell(contender.name)
             key = (load.scene.case or load.label, contender.name)
-            # The same compiled code serves all horizons of a scene.
+            # The same compiled code is used for all end times of a scene.
             begin = perf_counter()
             try:
                 if key not in makers:
@@ -184,19 +195,19 @@ def measure(
 
 
 def error_of(end: End, truth: Reference) -> float | None:
-    """Return the error of a run's result `end` against the reference solution `truth`.
+    """Return the error of the result `end` of a call against the reference solution `truth`.
 
-    It is the relative error of omega. If `truth` has an attitude, it is the larger one of this and
-    the error of the attitude (rad). Return None if the result is not finite, or if its attitude is
-    missing.
+    It is the relative error of omega. If `truth` has an attitude, it is the relative error of omega
+    or the angular error of the attitude (rad), whichever is larger. Return None if the result is
+    not finite, or if a required attitude is missing.
     """
     error = relative_error(end.omega, truth)
     if error is None or truth.attitude is None:
         return error
     if end.attitude is None or not np.isfinite(end.attitude).all() or not end.attitude.any():
         return None
-    # Normalise, because integrators do not preserve the norm. Scale first, so that the squares in
-    # the norm neither overflow nor underflow.
+    # The quaternion is normalised, because integrators do not preserve its norm. It is scaled
+    # before, so that the squares in the norm neither overflow nor underflow.
     attitude = end.attitude / np.abs(end.attitude).max()
     attitude /= np.linalg.norm(attitude)
     return max(error, float(angle_between(attitude[None], truth.attitude)[0]))
@@ -210,8 +221,8 @@ def relative_error(omega: Array, truth: Reference) -> float | None:
     """
     if len(truth.omega) == 0:
         return None
-    # Near the true solution this subtraction is exact. The digits of the reference beyond binary64
-    # then matter.
+    # Near the true solution this subtraction is exact, so that the digits of the reference beyond
+    # binary64, its `remainder`, matter.
     difference = omega - truth.omega[0]
     if truth.remainder is not None:
         difference -= truth.remainder[0]
@@ -221,17 +232,18 @@ def relative_error(omega: Array, truth: Reference) -> float | None:
 
 
 def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[float]:
-    """Yield the settings of a contender for one scene from coarse to fine.
+    """Yield the settings of a contender (solver) for one scene, from coarse to fine.
 
-    They are its tolerances or, for a fixed step, numbers of steps up to time `horizon` (s). Numbers
-    of steps grow by factors of 3/2 and 4/3. For methods of order 2 or less they grow by factors
-    of 2.
+    The settings are the contender's tolerances or, for a fixed step, numbers of steps from time 0
+    to `horizon` (s). The numbers of steps grow by factors of 3/2 and 4/3 in turn, or by factors
+    of 2 for methods of order 2 or less.
     """
     if contender.settings:
         yield from contender.settings
         return
-    # No method can take a step of 16 radians of the initial rotation. The frequencies of the torque
-    # do not count, since a fast torque may be too weak to need steps of its own.
+    # The smallest number of steps is such that the body rotates by at most 16 radians about an axis
+    # per step, at the initial omega; no method works with larger steps. The frequencies of the
+    # torque do not count, since a torque of high frequency may be too weak to require small steps.
     phase = max(map(abs, scene.omega)) * horizon / 16.0
     steps = 1 << max(1, math.ceil(math.log2(max(1.0, phase))))
     while steps <= _LARGEST_STEPS:
@@ -247,16 +259,17 @@ def _first_calls(
 ) -> tuple[list[tuple[Ready, Row]], float]:
     """Prepare the calls of one contender for one workload, and run each of them for the first time.
 
-    Return the calls that are to be timed, each with its result, and the time (s) that preparing
-    them took beyond the calls. `make` makes a call from a horizon (s) and a setting, and `truth` is
-    the reference solution. Settings that cannot be run are appended to `refused`.
+    Return the calls, each with its result, and the total time (s) of preparing them, without the
+    time of the calls themselves. `make` prepares a call for an end time (s) and a setting. `truth`
+    is the reference solution. Settings that cannot be run are appended to `refused`.
     """
     entries: list[tuple[Ready, Row]] = []
     errors: list[float | None] = []
     spent = preparing = last = before = 0.0
     for setting in ladder(contender, load.scene, load.horizon):
         named = None if contender.setting == "none" else setting
-        # The factor is bounded, because an interruption may have lengthened one of the two calls.
+        # The time of the next call is extrapolated from the last two calls. The factor is bounded,
+        # because an interruption may have lengthened one of them.
         expected = last * min(4.0, max(1.0, last / before)) if before else last
         hopeless = ""
         if expected > _LONGEST_CALL or spent + expected > _BUDGET[contender.setting]:
@@ -301,9 +314,10 @@ def _first_calls(
 
 
 def _at_rounding(errors: Sequence[float | None]) -> bool:
-    """Return whether rounding limits the errors of a contender, listed from coarse to fine steps.
+    """Return whether rounding limits the errors of a contender with ever finer steps.
 
-    This is so if the last three errors bring no improvement and the smallest error is below 1e-10.
+    `errors` are its errors from coarse to fine steps. Rounding limits them if none of the last
+    three errors is below the smallest earlier error, and if the smallest error is below 1e-10.
     """
     known = [error for error in errors if error is not None]
     return len(known) > 3 and min(known[-3:]) >= min(known[:-3]) and min(known) < 1e-10

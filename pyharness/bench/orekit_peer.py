@@ -1,4 +1,4 @@
-"""Orekit's closed form of torque-free motion, `TorqueFree`, in a Java machine in this process."""
+"""Orekit's closed form of torque-free motion, `TorqueFree`, run by Java within this process."""
 
 from importlib import import_module
 from time import perf_counter
@@ -11,16 +11,16 @@ from pyharness.compare.candidates import End, Ready
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 
-# Time (s) of the calls before the first one that counts. Java compiles frequently run code while it
-# runs.
+# Duration (s) of the calls before the first timed call. They are needed because Java compiles code
+# only after it has run often.
 WARMING = 2.0
 
 
 def orekit(scene: Scene) -> Maker:
-    """Return a `Maker` of calls of Orekit's `TorqueFree` for a scene.
+    """Return a `Maker`, which prepares timed calls, for Orekit's `TorqueFree` on a scene.
 
-    Each call sets up the motion anew, with its elliptic integrals. The setting has no effect. Raise
-    InputError if the scene has a torque or no moments, or if Java or Orekit fails.
+    Each call computes the elliptic integrals of the motion again. The setting of a call has no
+    effect. Raise InputError if the scene has a torque or no moments, or if Java or Orekit fails.
     """
     if not scene.torque.is_zero or scene.moments is None:
         raise InputError("TorqueFree does not take this scene; allowed: moments, and no torque")
@@ -30,7 +30,7 @@ def orekit(scene: Scene) -> Maker:
         vector = named("org.hipparchus.geometry.euclidean.threed.Vector3D")
         axis = named("org.orekit.attitudes.InertiaAxis")
         motion = named("org.orekit.attitudes.TorqueFree")
-        # Neither needs Orekit's data on the Earth or on leap seconds.
+        # This date and this frame need none of Orekit's data on the Earth or on leap seconds.
         begin = named("org.orekit.time.AbsoluteDate").ARBITRARY_EPOCH
         frame = named("org.orekit.frames.FramesFactory").getGCRF()
         axes = vector.PLUS_I, vector.PLUS_J, vector.PLUS_K
@@ -69,15 +69,15 @@ def _end(found: Any) -> End:
 
 
 def _machine() -> Any:
-    """Return the module JPype after starting the Java machine of this process, if necessary.
+    """Return the module JPype, after starting the Java virtual machine in this process if needed.
 
-    A process can start it only once. Raise InputError if Java or Orekit fails.
+    A process can start a Java virtual machine only once. Raise InputError if Java or Orekit fails.
     """
     try:
         # JPype's type hints declare only some of its names.
         jpype, package = map(import_module, ("jpype", "orekit_jpype"))
         if not jpype.isJVMStarted():
-            # With -Xrs Java leaves the signals to Python.
+            # With the option -Xrs Java does not handle signals, so that Python can handle Ctrl-C.
             package.initVM("-Xrs")
     except (ImportError, OSError, RuntimeError, TypeError, ValueError) as error:
         raise _unable(error) from error

@@ -1,4 +1,4 @@
-"""The report of a measurement: its tables and notes, and a page that names command and machine."""
+"""The report of a benchmark: its tables and notes, the command that made it, and the machine."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -19,13 +19,13 @@ def measured_report(
     packages: Iterable[str],
     command: str,
 ) -> Report:
-    """Return the report of a measurement, made of titled tables and notes.
+    """Return the report of a benchmark, made of titled tables and notes.
 
-    `title` is the heading of the page, with its Markdown marks. `worth` says how far the numbers
-    can be compared. `parts` are the titles and tables, and `notes` are lines of text below them.
-    `record` makes the JSON record, `data` is the table with full precision, and `pictures` makes
-    the pictures by name. `packages` are the packages whose versions are listed. `command` produces
-    the page again.
+    `title` is the heading of the page, with its Markdown marks. `worth` is a text on how far the
+    numbers can be compared. `parts` are the tables, each with its title, and `notes` are lines of
+    text below them. `record` is a function that returns the JSON record, `data` the table with full
+    precision, and `pictures` has functions that draw the pictures, by name. `packages` are the
+    packages whose versions are listed. `command` is the command that produces the page again.
     """
     here, built = machine(packages), build()
     versions = [
@@ -59,11 +59,11 @@ def measured_report(
 
 
 def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) -> list[str]:
-    """Return a line of text for each reason why contenders have no result.
+    """Return a line of text for each reason why contenders (solvers) have no result.
 
-    `reasons` are tuples (contender, reason, place), where the place is a task, with or without a
-    setting. At most the first `most` places of a contender are named. Contenders with the same
-    reason and the same places share a line.
+    `reasons` are tuples (contender, reason, task). The task may include the setting of the
+    contender, or be empty. A line names at most the first `most` tasks of a contender. Contenders
+    with the same reason and the same tasks share a line.
     """
     places: dict[tuple[str, str], list[str]] = {}
     for who, why, where in reasons:

@@ -1,4 +1,4 @@
-"""Third-party integrators in `bench`, each used in the way that its documentation calls fast."""
+"""Third-party integrators in `bench`, each used as its documentation recommends for speed."""
 
 import warnings
 from collections.abc import Callable
@@ -19,8 +19,8 @@ _SOLVE_IVP = ("DOP853", "RK45", "LSODA", "Radau")
 
 
 def peers() -> list[SceneContender]:
-    """Return all third-party contenders of `bench` for single scenes, installed or not."""
-    # 2**-52 is heyoka's default.
+    """Return all third-party solvers of `bench` for single scenes, whether installed or not."""
+    # 2**-52 is the default tolerance of heyoka.
     finest = (*TOLERANCES, 2.0**-52)
 
     def adaptive(name: str, package: str, prepare: Callable[[Scene], Maker]) -> SceneContender:
@@ -53,9 +53,9 @@ def peers() -> list[SceneContender]:
 
 
 def _heyoka(scene: Scene) -> Maker:
-    """Return a `Maker` of heyoka runs on a scene, which keeps one integrator for each tolerance.
+    """Return a `Maker`, which prepares timed calls, for the package heyoka on a scene.
 
-    A call resets the time and the state of its integrator.
+    It compiles one integrator for each tolerance. Each call resets the integrator's time and state.
     """
     import heyoka
 
@@ -98,24 +98,29 @@ def _heyoka_equations(scene: Scene) -> list[tuple[Any, Any]]:
 
 
 def _right_hand_side(scene: Scene) -> RightHandSide:
-    """Return a scene's right-hand side, for omega or for omega and attitude, on Python floats."""
+    """Return the right-hand side of a scene's equations of motion, which computes with floats.
+
+    It is for omega, or for omega and attitude if the scene has an attitude.
+    """
     slopes = scene.right_hand_side()
     return slopes if scene.attitude is None else turning(slopes)
 
 
 def _absolute(scene: Scene) -> Any:
-    """Return the magnitudes of a scene's unknowns, a number for all or an array of seven.
+    """Return the magnitudes of a scene's unknowns, by which the relative tolerance is multiplied.
 
-    The absolute tolerance is the relative tolerance times the magnitude.
+    The product is the absolute tolerance. The result is one number for the three components of
+    omega, or an array of seven numbers for omega and the quaternion of the attitude.
     """
     largest = max(map(abs, scene.omega)) or 1.0
     return largest if scene.attitude is None else np.array([largest] * 3 + [1.0] * 4)
 
 
 def _solve_ivp(name: str, scene: Scene) -> Maker:
-    """Return a `Maker` of runs on a scene by SciPy's `solve_ivp` with its method `name`.
+    """Return a `Maker`, which prepares timed calls, for SciPy's `solve_ivp` on a scene.
 
-    The runs have no dense output, and their right-hand side computes with Python floats.
+    `name` is the method of `solve_ivp`. The calls have no dense output, and their right-hand side
+    computes with Python floats.
     """
     from scipy.integrate import solve_ivp
 
@@ -149,7 +154,8 @@ def _odeint(scene: Scene) -> Maker:
         )  # fmt: skip
 
         def read(rows: Any) -> End:
-            # Counting needs an output option which the timed call does not use.
+            # The call is repeated, because counting the evaluations needs an option for additional
+            # output, which the timed call does not have.
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ODEintWarning)
                 _, told = run(full_output=True)

@@ -1,4 +1,4 @@
-"""The pictures of `bench`: error against run time and right-hand sides, and growth of errors."""
+"""The pictures of `bench`: error against run time and evaluations, and growth of errors."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -12,8 +12,9 @@ if TYPE_CHECKING:
 
     from pyharness.bench.growth import Growth
 
-_FLOOR = 2.0**-53
-# The curves can be told apart without colour: families by dashes and line width, members by marker.
+_FLOOR = 2.0**-53  # relative error of one rounding in double precision
+# The curves can be distinguished without colours: groups of solvers by dashes and line width, and
+# the solvers of a group by their markers.
 _FAMILIES: dict[str, dict[str, Any]] = {
     "ours": {"linestyle": "-", "linewidth": 1.5, "color": "#1040a0"},
     "gauss": {"linestyle": (0, (6, 1.5)), "linewidth": 0.9, "color": "#3a86c8"},
@@ -23,14 +24,15 @@ _FAMILIES: dict[str, dict[str, Any]] = {
 _MARKERS = "osD^v<>pP*Xhd8"
 _PROGRAMS = ("two-term", "four-term", "runge-kutta")
 _OURS = ("auto", "taylor", "closed-form", "rk4", "improved-euler", "taylor-3")
-# Orders whose slopes are drawn in the plots against right-hand sides.
+# Orders of convergence whose slopes are drawn in the plots of error against right-hand sides.
 _SLOPES = (2, 4, 8)
 
 
 def bench_picture(finding: Finding, data: Table) -> Picture:
-    """Draw the error of each contender against time and right-hand sides, for each workload.
+    """Draw the error of each solver against run time and against evaluations, for each workload.
 
-    Each workload has a row of two plots. `data` is the table that goes with the figure.
+    Each workload has a row of two plots: error against run time, and error against the number of
+    evaluations of the right-hand side. `data` is the table that is saved with the picture.
     """
     from matplotlib.figure import Figure
 
@@ -88,7 +90,8 @@ def _styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
             family = "program" if name.startswith(_PROGRAMS) else "peer"
         marker = _MARKERS[used[family] % len(_MARKERS)]
         used[family] += 1
-        # Markers are filled for our methods and for the programs, open for the others.
+        # Markers are filled for most of our methods and for the programs, and open for the Gauss
+        # methods and third-party solvers.
         face = _FAMILIES[family]["color"] if family in ("ours", "program") else "white"
         styles[name] = _FAMILIES[family] | {
             "marker": marker, "markersize": 5.0, "markerfacecolor": face, "markeredgewidth": 0.8,
@@ -108,9 +111,9 @@ def _frame(axes: "Axes", load: Workload, label: str) -> None:
 
 
 def draw_slopes(axes: "Axes") -> None:
-    """Draw reference slopes: the error of methods of order 2, 4 and 8 against right-hand sides.
+    """Draw lines with the slopes of methods of order 2, 4 and 8 in a plot against right-hand sides.
 
-    The slopes form a fan in the upper right corner of the plot, where no method has its results.
+    The lines form a fan in the upper right corner of the plot, where no solver has its results.
     """
     low, high = axes.get_xlim()
     begin = high * (low / high) ** 0.3
@@ -118,7 +121,7 @@ def draw_slopes(axes: "Axes") -> None:
         end = min(begin * (high / begin) ** 0.7, begin * 10.0 ** (6.0 / order))
         last = 0.5 * (end / begin) ** -order
         axes.plot([begin, end], [0.5, last], color="#909090", linewidth=1.0, zorder=0)
-        # A white background covers curves that cross the label nevertheless.
+        # The label has a white background, in case a curve crosses it.
         axes.annotate(
             f"order {order}", (end, last), (0, -2), textcoords="offset points", color="#505050",
             fontsize=8, ha="center", va="top", zorder=5,
@@ -128,9 +131,10 @@ def draw_slopes(axes: "Axes") -> None:
 
 
 def growth_picture(found: "Mapping[int, Sequence[Growth]]") -> Picture:
-    """Draw the Taylor method's error and the effect of one rounding of the time, against time.
+    """Draw the Taylor method's error, and the effect of one rounding of the time, against time.
 
-    `found` has the measured errors by case. Each case has a plot.
+    `found` has the measured errors by the number of the case. Each case has a plot. The effect of a
+    rounding, by a relative 2**-53, does not depend on the method.
     """
     from matplotlib.figure import Figure
 

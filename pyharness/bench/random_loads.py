@@ -1,7 +1,8 @@
-"""Random scenes for `bench`, by kind; no method was tuned on them.
+"""Random scenes of several kinds for `bench`; no method was tuned on them.
 
-A seed and a number determine a scene. The second reference, a Taylor series in integer arithmetic,
-computes its motion. The motion decides whether the scene is accepted or drawn again.
+A seed and a number determine a scene. Its motion is computed by a Taylor series in integer
+arithmetic, which is the second of our two reference solvers. Depending on the motion, the scene is
+accepted or drawn again.
 """
 
 import math
@@ -18,7 +19,7 @@ from pyharness.theory.conditioning import along, conditioning
 from pyharness.truth.integer_series import integer_series
 from pyharness.truth.reference import Reference
 
-MOST_GROWTH = 1e3
+MOST_GROWTH = 1e3  # limit of the error amplification of an accepted scene
 _LENGTHS = {"1 to 10 turns": 10.0, "10 to 100 turns": 100.0, "100 to 300 turns": MOST_TURNS}
 KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 
@@ -26,26 +27,27 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     """Return the random workload that a seed and a number (from 1) determine.
 
-    Successive numbers take the kinds of torque in turn. Moments are in kg m2, omega in rad/s,
-    torque in N m, the horizon in s. The solution `truth` of the workload comes from the second
-    reference, and its `kinds` are members of `KINDS`. A scene is drawn again if its error
-    amplification is `MOST_GROWTH` or more. It is also drawn again if the body turns less than once
-    or more than 300 times. If `attitude`, the scene is the same, with an attitude that starts from
-    the axes of space. The workload then has no `truth`, because the second reference does not
-    propagate the attitude.
+    Successive numbers take the kinds of torque in turn. The `kinds` of the workload are members of
+    `KINDS`, and its solution `truth` comes from the second reference, `integer_series`. Moments are
+    in kg m2, omega in rad/s, torque in N m, the horizon in s. A scene is drawn again if its error
+    amplification is `MOST_GROWTH` or more, or if the body turns less than once or more than 300
+    times. With `attitude`, the same scene also has an attitude, which starts from the axes of
+    space. The workload then has no `truth`, because the second reference does not propagate the
+    attitude.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1
     law, place = LAWS[place % len(LAWS)], place // len(LAWS)
-    # Four bodies and three speeds: twelve draws contain all pairs.
+    # There are four bodies and three speeds, so that twelve successive draws of a kind of torque
+    # contain all pairs.
     body = list(BODIES)[place % len(BODIES)]
     speed = list(SPEEDS)[place % len(SPEEDS)] if law in WAVES else ""
     name = ", ".join(filter(None, (f"{number}: {law}", speed.removesuffix(" waves"), body)))
     while True:
         scene, horizon = by_torque(source, name, law, speed, body)
         try:
-            # This estimate spares the reference the scenes far beyond the limit. The reference
-            # decides on scenes near the limit.
+            # This fast estimate rejects scenes with an amplification far above the limit. Near the
+            # limit, the solution of the reference decides.
             if conditioning(scene, horizon).amplification > 2.0 * MOST_GROWTH:
                 continue
             path = integer_series(scene, [horizon])

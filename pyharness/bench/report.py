@@ -1,4 +1,4 @@
-"""The reports of `bench`: run time against error, time saved by the plan, growth of errors."""
+"""The reports of `bench`: time against error, time that the plan saves, growth of errors."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -31,12 +31,12 @@ _DRIFT = (
 
 
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
-    """Return the report of a benchmark: a table for each workload, then the mean ratios of times.
+    """Return the report of a benchmark: a table for each workload, then mean ratios of run times.
 
-    A ratio is the baseline contender's time divided by another contender's, at the same error.
-    For random scenes the report shows the distribution of the ratios instead. The page also
-    describes the machine. `packages` are the packages whose versions are listed. `command` produces
-    the page again.
+    A ratio is the run time of the baseline solver divided by the run time of another solver at the
+    same error. For random scenes, the report shows the distributions of the ratios instead of these
+    tables. The report also describes the machine. `packages` are the packages whose versions are
+    listed. `command` is the command that produces the report again.
     """
     drawn, data = _random(finding), _data(finding)
     return measured_report(
@@ -67,9 +67,10 @@ def _spread_data(finding: Finding) -> Table:
 
 
 def _spread_parts(finding: Finding) -> list[tuple[str, Table]]:
-    """Return a title and a table for every contender at every target error, for random scenes.
+    """Return a title and a table for every solver and target error, for random scenes.
 
-    A table has the distribution of the ratios of times for each kind of scene.
+    For each kind of scene, a table has the distribution over the scenes of the baseline solver's
+    run time divided by this solver's run time.
     """
     heads = ("mean", "smallest", "25 %", "median", "75 %")
     columns = [
@@ -100,7 +101,10 @@ def _data(finding: Finding) -> Table:
 
 
 def savings_report(found: Sequence[Saving]) -> Report:
-    """Return the report of the time saved where the plan of a computation leaves out a part."""
+    """Return the report of the time saved by leaving out parts of a computation.
+
+    `found` has, for each such part, the run times with and without it.
+    """
     time = digits(".3g", 1e6)
     columns = (
         *words("skipped where"), Column("us with it", time, unit="s", full=time),
@@ -113,9 +117,9 @@ def savings_report(found: Sequence[Saving]) -> Report:
 
 
 def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
-    """Return the report of the errors of the Taylor method against time.
+    """Return the report of the Taylor method's error against the time up to which it integrates.
 
-    `found` has the measured errors by number of the case.
+    `found` has the measured errors by the number of the case of Table 1.
     """
     time, error = digits(".3g"), digits(".2g")
     columns = (
@@ -173,7 +177,7 @@ def _asked(each: Row | Refusal) -> dict[str, Any]:
 
 
 def microseconds(seconds: float | None) -> str:
-    """Return a time `seconds` (s) as text in microseconds, as 0.63, 12.3 or 1234; "-" if None."""
+    """Return a time `seconds` (s) as text in microseconds, such as 12.3; "-" if it is None."""
     if seconds is None:
         return "-"
     value = seconds * 1e6
@@ -181,7 +185,7 @@ def microseconds(seconds: float | None) -> str:
 
 
 def ratio(value: float | None) -> str:
-    """Return a ratio as text, as 0.0123, 12.3 or 1234; "-" if None."""
+    """Return a ratio as text with about three digits, such as 0.0123 or 12.3; "-" if it is None."""
     if value is None:
         return "-"
     if value >= 99.95:
@@ -193,8 +197,8 @@ def ratio(value: float | None) -> str:
 def _parts(finding: Finding) -> list[tuple[str, Table]]:
     """Return a title and a table for every workload, and for every group of workloads.
 
-    The table of a workload has times to reach the target errors. The table of a group has the
-    geometric means of the ratios of times.
+    The table of a workload has each solver's run time for each target error. The table of a group
+    has geometric means, over its workloads, of the baseline solver's time divided by each solver's.
     """
     targets = list(map(_power, TARGETS))
     columns = [Column("us per solve to", left=True)]
@@ -252,12 +256,12 @@ def _notes(finding: Finding) -> list[str]:
 
 
 def not_measured(finding: Finding) -> list[str]:
-    """Return a line of text for each reason why contenders have no result.
+    """Return a line of text for each reason why solvers have no result in `finding`.
 
     A line also names the first workloads and settings without a result for this reason.
     """
-    # Expected times and the steps at which runs ended differ from case to case. They are cut off,
-    # so that equal reasons share a line.
+    # Reasons may end with an expected time or with the step at which a run ended, which differ from
+    # case to case. These ends are removed, so that equal reasons share a line.
     came: list[tuple[Row | Refusal, str]] = [
         (each, each.reason.split(", a call would take")[0]) for each in finding.refused
     ]

@@ -1,6 +1,6 @@
-"""Time saved by leaving out the parts of a computation that a plan finds unnecessary.
+"""Time saved by leaving out the parts of a computation that its plan finds unnecessary.
 
-A computation is timed with and without such a part in the same run.
+A computation is timed with and without such a part, in interleaved batches of the same run.
 """
 
 import subprocess
@@ -18,7 +18,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled
 
-_BATCHES = 9
+_BATCHES = 9  # number of batches of calls that are timed
 _SECONDS = 2e-3  # duration of a batch
 
 
@@ -27,9 +27,9 @@ class Saving:
     """The times of one computation with and without a part that a plan can leave out."""
 
     part: str  # the part that is left out, as the plan names it
-    where: str  # the scene or program on which it is measured
-    with_it: float  # s with the part computed, median of interleaved batches
-    without: float  # s without the part, likewise
+    where: str  # the scene or program with which it is measured
+    with_it: float  # time (s) with the part, the median over interleaved batches
+    without: float  # time (s) without the part, also a median
 
     @property
     def ratio(self) -> float:
@@ -40,9 +40,10 @@ class Saving:
 def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
     """Measure the time saved by each part of a computation that a plan can leave out.
 
-    The parts are the integration, the torque as a function of time, dense output, the translational
-    velocity, and imports of SciPy and of the reference. Solutions are computed to `t_end` (s) with
-    the relative tolerance `tolerance`.
+    The parts are the integration (if there is a closed form), the torque as a function of time,
+    dense output, and the translational velocity. Further parts are the imports of SciPy and of the
+    reference solver. Solutions
+    are computed up to `t_end` (s) with the relative tolerance `tolerance`.
     """
     constant = case_scene(5)
     times = [t_end * k / 100.0 for k in range(1, 101)]
@@ -77,8 +78,8 @@ def _solver(scene: Scene, method: str, t_end: float, tolerance: float) -> Callab
 
 
 def _as_if_varying(scene: Scene) -> Scene:
-    # The rate is too small to change a bit, but it forces the kernel to evaluate the torque at each
-    # time.
+    # The rate of change of the torque is too small to change a bit of the result, but it forces the
+    # kernel to evaluate the torque at each time.
     return replace(scene, torque=replace(scene.torque, rate=(1e-300, 0.0, 0.0)))
 
 
@@ -89,8 +90,9 @@ def _python(code: str) -> None:
 def measured_saving(
     part: str, where: str, with_it: Callable[[], object], without: Callable[[], object]
 ) -> Saving:
-    """Return the times of two calls, `with_it` and `without`, as the saving of leaving out `part`.
+    """Measure the times of the functions `with_it` and `without`, and return them as a `Saving`.
 
-    `where` names the scene or program on which they are measured.
+    The functions make a computation with the part `part` and without it. `where` names the scene or
+    program with which they are measured.
     """
     return Saving(part, where, *seconds([with_it, without], _SECONDS, _BATCHES))

@@ -1,4 +1,4 @@
-"""Scores of a benchmark: time to reach an error, ratios to a baseline's time, geometric means."""
+"""Scores of solvers in a benchmark: times to reach errors, and ratios to a baseline's times."""
 
 import math
 from collections.abc import Sequence
@@ -8,53 +8,55 @@ import numpy as np
 
 from pyharness.bench.measure import TARGETS, Finding, Row, Workload
 
-# The first of these that took part is the baseline of all ratios.
+# The first of these solvers that took part in the benchmark is the baseline of all ratios.
 YARDSTICKS = ("heyoka", "solve_ivp-dop853")
 
 
 @dataclass(frozen=True)
 class Score:
-    """The times in which one contender reaches the target errors on one workload."""
+    """The times in which one contender (solver) reaches the target errors on one workload."""
 
-    method: str
-    # s, for each error in `TARGETS` the time of the fastest setting that reaches it; None if no
-    # setting does
+    method: str  # name of the contender
+    # For each error in `TARGETS`, the time (s) of the fastest setting that reaches this error; None
+    # if no setting reaches it.
     seconds: tuple[float | None, ...]
     best: float | None  # the smallest error of any setting
-    ratios: tuple[float | None, ...]  # time of the baseline over the contender's; above 1 is faster
+    # For each error, the baseline's time divided by this contender's time; it is above 1 if this
+    # contender is faster.
+    ratios: tuple[float | None, ...]
 
 
 @dataclass(frozen=True)
 class Spread:
-    """The distribution of a contender's ratios over the random scenes of one kind.
+    """The distribution of a contender's time ratios over the random scenes of one kind.
 
     A ratio is the baseline contender's time to reach the target error, divided by the time of this
     contender.
     """
 
-    method: str
-    kind: str
+    method: str  # name of the contender
+    kind: str  # kind of the scenes
     target: float  # error to be reached, measured like `Row.error`
     scenes: int  # number of scenes of this kind
-    reached: int  # number of scenes in which it and the baseline reach the error
-    mean: float | None  # geometric mean over these scenes
+    reached: int  # number of scenes in which the contender and the baseline reach the error
+    mean: float | None  # geometric mean of the ratios over these scenes
     smallest: float | None
     quartiles: tuple[float | None, float | None, float | None]
 
 
 def yardstick(finding: Finding) -> str | None:
-    """Return the name of the contender whose times are the baseline of all ratios.
+    """Return the name of the contender (solver) whose times are the baseline of all ratios.
 
-    Return None if nothing was measured.
+    Return None if no contender was measured.
     """
     names = list(dict.fromkeys(row.method for row in finding.rows))
     return next((name for name in (*YARDSTICKS, *names) if name in names), None)
 
 
 def scores(finding: Finding, load: Workload) -> list[Score]:
-    """Return the scores of all contenders on a workload.
+    """Return the scores of all contenders (solvers) on the workload `load`.
 
-    The baseline contender comes first, the others in the order of measurement.
+    The score of the baseline contender is the first; the others are in the order of measurement.
     """
     rows: dict[str, list[Row]] = {}
     for row in finding.rows:
@@ -73,9 +75,9 @@ def scores(finding: Finding, load: Workload) -> list[Score]:
 
 
 def groups(finding: Finding) -> dict[str, list[Workload]]:
-    """Return the workloads whose ratios are averaged together, by the name of their group.
+    """Return the groups of workloads over which time ratios are averaged, by the name of the group.
 
-    Groups are ordered by horizon and name.
+    The groups are ordered by the end time of the integration, and then by name.
     """
     found: dict[str, list[Workload]] = {}
     for load in finding.workloads:
@@ -84,10 +86,11 @@ def groups(finding: Finding) -> dict[str, list[Workload]]:
 
 
 def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float | None]]:
-    """Return each contender's geometric means of its ratios over the workloads `loads`.
+    """Return each contender's geometric means of its time ratios over the workloads `loads`.
 
-    A contender has a mean for each target error. It is None if the contender or the baseline does
-    not reach the error on all workloads.
+    A ratio is the baseline's time divided by the contender's. A contender has a mean for each
+    target error. The mean is None if the contender or the baseline does not reach the error on all
+    workloads.
     """
     tables = [{each.method: each.ratios for each in scores(finding, load)} for load in loads]
     names = dict.fromkeys(name for table in tables for name in table)
@@ -101,10 +104,10 @@ def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float |
 
 
 def spreads(finding: Finding, kinds: Sequence[str]) -> list[Spread]:
-    """Return the spread of each contender's ratios at each target error, for each kind of scene.
+    """Return the distribution of each contender's time ratios, by target error and kind of scene.
 
-    They are ordered by contender, error and kind. The baseline contender has no spread, because its
-    ratios are all 1.
+    `kinds` are the kinds of random scenes. The distributions are ordered by contender, error and
+    kind. The baseline contender has no distribution, because all of its ratios are 1.
     """
     tables = {
         load.label: {each.method: each.ratios for each in scores(finding, load)}

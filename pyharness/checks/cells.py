@@ -1,6 +1,7 @@
 """Checks that the Fortran programs and their Python twins agree bit for bit.
 
-They cover every cell (program, case, defects and readings) and scenes drawn at random.
+A check is made in every cell, which is a program with a case of Table 1, defects and readings.
+Further checks use scenes drawn at random.
 """
 
 from collections.abc import Iterator
@@ -28,7 +29,8 @@ _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 def cells(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks that Fortran and the Python twin agree bit for bit in every cell.
 
-    A cell is a program with a case, a subset of its defects, and a choice of its readings.
+    A cell is a program with a case of Table 1, a subset of the program's defects, and a subset of
+    its readings. If `chosen.thin` is set, as in the self-test, only a few cells are checked.
     """
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
@@ -41,14 +43,19 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
-    """Return the name of a suite's check of one cell, a listing of a program with a case."""
+    """Return the name of the check that the suite named `suite` makes of one cell.
+
+    A cell is a listing (a program with a choice of its defects and readings) and the number of a
+    case.
+    """
     return Name(suite, listing.program, f"case-{case}", listing_name(listing))
 
 
 def random_programs(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks that Fortran and the twin agree in scenes drawn from the seed.
+    """Yield deferred checks that Fortran and the Python twin agree in scenes drawn at random.
 
-    The listings and parameters of the programs are also drawn.
+    `chosen` has the seed and the number of draws. For each scene, the listing and the options of
+    the stop test are also drawn.
     """
     for number in range(chosen.draws):
         yield Attempt(chosen.drawn(number, "program"), partial(_of_draw, chosen.seed, number))
@@ -66,9 +73,9 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 def _agreement(name: Name, listing: Listing, scene: Scene, is_listed: bool, *options: Any) -> Check:
     """Return the check that Fortran and the twin agree in a scene to the last bit.
 
-    If `is_listed`, a difference in this cell is known and listed in `divergences`. The check then
-    fails if the difference no longer occurs. `options` are the constant of the stop test (1/s) and
-    whether the test may stop the run.
+    If `is_listed`, a difference in this cell is known and listed in `data/divergences.toml`. The
+    check then fails if the difference no longer occurs. `options` are the constant of the stop test
+    (1/s) and whether the test may stop the run.
     """
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))

@@ -1,4 +1,4 @@
-"""Checks: what they compare, whether they passed, and the commands that repeat them."""
+"""Checks: their names, their results, and the selection of the checks that are computed."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -8,8 +8,8 @@ from typing import Any
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 
-# The note of a check begins with this if a method could not solve the problem, or refused to exceed
-# its work limit.
+# Beginning of the note of a check if a method could not solve the problem, or if it refused to
+# exceed its work limit.
 REFUSED = "refused: "
 # Suites whose ids name the problem before the method that solves it.
 _CIRCUMSTANCE_FIRST = ("random", "external")
@@ -22,15 +22,19 @@ class Name:
     Attributes
     ----------
     suite : str
-        A kind of `verify`, or a trial of `stress`.
+        The group of the check: a kind of checks of `verify`, or a trial of `stress`.
     subject : str
         The program or method that is judged.
-    circumstance, setting, quantity : str
-        The problem; the tolerance, step size or listing; the number that is compared.
+    circumstance : str
+        The problem that is solved, as in ``case-3``.
+    setting : str
+        The tolerance, the step size, or the listing, which is a version of a program.
+    quantity : str
+        The quantity that is compared with a limit.
     command, options : str
-        The verb that makes the check, and its options beside ``--only``.
+        The verb that makes the check, and the options that repeat it in addition to ``--only``.
     scene : Scene or None
-        The input, if it is a scene that may be saved.
+        The scene of the problem, which can be saved in a file; None if there is none.
     """
 
     suite: str
@@ -44,14 +48,21 @@ class Name:
 
     @property
     def id(self) -> str:
-        """Return the non-empty parts of the name joined by slashes; ids are unique within a run."""
+        """Return the non-empty parts of the name joined by slashes; ids are unique within a run.
+
+        The order is suite, subject, circumstance, setting and quantity. In random and external
+        checks the circumstance is before the subject.
+        """
         who = self.subject, self.circumstance
         who = who[::-1] if self.suite in _CIRCUMSTANCE_FIRST else who
         return "/".join(filter(None, (self.suite, *who, self.setting, self.quantity)))
 
     @property
     def place(self) -> str:
-        """Return the circumstance, setting and quantity, joined by slashes."""
+        """Return the parts of the name after suite and subject, joined by slashes.
+
+        They are circumstance, setting and quantity. Empty parts are omitted.
+        """
         return "/".join(filter(None, (self.circumstance, self.setting, self.quantity)))
 
     @property
@@ -60,13 +71,13 @@ class Name:
         return f"python -m pyharness {self.command} --only {self.id}{self.options}"
 
     def of(self, quantity: str) -> "Name":
-        """Return the name of the check of another `quantity`, with all other parts as here."""
+        """Return this name with another `quantity`, the quantity that the check compares."""
         return replace(self, quantity=quantity)
 
     def bounded(self, value: float, limit: float, note: str = "") -> "Check":
         """Return the check that `value` does not exceed `limit`; a value of NaN fails.
 
-        `note` describes the fault or the observation in a few words.
+        `note` describes the fault or the observation in a few words, for reports.
         """
         # Values of NumPy's types occur here and can't be written as JSON.
         found, allowed = float(value), float(limit)
@@ -77,7 +88,7 @@ class Name:
     ) -> "Check":
         """Return a check whose result `passed` the caller has decided; `note` gives the reason.
 
-        `value` and `limit` are only shown in reports.
+        `value` and `limit` do not affect the result and are only shown in reports.
         """
         return Check(self, bool(passed), value, limit, note)
 
@@ -93,7 +104,7 @@ class Check:
     name: Name
     passed: bool
     value: float | None  # None if there is no single number
-    limit: float | None  # limit of `value`; None if the check is yes or no, or only describes
+    limit: float | None  # limit of `value`; None if `value` is not compared with a limit
     note: str = ""  # the fault or the observation, in a few words
     again: str = ""  # the command that repeats the check, if the name's command does not
 
@@ -124,9 +135,9 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a scene drawn at random, with the quantities that determine its limit.
+    """A check in a scene drawn at random, with its entry point, tolerance and error amplification.
 
-    They are the entry point, the tolerance and the error amplification.
+    The report groups these checks by the three quantities.
     """
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
@@ -138,8 +149,8 @@ class Sample(Check):
 class Attempt:
     """A deferred computation of the checks whose ids begin with the id of `name`.
 
-    If such a check is requested, `make` is called with `name`. It returns checks or further
-    attempts.
+    If one of these checks is requested, ``make(name)`` is called. It returns a check, or several
+    checks and further attempts.
     """
 
     name: Name
@@ -150,10 +161,10 @@ Attempts = Iterable[Check | Attempt]
 
 
 def made(attempts: Attempts, only: Sequence[str]) -> Iterator[Check]:
-    """Yield the checks of `attempts` that `only`, the leading parts of ids, requests.
+    """Yield the requested checks of `attempts`, which has finished and deferred checks.
 
-    An attempt is computed only if one of its checks is requested. Checks in `attempts` that are
-    finished already are yielded unchanged.
+    `only` has the leading parts of the requested ids. A deferred check (`Attempt`) is computed only
+    if it is requested. A finished check in `attempts` is always yielded.
     """
     for each in attempts:
         if isinstance(each, Check):
@@ -172,10 +183,10 @@ def run_suites(
 ) -> Iterator[Check]:
     """Yield the requested checks of all suites, which are computed one after another.
 
-    `suites` has, by name, functions that return attempts. `only` are the leading parts of the
-    requested ids, and `command` is the verb that makes the checks. An InputError that ends a suite
-    becomes a failed check. In the suites `of_the_user` the InputError is raised again, because it
-    is a mistake in the user's input.
+    `suites` maps the name of each suite to a function that returns the attempts of this suite.
+    `only` has the leading parts of the requested ids, and `command` is the verb that makes the
+    checks. An InputError that ends a suite becomes a failed check. In the suites `of_the_user` the
+    InputError is raised again, because it is caused by a mistake in the user's input.
     """
     for suite, attempts in suites.items():
         if not may_hold(suite, only):
@@ -191,7 +202,10 @@ def run_suites(
 
 
 def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
-    """Return, in order, the names of the suites that may contain a check requested by `only`."""
+    """Return the names in `suites` that may contain a requested check, in the same order.
+
+    `only` has the leading parts of the requested ids.
+    """
     return [suite for suite in suites if may_hold(suite, only)]
 
 
@@ -217,8 +231,9 @@ def selected(id: str, only: Sequence[str]) -> bool:
 
 
 def may_hold(id: str, only: Sequence[str]) -> bool:
-    """Return whether `only` may request a check whose id is `id` or begins with it.
+    """Return whether `only` may request a check whose id is `id` or begins with `id`.
 
-    Attempts and suites are computed only if this is true of their names.
+    `only` has the leading parts of the requested ids. An attempt or a suite is computed only if the
+    result for its name is true.
     """
     return selected(id, only) or any(each.startswith(id + "/") for each in only)

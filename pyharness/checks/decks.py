@@ -1,8 +1,9 @@
 """Checks of the Fortran port against the decks, which are compiled from the author's own cards.
 
-The decks are a third, independent path from the cards to the numbers, besides the Fortran port and
-the Python twins. TAPE5 is compared bit for bit and the page as text, in every case. An overflow
-ends a run of the port. The deck continues after an overflow, and its numbers must not be finite.
+A deck is the Fortran program that the punched cards of one listing form. Its results do not depend
+on the Fortran port or on the Python twins. In every case, the file of results TAPE5 is compared bit
+for bit, and the printed page as text. An overflow ends a run of the port. The deck continues after
+an overflow, but must not produce finite values of omega.
 """
 
 from collections.abc import Iterator
@@ -28,9 +29,9 @@ _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/
 
 
 def listings(program: str) -> list[Listing]:
-    """Return the listings of a program to check: original, corrected, and with one change of these.
+    """Return the versions of a program to check: original, corrected, and each with one change.
 
-    The changes are each defect alone kept, each defect alone corrected, and each reading in both.
+    The change activates or corrects a single defect or conjecture, or activates a single reading.
     """
     names = frozenset(switches(program))
     found = [original(program), corrected(program)]
@@ -42,9 +43,10 @@ def listings(program: str) -> list[Listing]:
 
 
 def decks(chosen: Selection) -> Iterator[Check]:
-    """Yield checks that every deck gives the same TAPE5 and page as the Fortran port.
+    """Yield checks that every deck gives the same file TAPE5 and the same page as the Fortran port.
 
-    Yield nothing if there is no compiler. `verify` then reports that the decks were not run.
+    A deck is the source text of a program on the author's own cards. Yield nothing if there is no
+    Fortran compiler. `verify` then reports that the decks were not run.
     """
     asked = [
         (of_cell("decks", listing, case), listing, case)
@@ -86,10 +88,10 @@ def _held(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
 
 
 def _after(deck: Run, steps: int, overflowed: bool) -> list[str]:
-    """Return the faults of the deck's records after the last row of the port, number `steps`.
+    """Return texts that describe faults in the deck's records after the last row of the port.
 
-    If the port overflowed, there must be such records, without finite omegas. Otherwise there must
-    be no further records.
+    The port has `steps` rows. If the port overflowed, the deck must have further records, none of
+    which has three finite components of omega. Otherwise the deck must have no further records.
     """
     rest = deck.tape5[steps:]
     if not overflowed:

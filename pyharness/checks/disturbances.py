@@ -1,7 +1,7 @@
 """Propagation of small perturbations by a step of each program, measured by running it.
 
 The measurements are compared with `pyharness.theory.amplification`, which derives the same
-quantities from the schemes, without the programs.
+quantities from the schemes, without running the programs.
 """
 
 from collections.abc import Callable, Sequence
@@ -38,18 +38,21 @@ _WEIGHTS = {"two-term": 3.0, "four-term": 15.0}
 
 @dataclass(frozen=True)
 class Probe:
-    """One quantity, measured on a program and derived, with a bound on the difference.
+    """A vector or matrix, measured on a program and derived by theory, with an error bound.
 
-    The difference may be due to rounding alone. The quantity is a vector or a matrix.
+    The bound on the difference allows for rounding errors alone, because the theory is exact.
     """
 
-    found: Array
-    derived: Array
-    limit: float
+    found: Array  # as measured
+    derived: Array  # of the same shape
+    limit: float  # bound on the absolute difference of two elements
 
     @property
     def difference(self) -> float:
-        """Return the largest difference of two elements; NaN if one is not finite."""
+        """Return the largest absolute difference of a measured and a derived element.
+
+        The result is not finite if an element is not finite.
+        """
         return float(np.abs(self.found - self.derived).max())
 
 
@@ -68,7 +71,10 @@ def held_steady(coefficients: Triple, omega: Triple, step: float) -> Scene:
 
 
 def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
-    """Return the exact Jacobian of equations 13-15 at `omega`, times the scene's step size."""
+    """Return the Jacobian of equations 13-15 at `omega`, times the scene's step size, in fractions.
+
+    The equations are Euler's equations of the thesis, and the Jacobian is exact.
+    """
     a, b, c = (Fraction(each) * Fraction(scene.step_size) for each in scene.euler_coefficients)
     x, y, z = map(Fraction, omega)
     return [[Fraction(0), a * z, a * y], [b * z, Fraction(0), b * x], [c * y, c * x, Fraction(0)]]
@@ -82,9 +88,10 @@ def eigenvalues(scene: Scene) -> Array:
 def first_step(scene: Scene, listing: Listing) -> Probe:
     """Return the derivative of a program's first step at a steady rotation, measured and derived.
 
-    It is the derivative of omega after the step with respect to omega before it. It is measured by
-    differences. The step is a polynomial of known degree, so that differences with enough
-    neighbours have no error except rounding. It is derived from the amplification matrix.
+    It is the derivative of omega after the step with respect to omega before the step, a 3 x 3
+    matrix. The measured matrix consists of differences between steps from neighbouring omegas. The
+    step is a polynomial of known degree, so that differences with enough neighbours have no error
+    except rounding. The derived matrix follows from the amplification matrix.
     """
 
     def stepped(omega: Array) -> Array:
@@ -101,9 +108,10 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 def later_steps(scene: Scene, listing: Listing) -> Probe:
     """Return a spinning top's perturbation after all steps of a scene, measured and derived.
 
-    C and the torque are zero. omega3 is the spin, and omega1 and omega2 are the perturbation. The
-    equations are then linear, so that the perturbation may be of any size. The derived perturbation
-    is the initial one, multiplied by the amplification matrix in every step.
+    The coefficient C and the torque are zero. omega3 is the spin, and omega1 and omega2 are the
+    perturbation. The equations are then linear, so that the perturbation may be of any size. The
+    derived perturbation is the initial perturbation, multiplied by the amplification matrix in
+    every step.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
@@ -126,7 +134,8 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
     """Return the growth factor of a collocation step on x' = z x, measured and derived.
 
-    The factor is measured with the Python twin, in step number `step` of a run with steps of 1 s.
+    The measured factor is computed by the Python twin, in step number `step` of a run with steps of
+    1 s. The derived factor is an element of the amplification matrix.
     """
     program = listing.program
     moved = _moved(listing, step)
@@ -147,10 +156,10 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
 def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
 
-    z is the step size times an eigenvalue of a spinning top, in the direction -1 or 1j. The
-    distance is measured by bisection over runs of the program. If the program keeps a second vector
-    from step to step, growth is measured by the change from step to step. Otherwise the constant
-    part of omega would hide the growth.
+    z is the step size times an eigenvalue of the equations of a spinning top. It has the direction
+    -1 or 1j from 0. The distance is measured by bisection over runs of the program. If the program
+    keeps a second vector from step to step, growth is measured by the change of omega from step to
+    step. Otherwise the constant part of omega would hide the growth.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -181,20 +190,21 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
 
 
 def _moved(listing: Listing, step: int) -> float:
-    """Return the factor by which `dt-accumulates` has moved the collocation points of a step.
+    """Return the factor by which a defect has moved the collocation points of a step.
 
-    `step` is the number of the step. The factor is 1 for a listing without this defect.
+    The defect is `dt-accumulates`, and the factor is 1 for a listing without it. `step` is the
+    number of the step, from 1.
     """
     return float(step) if listing.has("dt-accumulates") else 1.0
 
 
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
-    """Return the derivative of a collocation step at a moving state, measured and derived.
+    """Return the derivative of a collocation step at an unsteady omega, measured and derived.
 
-    It is measured with the Python twin, in step number `step` of a run, at the scene's omega, which
-    is no steady rotation. With the step size h, the step gives omega + h F + h**2/2 J F + w h**3
-    Q(F). F is the right-hand side, J is its Jacobian, and Q is its quadratic part. Only the weight
-    w depends on the positions of the collocation points.
+    The derivative is measured with the Python twin, in step number `step` of a run. It is taken at
+    the scene's omega, which is no steady rotation. With the step size h, omega after the step is
+    omega + h F + h**2/2 J F + w h**3 Q(F). F is the right-hand side, J is its Jacobian, and Q is
+    its quadratic part. Only the weight w depends on the positions of the collocation points.
     """
     program, h = listing.program, scene.step_size
     moved = _moved(listing, step)
@@ -225,11 +235,12 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
 def _differentiated(
     stepped: Callable[[Array], Array], omega: Sequence[float], count: int
 ) -> tuple[Array, float, float]:
-    """Return the derivative of a step, the distance of its neighbours, and a rounding factor.
+    """Return the derivative of a step by differences, their reach, and a rounding factor.
 
-    `stepped` maps omega before the step to omega after it, and the derivative is taken at `omega`.
-    There are `count` pairs of neighbours along each axis, up to the returned distance (rad/s). The
-    factor tells how far the differences amplify the rounding error of a step.
+    `stepped` maps omega before the step to omega after the step, and the derivative is taken at
+    `omega`. There are `count` pairs of neighbouring omegas along each axis. The reach is the
+    distance from `omega` to the farthest neighbour (rad/s). The factor is the ratio of the rounding
+    error of the derivative to the rounding error of a step.
     """
     base = np.array(omega)
     reach = _REACH * float(np.abs(base).max())
@@ -246,11 +257,11 @@ def _differentiated(
 
 
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
-    """Return a bound on the rounding error of each omega in a step, in units of 2**-53.
+    """Return a bound on the rounding error of each omega in a step, in units of 2**-53 rad/s.
 
-    `sizes` are bounds of abs(omega) before the step. `moved` is the factor by which the collocation
-    points have moved. Every rounding belongs to a term of the step that is no larger than the same
-    term with all signs positive.
+    `sizes` are bounds of abs(omega) before the step. `moved` is the factor by which a defect has
+    moved the collocation points. Every rounding belongs to a term of the step that is no larger
+    than the same term with all signs positive.
     """
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":

@@ -20,10 +20,11 @@ _SAMPLES = 20_000
 class Divergence:
     """The smallest step size (s) for which runs diverge, as found by running and as predicted.
 
-    `found` is the smallest step with which a component of omega exceeds twice its bound on the
-    solution, or overflows. It is 0 if this already happens with the smallest step that is tried.
-    `predicted` is the smallest step with which, by linear stability, the wobble about axis 3
-    doubles. `limit` is the largest allowed difference of the two, relative to `predicted`.
+    `found` is the smallest step with which a component of omega overflows, or exceeds twice its
+    largest magnitude in the solution. It is 0 if this already happens with the smallest step that
+    is tried. `predicted` is the smallest step with which, by linear stability, the wobble about
+    axis 3 doubles. `limit` is the largest allowed difference of `found` and `predicted`, relative
+    to `predicted`.
     """
 
     found: float
@@ -36,9 +37,9 @@ def divergence(
 ) -> Divergence:
     """Compare the step size at which runs of a spinning body diverge with the prediction.
 
-    The scene has no torque, and the body spins about a stable axis 3 for `time` (s). `runner` runs
-    a scene by a method, and `matrix` is the amplification matrix of the method's step. `smallest`
-    (s) is the smallest step that is tried.
+    The body has no torque, and spins about a stable axis 3 for `time` (s). `runner` runs a scene by
+    a method, and `matrix` is the amplification matrix of the method's step. `smallest` is the
+    smallest step size that is tried (s).
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -61,11 +62,12 @@ def divergence(
 
 
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
-    """Return the smallest step (s) with which omega exceeds twice its bound on the solution.
+    """Return the smallest step (s) with which a run exceeds twice the largest true omega.
 
+    Each component of omega is compared with twice its own largest magnitude in the true solution.
     `runner` runs the scene until `time` (s). The number of steps is found by bisection. Return 0 if
-    omega exceeds twice the bound even with the step `smallest` (s). Return infinity if it does not
-    do so with any step.
+    a component exceeds this bound even with the step `smallest` (s). Return infinity if no
+    component exceeds it with any step.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 
@@ -89,9 +91,9 @@ def _doubling(
 ) -> float:
     """Return the smallest step (s) with which a wobble grows by the factor 2 exp(`missed`).
 
-    `matrix` is the amplification matrix of a step, `rate` the angular frequency of the wobble
-    (1/s), and `time` (s) the duration of the growth. The step is found by bisection from `smallest`
-    (s) on.
+    `matrix` is the amplification matrix of a step, `rate` is the angular frequency of the wobble
+    (1/s), and `time` (s) is the duration of the growth. The step is found by bisection between
+    `smallest` (s) and `time`.
     """
     wanted = math.log(2.0) + missed
 

@@ -1,8 +1,8 @@
 """Checks of every method against published results that were not computed here.
 
-A check passes if the difference from the published number is at most the sum of three terms. They
-are the accuracy of the published number, the error that the method may have, and the effect of
-rounding the numbers of the problem to binary64.
+A check passes if the difference from the published number is at most the sum of three terms. The
+terms are the accuracy of the published number, the error that the method may have, and the effect
+of rounding the input numbers of the problem to binary64.
 """
 
 import math
@@ -42,7 +42,8 @@ _HALF_ULP = 2.0**-53
 # A number is rounded when it is read, and once more when a method uses it.
 _ROUNDING = 2.0 * _HALF_ULP
 _STEP_ASIDE = 2.0**-30
-# These must solve every problem that any method solves: a choice of method, and a formula.
+# Methods that must solve every problem that any method solves: `auto` chooses a suitable method,
+# and `closed-form` evaluates a formula.
 _MAY_NOT_REFUSE = ("auto", "closed-form")
 
 _Row = TypeVar("_Row")
@@ -53,10 +54,12 @@ _Result = tuple[Array, float]
 
 
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
-    """Yield checks of every method that can take a problem against its published results.
+    """Yield checks that compare every method with the published results of each problem.
 
-    The ids of the checks are ``external/<problem>/<time>/<method>``. Value and limit are in the
-    problem's unit, for the component of omega with the largest ratio of value to limit.
+    A method that can't take a problem is left out. The ids of the checks are
+    ``external/<problem>/<time>/<method>``. Value and limit are in the problem's unit, for the
+    component of omega with the largest ratio of value to limit. `only` has the leading parts of the
+    requested ids.
     """
     for problem in problems:
         # Times of one sign are solved together, so that a replay of one check gives the same bits.
@@ -76,9 +79,9 @@ def _names(
 ) -> list[tuple[int, Name]]:
     """Return the index in `values`, and the name, of each requested check of a method.
 
-    `values` are the published results by time, and `only` the leading parts of requested ids.
-    `quantity` is the last part of the ids, if it is not empty. Return an empty list if the method
-    can't take the problem.
+    `values` are the published results by time, and `only` has the leading parts of the requested
+    ids. `quantity` is the last part of the ids, if it is not empty. Return an empty list if the
+    method can't take the problem.
     """
     given = "" if problem.path is None else f" --external {shlex.quote(problem.path)}"
     places = [f"{problem.name}/{value.time}" for value in values]
@@ -94,8 +97,9 @@ def _names(
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
     """Return the check of a method that has no result at the time of `value`.
 
-    `refusal` is the message of the method, or empty if its run ended before that time. A refusal
-    passes for a problem from a user's file, because its times may take the method too long.
+    `refusal` is the message of the method, or empty if its run ended before that time. For a
+    problem from a user's file a refusal passes, because its times may take the method too long.
+    `auto` and `closed-form` may not refuse.
     """
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
@@ -106,8 +110,8 @@ def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
 def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
     """Yield checks of every method that propagates attitudes against the published attitudes.
 
-    Their values are angles (rad). The limit is the sum of the published accuracy, the tolerance,
-    and the effect of rounding the numbers of the problem.
+    The value of a check is the angle between the two attitudes (rad). The limit is the sum of the
+    published accuracy, the tolerance, and the effect of rounding the input numbers of the problem.
     """
     scene, times = problem.scene, [float(value.time) for value in values]
     for method in (name for name in _SOLVED if REGISTRY[name].attitude and values):
@@ -137,8 +141,8 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
     """Return the change of attitude that rounding the numbers of a scene causes at each time (rad).
 
-    It is computed like the changes of omega in `_moves`. Where the scene can't be solved, only the
-    rounding of the quaternions is counted.
+    The change is computed like the change of omega in `_moves`. If the scene can't be solved, only
+    the rounding of the quaternions is counted.
     """
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows
@@ -178,11 +182,11 @@ def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Ite
 def _as_far_as_solved(
     solve: Callable[[Sequence[Value]], list[_Row]], values: Sequence[Value]
 ) -> tuple[list[_Row], str]:
-    """Return the results of `solve` for as many values as possible, and a refusal.
+    """Return the results of `solve` for as many values as possible, and the message of a refusal.
 
-    All published values are solved together. If that is refused, they are solved one by one up to
-    the first refusal, because an earlier time may be within the work limit. The refusal is its
-    message, or empty if there was none.
+    All published values are first solved together. If this is refused, they are solved one by one
+    up to the first refusal, because an earlier time may be within the work limit. The message is
+    empty if nothing was refused.
     """
     try:
         return solve(values), ""
@@ -212,9 +216,9 @@ def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Re
 
 
 def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
-    """Return whether a method can take a scene at these times (s) at all.
+    """Return whether a method can solve a scene at these times (s), whatever the tolerance.
 
-    Programs run only forward, and `closed-form` and `quick` take only some scenes.
+    Programs integrate only forward in time, and `closed-form` and `quick` solve only some scenes.
     """
     if method == "closed-form":
         return closed_form(scene) is not None
@@ -260,7 +264,8 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
         if rows.ier is not None and rows.ier.any():
             # LEQT1F declares the matrices of tiny steps singular. The program then has order 1.
             break
-        # With steps that are far too long, a motion may overflow that does not with shorter ones.
+        # With steps that are far too long, a run may overflow, although it does not with shorter
+        # steps.
         ended = rows.ended
         omega = rows.omega[-1] if ended == "complete" else None
         if omega is not None and before is not None:
@@ -289,7 +294,7 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
             distance = abs(float(Decimal(float(omega[axis]) / factor) - figure.value))
             limit = figure.accuracy + float(error + rounding[axis]) / factor
             judged.append((distance, limit, f"w{axis + 1}, {unit}"))
-    # NaN counts as the worst, but comparisons do not show it.
+    # A difference of NaN counts as the worst, although every comparison with NaN is false.
     worst = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
     distance, limit, note = worst
     return name.bounded(distance, limit, note)
@@ -306,8 +311,8 @@ def _scale(scene: Scene, omega: Array) -> float:
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
     """Return the change of omega caused by rounding the numbers of a scene (rad/s), by time.
 
-    The times are those of the published values, as printed. The change is zero at a time that no
-    solution reaches, so that this time has no allowance. The method's own check reports the reason.
+    The keys are the times of the published values, as printed. The change is set to zero at a time
+    that no solution reaches. The check of the method then reports the reason.
     """
 
     def solve(values: Sequence[Value]) -> list[Array]:
@@ -326,8 +331,9 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
 def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
     """Return the change of omega caused by rounding the numbers of a scene and its times (rad/s).
 
-    The solutions are by `method`. The changes caused by each number alone are computed to first
-    order and added. Rows after the end of the motion are zero.
+    The changes caused by each number alone are computed to first order, from solutions by `method`,
+    and their magnitudes are added. The result has a row for each time, which is zero after the end
+    of the motion.
     """
     moved = np.zeros((len(times), 3))
     run = method_candidate(method, METHODS[method].finest).rows

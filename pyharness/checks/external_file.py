@@ -1,7 +1,7 @@
 """Published results that were not computed here, and the files that describe them.
 
-A file contains a scene in the format of a scene file, the source of the published numbers, and
-their printed digits. The accuracy of a number is read from its digits.
+A file contains a scene in the format of a scene file, the source of the published numbers, and the
+digits of these numbers as printed. The accuracy of a number is derived from its digits.
 """
 
 import math
@@ -29,7 +29,7 @@ _LONGEST_PRINT = 100
 
 @dataclass(frozen=True)
 class Figure:
-    """A published number with its accuracy."""
+    """A published number as text and as a decimal number, with a bound on its error."""
 
     print: str  # its digits as printed
     value: Decimal  # the value of these digits
@@ -48,7 +48,7 @@ class Pointing:
 
 @dataclass(frozen=True)
 class Value:
-    """The omega and the attitude that are published for one time."""
+    """The results that are published for one time: omega, an attitude, or both."""
 
     time: str  # time as printed (s); taken as exact
     # angular velocity in the unit of the problem, None where nothing is printed
@@ -75,9 +75,9 @@ class Problem:
 def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
     """Return the published number with the digits `text`, and its accuracy.
 
-    The accuracy is half a unit of the last digit, or `good_to`, the error that the source states,
-    if that is larger. Raise InputError, with `where` in front of its message, if `text` is not the
-    text of a number, or is too large for binary64.
+    The accuracy is half a unit of the last digit, or `good_to` if that is larger. `good_to` is the
+    error that the source states. Raise InputError, with `where` in front of its message, if `text`
+    is not the text of a number, or is too large for binary64.
     """
     if not isinstance(text, str):
         raise InputError(f"{where}: {kind_of(text)}; allowed: the digits as text, '0.606'")

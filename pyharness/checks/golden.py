@@ -81,8 +81,9 @@ def golden(chosen: Selection) -> Iterator[Attempt]:
 
     Programs and methods with a fixed step must agree with the record to the last bit. Methods that
     state an error must agree within twice this error, because processors and compilers may round
-    their operations differently. If sine and cosine come from another mathematical library than for
-    the record, results under a torque with waves may differ by rounding.
+    their operations differently. If sine and cosine come from another mathematical library than in
+    the record, results under a torque with waves may differ by rounding. Yield nothing if there is
+    no folder of the record.
     """
     if not chosen.record.is_dir():
         return
@@ -131,7 +132,7 @@ def _held(each: Recorded, entry: dict[str, Any] | None, same_library: bool, name
 
 
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return the files of the golden record in `folder`, by program or method.
+    """Return the contents of each file of the golden record in `folder`, by program or method.
 
     Raise InputError if a file is not a valid record.
     """
@@ -208,9 +209,9 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
 
 
 def _digest(rows: Array, run: Trajectory) -> str:
-    """Return a digest of every bit of the rows, and of IER if the run has it.
+    """Return a SHA-256 digest of every bit of the rows, and of IER if the run has this error code.
 
-    All NaNs count as one bit pattern.
+    All NaNs count as one bit pattern. The digest is shortened to 32 hexadecimal digits.
     """
     digest = hashlib.sha256(np.where(np.isnan(rows), np.nan, rows).astype("<f8").tobytes())
     if run.ier is not None:
@@ -219,12 +220,15 @@ def _digest(rows: Array, run: Trajectory) -> str:
 
 
 def _rows(entry: dict[str, Any]) -> Array:
-    """Return the rows of an entry of the golden record, with the step number in column 0."""
+    """Return the recorded rows of an entry of the golden record as an array.
+
+    The columns are step number, time, TIME, omega and, for programs, translational velocity.
+    """
     return np.array([[float(row[0]), *map(float.fromhex, row[1:])] for row in entry["rows"]])
 
 
 def _moved(old: dict[str, Any], new: dict[str, Any]) -> str:
-    """Describe how two entries of a trajectory differ, `old` and `new`.
+    """Return a text that describes how the entries `old` and `new` of one trajectory differ.
 
     Differences of numbers are in units in the last place.
     """

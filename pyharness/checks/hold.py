@@ -47,7 +47,7 @@ from pyharness.truth.reference import reference
 OURS = ("closed-form", "taylor", "gauss-2", "gauss-4", "gauss-8")
 ALL = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_STEP)
 _SERIES = ("taylor", "auto", "prepared-auto")
-_TOO_MANY_RADIANS = 1e8  # of a wave; the limit for a series
+_TOO_MANY_RADIANS = 1e8  # phase of a torque wave beyond which a Taylor series may refuse
 _ROWS = 10  # rows of a program's run that are compared with the true solution
 FORMS = ("closed-form", "auto")
 
@@ -56,8 +56,8 @@ def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Tru
     """Return the true omega of a scene at `time` (s), with its error bound and conditioning.
 
     `flow` is the conditioning of the scene up to `time`; it is computed if it is not given. For a
-    body with known moments and no torque, the solution consists of elliptic functions. Otherwise
-    the reference computes it.
+    body with known moments and no torque, the solution consists of elliptic functions. For any
+    other scene, `pyharness.truth.reference` computes the solution.
     """
     flow = flow or conditioning(scene, time)
     if not _is_free(scene):
@@ -74,8 +74,8 @@ def _is_free(scene: Scene) -> bool:
     return scene.torque.is_zero and scene.moments is not None
 
 
-# A function from the true solution, a tolerance and a name to the checks of one method. The
-# tolerance is None for runs in the scene's own steps.
+# A function that returns the checks of one method, from the true solution, a tolerance and the name
+# of the checks. The tolerance is None for runs with the scene's step size.
 Judged = Callable[[Truth, float | None, Name], Iterable[Check]]
 
 
@@ -84,11 +84,11 @@ def hold_all(
     held: Callable[[Name, float], Iterable[Attempt]] | None = None,
     has_programs: Callable[[Circumstance], bool] = lambda each: True,
 ) -> Iterator[Attempt]:
-    """Yield deferred checks of all methods in the extreme scenes of the suite.
+    """Yield deferred checks of all methods in the extreme scenes of the trial named `suite`.
 
-    The function `held` yields the checks for a name and a time (s); by default it is `hold`. In the
-    scenes for which `has_programs` is true, the errors of the programs are reported, without a
-    limit.
+    ``held(name, time)`` yields the checks in the scene of `name` at `time` (s); by default it is
+    `hold`. In the scenes for which `has_programs` is true, the errors of the programs of the thesis
+    are also reported, without a limit.
     """
     for each in EXTREMES[suite]():
         name = named(suite, "", each.name, scene=each.scene)
@@ -107,15 +107,16 @@ def hold(
 ) -> Iterator[Attempt]:
     """Yield deferred checks of the error of each method at `time` (s) in the scene of `name`.
 
-    `truth` computes the true solution. `tolerances` returns the tolerances at which a method is
-    tried, by default those of `affordable`. `judged` makes the checks of one method at one
-    tolerance.
+    `methods` has the names of the methods. `truth` computes the true solution. `tolerances` returns
+    the tolerances at which a method is tried, by default those of `affordable`. `judged` makes the
+    checks of one method at one tolerance.
 
-    By default, the limit of the error is the sum of three terms. They are the errors that the
-    method promises to make and rounding, both multiplied by the error amplification, and the error
-    of the true solution. If fewer than two digits are left, no limit is set. The errors of energy
-    and momentum without torque always have a limit, because the flow does not amplify them. A
-    method fails if it refuses a scene that it must take.
+    By default, the limit of the error is the sum of three terms. The first term is the error that
+    the method promises to make, and the second is rounding. The error amplification multiplies
+    both. The third term is the error of the true solution. If the sum leaves fewer than two digits
+    of omega, no limit is set. Without torque, the errors of energy and momentum always have a
+    limit, because the flow does not amplify them. A method fails if it refuses a scene that it must
+    take.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -132,11 +133,11 @@ def hold(
 
 
 def run_method(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
-    """Return omega at `time` (s) by the method `name`, with how the run ended.
+    """Return omega at `time` (s) by the method `name`, and how the run ended, as an `End`.
 
-    If the tolerance is None, the method uses the scene's own steps. It then runs as a prepared
-    solver, as `auto` and `quick` always do. A prepared solver may report a refusal in the result.
-    Any other refusal raises InputError.
+    If the tolerance is None, the method uses the scene's step size and runs as a prepared solver.
+    The methods `auto` and `quick` always run as prepared solvers. A prepared solver may report a
+    refusal in the result. Any other refusal raises InputError.
     """
     if name in ("auto", "quick") or tolerance is None:
         return prepared_candidate(name, tolerance or 1.0).end(scene, time)
@@ -148,12 +149,13 @@ def _steps(scene: Scene, time: float) -> int:
 
 
 def refusable(tried: Tried, truth: Truth, why: str) -> bool:
-    """Return whether a method may refuse the scene of `tried`; every other refusal is a fault.
+    """Return whether a method may refuse a scene; every other refusal is a fault.
 
-    `why` is the message of the refusal and does not matter here. `closed-form` may refuse where
-    there is no closed form. `quick` may refuse every scene, because it needs A, B and C other than
-    0, and leaves scenes with too many steps to the Taylor series. The series may refuse torques
-    whose waves run through so many radians that it would take too long.
+    `tried` has the method and the scene, and `truth` is the true solution. `why` is the message of
+    the refusal and does not matter here. `closed-form` may refuse a scene that has no closed form.
+    `quick` may refuse every scene, because it requires that A, B and C are not 0 and that few steps
+    suffice. Methods that use the Taylor series may refuse a torque with a wave whose phase exceeds
+    1e8 radians, because they would take too long.
     """
     method, scene = tried.method, tried.scene
     if method == "closed-form":
@@ -166,8 +168,9 @@ def refusable(tried: Tried, truth: Truth, why: str) -> bool:
 def _derived(truth: Truth, tried: Tried) -> float | None:
     """Return the limit of a method's error: promised errors and rounding, amplified by the flow.
 
-    The limit is relative to the largest omega. It is None if the method promises no error, and
-    infinite if fewer than two digits are left. The limit of a closed form is not amplified.
+    `tried` is the run of the method. The limit is relative to the largest omega. It is None if the
+    method promises no error, and infinite if it would leave fewer than two digits of omega. The
+    limit of a closed form is not amplified.
     """
     made = made_on_the_way(tried, truth)
     if truth.exact and tried.method in FORMS:
@@ -183,11 +186,14 @@ def _derived(truth: Truth, tried: Tried) -> float | None:
 
 
 DERIVED = Policy(_derived, refusable)
-"""Policy that grants the errors that a method promises and rounding, amplified by the flow."""
+"""Policy whose limit is the promised error of a method plus rounding, amplified by the flow."""
 
 
 def _roundings(tried: Tried, truth: Truth) -> float:
-    """Return the number of times that the run of `tried` rounds omega without compensation."""
+    """Return the number of steps in which a run rounds omega without compensated summation.
+
+    `tried` is the run, and `truth` is the true solution of the same scene.
+    """
     method, answer = tried.method, tried.answer
     if tried.tolerance is None:
         return 0.0 if method in GAUSS else float(_steps(tried.scene, truth.end))
@@ -209,7 +215,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
             # Each step rounds omega, its sums, and the last iteration.
             lost += 4.0 * ROUNDING * _steps(scene, truth.end)
         total = (made or 0.0) + lost
-        # An error of omega changes the conserved quantities by no more than itself.
+        # The result of `conserved` is at most the error of omega.
         limit = DERIVED.limit(truth, tried)
         most = min(math.inf if limit is None else limit, total + total * total)
         found = conserved(scene, answer.omega[-1], truth.flow.largest)
@@ -223,10 +229,11 @@ def scene_of(name: Name) -> Scene:
 
 
 def made_on_the_way(tried: Tried, truth: Truth) -> float | None:
-    """Return the sum of the errors that a method promises to make in its steps.
+    """Return the bound that a method promises on the sum of the errors of its steps.
 
-    The sum is relative to the largest omega. It follows from the order for a method with a fixed
-    step and no torque. Otherwise it is the tolerance, or None if the method has no tolerance.
+    The bound is relative to the largest omega. For a method with a fixed step in a scene without
+    torque, it follows from the order of the method. In all other cases it is the tolerance of the
+    run, or None if the run has no tolerance.
     """
     if tried.method in FIXED_STEP and truth.exact:
         radians = speed(tried.scene, truth.flow.largest) * abs(truth.end)
@@ -236,12 +243,12 @@ def made_on_the_way(tried: Tried, truth: Truth) -> float | None:
 
 
 def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
-    """Return the smallest relative error of `omega` that explains its change of energy or momentum.
+    """Return the smallest error of `omega` that explains its drift of energy and momentum.
 
     The error is relative to `largest`, the largest abs(omega) of the motion (rad/s). Energy and
     squared momentum are sums of q w**2, where w are the components of omega, and q are the moments
     or their squares. An error e of every component changes such a sum by at most 2 e times the sum
-    of q abs(w). An error of at least e is therefore needed to cause the change that was found.
+    of q abs(w). The change of the sum that was found therefore requires an error of at least e.
     """
     assert scene.moments is not None
     if not np.isfinite(omega).all():
@@ -263,8 +270,8 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 def describe_programs(name: Name) -> Iterator[Attempt]:
     """Yield deferred checks that report, without a limit, the largest error of each program.
 
-    The programs, original and corrected, run over the steps of the scene in `name`. The error of
-    omega is relative to the largest omega, and is taken at some ten of these steps.
+    The programs of the thesis, original and corrected, run over the steps of the scene in `name`.
+    The error of omega is relative to the largest omega, and is taken at about ten of the steps.
     """
     scene = scene_of(name)
     every = max(1, scene.steps // _ROWS)
@@ -290,6 +297,9 @@ def describe_programs(name: Name) -> Iterator[Attempt]:
 
 
 def apart(found: Array, wanted: Array) -> float:
-    """Return the largest difference between two arrays in the rows that both have."""
+    """Return the largest absolute difference between elements of two arrays.
+
+    Only the rows that both arrays have are compared.
+    """
     n = min(len(found), len(wanted))
     return float(np.abs(found[:n] - wanted[:n]).max(initial=0.0))

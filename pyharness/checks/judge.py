@@ -1,4 +1,4 @@
-"""The judgement of a method's answer by the true solution, within the limit of a policy."""
+"""The comparison of a method's result with the true solution, and the limits of the error."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -17,29 +17,33 @@ from pyharness.model.trajectory import Array
 from pyharness.theory.conditioning import LIVELY, Conditioning, conditioning
 from pyharness.truth.reference import reference
 
-# Beyond this error the linearised flow says little.
+# Relative error beyond which the linearised flow no longer predicts the error.
 LINEAR = 0.01
-# Relative to the largest omega. A limit of this size says nothing.
+# Relative to the largest omega. A limit of this size is no restriction, because two vectors omega
+# of this magnitude differ by no more.
 MOST = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The answer of a method: results for the last of the times, or the reason of its refusal."""
+    """A method's answer: results at all requested times or the last one, or why it refused.
+
+    The answer has no rows if the method refused, or if its rows are not those that were requested.
+    """
 
     omega: Array = field(default_factory=lambda: np.empty((0, 3)))  # shape (n, 3), rad/s
     attitude: Array | None = None  # shape (n, 4), where it was requested
-    ended: str = "complete"
+    ended: str = "complete"  # how the run ended
     steps: int = 0
-    evaluations: int | None = None
-    refusal: str = ""  # why the method refused the scene
+    evaluations: int | None = None  # number of right-hand sides, if it is counted
+    refusal: str = ""  # why the method refused the scene; empty if it did not
     is_whole: bool = True  # whether the method reached the last time, with every row
 
 
 def of_end(method: str, end: End) -> Answer:
-    """Return the answer that a call of `method` for one time gave; `end` is the call's result.
+    """Return the answer of `method` for one time; `end` is the result of its call as an `End`.
 
-    If the status of a prepared solver says that it refused, the answer is a refusal.
+    If the status of a prepared solver reports that it refused, the answer is a refusal.
     """
     if end.is_refused:
         return Answer(refusal=f"{method}: {end.ended}")
@@ -49,9 +53,9 @@ def of_end(method: str, end: End) -> Answer:
 
 
 def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answer:
-    """Run a candidate at all times (s) and return its answer.
+    """Run a candidate, a method with its tolerance, at all `times` (s) and return its answer.
 
-    The answer has attitudes if the scene has one. It is not whole if rows are missing.
+    The answer has attitudes if the scene has one. If rows are missing, `is_whole` is false.
     """
     run = candidate.rows(scene, list(times))
     has_rows = run.has_all_rows and run.time.tolist() == list(times)
@@ -64,7 +68,7 @@ def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answe
 class Tried:
     """A run of a method on a scene, which `ask` makes when the answer is first needed.
 
-    `tolerance` is None if the method uses the scene's own steps.
+    `tolerance` is None if the method uses the scene's step size.
     """
 
     method: str
@@ -82,22 +86,26 @@ class Tried:
 
 
 def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> Tried:
-    """Return a run of a method of the registry by `solve` at all times (s), made when judged."""
+    """Return a deferred run of the method `method` by `solve`, with results at all `times` (s).
+
+    The run is made when its answer is first needed.
+    """
     ask = method_candidate(method, tolerance)
     return Tried(method, tolerance, scene, lambda: of_rows(ask, scene, times))
 
 
 def by_end(method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float) -> Tried:
-    """Return a run of a candidate at one time (s), made when judged.
+    """Return a deferred run of a candidate, a method or a prepared solver, until one `time` (s).
 
-    `method` is the name of the method in the policy and in messages of refusal.
+    The run is made when its answer is first needed. `method` is the name of the method in the
+    policy and in messages of refusal.
     """
     return Tried(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The true solution of a scene at some times, and the conditioning of the flow until then.
+    """The true solution of a scene at some times, and the conditioning until the last time.
 
     Attributes
     ----------
@@ -106,15 +114,17 @@ class Truth:
     error : float
         Bound on the error of any component of `omega` (rad/s).
     flow : Conditioning
-        Error amplification and rounding up to the last time.
+        Error amplification and rounding errors up to the last time.
     attitude, angle_error : ndarray of shape (n, 4) or None, float
-        The attitude if it is judged, and a bound on its error (rad).
+        The true quaternions, if attitudes are compared instead of omega, and a bound on their error
+        (rad).
     is_signed : bool
         Whether the sign of a quaternion counts, although both signs give the same rotation.
     data : float
-        Change of omega by the rounding of A, B and C, over the largest abs(omega).
+        Change of omega caused by the rounding of A, B and C, divided by the largest abs(omega).
     exact : bool
-        Whether there is no torque, so that `data` and the conserved quantities are known.
+        Whether the solution is a closed form without torque. Then `data` is known, and energy and
+        momentum are conserved.
     """
 
     time: Array
@@ -134,11 +144,11 @@ class Truth:
 
     @property
     def relative_error(self) -> float:
-        """Return the bound on the error of the true omega, over the largest omega."""
+        """Return the bound on the error of the true omega, divided by the largest abs(omega)."""
         return self.error / (self.flow.largest or 1.0)
 
     def error_of(self, answer: Answer) -> float:
-        """Return the largest error of an answer: of its attitudes, if they are judged, or of omega.
+        """Return the largest error of an answer: of its attitudes if compared, else of its omegas.
 
         The error of an attitude is an angle (rad). The error of omega is relative to the largest
         omega. Return NaN if a row of the answer contains NaN.
@@ -156,8 +166,9 @@ class Truth:
 
 
 def unknown_flow(largest: float) -> Conditioning:
-    """Return a conditioning without useful bounds, for closed forms, which need no bounds.
+    """Return a conditioning with infinite error amplification, for closed forms.
 
+    The limits of closed forms do not depend on the error amplification, so that it is not computed.
     `largest` is the largest abs(omega) (rad/s).
     """
     return Conditioning(math.inf, MOST, MOST, MOST, largest)
@@ -169,7 +180,7 @@ def reference_truth(
     effort: float | None = None,
     flow: Conditioning | None = None,
 ) -> Truth:
-    """Return the reference's solution as the true solution at all times (s).
+    """Return the true solution of a scene at all `times` (s) by the high-precision reference.
 
     `effort` is a factor on the work limit of the reference. `flow` is the conditioning up to the
     last time, which is computed if it is not given. Raise InputError if the solution does not reach
@@ -186,17 +197,22 @@ def reference_truth(
 
 @dataclass(frozen=True)
 class Policy:
-    """A rule for judging answers: the largest error that passes, and the refusals that pass."""
+    """A rule for judging answers: the limit of the error, and the refusals that pass.
+
+    `limit` takes the true solution and the run. `may_refuse` takes the run, the true solution and
+    the message of the refusal.
+    """
 
     limit: Callable[[Truth, Tried], float | None]
     may_refuse: Callable[[Tried, Truth, str], bool] = lambda *_: False
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
-    """Return the largest error that passes: the method's own, rounding and the true solution's.
+    """Return the limit of a method's error: errors of its steps, rounding, and the truth's error.
 
-    `made` is the sum of the errors that a method makes in its steps, relative or as an angle (rad).
-    `growth` is the error amplification granted to `made`. `steps` is the number of times that the
+    The limit is relative to the largest omega, or an angle (rad) if attitudes are compared. `made`
+    is the sum of the errors that the method makes in its steps, in the same unit. `growth` is the
+    error amplification by which `made` is multiplied. `steps` is the number of times that the
     method rounds omega.
     """
     if truth.attitude is not None:
@@ -205,7 +221,7 @@ def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> flo
 
 
 def lively(growth: float) -> float:
-    """Return the factor granted to a tolerance: `growth` if it exceeds `LIVELY`, else 1.
+    """Return the factor on a tolerance in a limit: `growth` if it exceeds `LIVELY`, else 1.
 
     `growth` is the error amplification of the flow.
     """
@@ -215,7 +231,8 @@ def lively(growth: float) -> float:
 def linear(limit: float) -> float:
     """Return an error limit unchanged, or infinity if it exceeds `LINEAR`.
 
-    In this case the linearised flow leaves fewer than two digits.
+    If errors exceed `LINEAR`, the linearised flow does not predict them, and omega has fewer than
+    two correct digits.
     """
     return limit if limit <= LINEAR else math.inf
 
@@ -227,21 +244,22 @@ def tolerance_of(tried: Tried) -> float:
 
 
 def has_no_form(tried: Tried, truth: Truth, why: str) -> bool:
-    """Return whether the refusal of a scene passes; `why` is its message.
+    """Return whether a method may refuse the scene of `tried` with the message `why`.
 
     `closed-form` may refuse a scene that has no closed form. `quick` may refuse a scene if one of
-    the coefficients A, B and C is 0.
+    the coefficients A, B and C is 0. The true solution `truth` does not matter.
     """
     if tried.method == "quick":
-        # The unknowns of `quick` need all three products.
+        # `quick` requires that A, B and C are not 0.
         return why == "quick: refused" and not all(tried.scene.euler_coefficients)
     return tried.method == "closed-form" and closed_form(tried.scene) is None
 
 
 def _granting(factor: Callable[[float], float]) -> Callable[[Truth, Tried], float]:
-    """Return a limit for a policy: the tolerance times ``factor(K)``, plus rounding.
+    """Return the limit function of a policy: the tolerance times ``factor(K)``, plus rounding.
 
-    K is the error amplification of the flow. The error of the true solution is added too.
+    K is the error amplification of the flow. The limit also contains the error of the true
+    solution.
     """
     return lambda truth, tried: allowed(
         truth, tolerance_of(tried), factor(truth.flow.amplification)
@@ -249,21 +267,22 @@ def _granting(factor: Callable[[float], float]) -> Callable[[Truth, Tried], floa
 
 
 AS_STATED = Policy(_granting(lambda growth: 1.0), has_no_form)
-"""Policy that grants the tolerance itself, plus rounding amplified by the flow."""
+"""Policy whose limit is the tolerance itself, plus rounding amplified by the flow."""
 IF_CALM = Policy(_granting(lively))
-"""Policy that grants the tolerance, plus rounding amplified by the flow.
+"""Policy whose limit is the tolerance, plus rounding amplified by the flow.
 
-The tolerance is amplified too if perturbations grow a thousandfold.
+The tolerance is multiplied by the error amplification only if this exceeds `LIVELY`.
 """
 AMPLIFIED = Policy(_granting(lambda growth: growth))
-"""Policy that grants the tolerance plus rounding, both amplified by the flow."""
+"""Policy whose limit is the tolerance plus rounding, both amplified by the flow."""
 
 
 def judge(name: Name, tried: Tried, truth: Truth, policy: Policy) -> Check:
     """Return the check that the error of a method's answer is within the limit of the policy.
 
-    If the method refused, the check passes if the policy permits the refusal. If the policy sets no
-    limit, the error is only reported. A closed form fails if it solves a scene that has none.
+    `tried` is the run that gives the answer, and `truth` is the true solution. If the method
+    refused, the check passes if the policy permits the refusal. If the policy sets no limit, a
+    finite error is only reported. `closed-form` fails if it solves a scene that has no closed form.
     """
     answer = tried.answer
     if answer.refusal:

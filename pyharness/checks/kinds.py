@@ -1,7 +1,7 @@
 """The kinds of checks of `verify`; the first part of a check's id is its kind.
 
-Some kinds compare the results of Fortran and Python bit for bit. Others compare results with the
-true solution, or with recorded results.
+Some kinds compare the results of Fortran and Python bit for bit. Other kinds compare results with
+the true solution, or with recorded results.
 """
 
 from collections.abc import Callable, Iterator
@@ -38,7 +38,8 @@ KINDS: dict[str, Callable[[Selection], Attempts]] = {
     # Fortran against the Python twin for every program, case, listing and reading: the bits of the
     # whole trajectory, the counters, and where the stop test ended the run.
     "cells": cells,
-    # Binary64 in our own arithmetic against the processor's, and test vectors of the CDC.
+    # Our own arithmetic of machine words: test vectors of the CDC, binary64 against the processor,
+    # and the compiled programs against the Python twins in other words.
     "words": words,
     # The decks, compiled from the author's own cards, against the Fortran port: TAPE5 and the
     # page.
@@ -55,21 +56,24 @@ KINDS: dict[str, Callable[[Selection], Attempts]] = {
     # The power with which the error decreases as the step is halved. Corrected programs are
     # compared with `solve_ivp`, methods with a fixed step with the reference.
     "orders": orders,
-    # Programs, methods and attitudes in scenes drawn from a seed, half of them of the kinds in
-    # `NASTY`.
+    # Programs, methods and attitudes in scenes drawn from a seed, half of them of the difficult
+    # kinds in `NASTY`.
     "random": lambda chosen: chain(
         random_programs(chosen), random_methods(chosen), random_attitudes(chosen)
     ),
     # Methods and programs against published results that were not computed here.
     "external": _external,
-    # Trajectories as they were recorded.
+    # Trajectories against those in the golden record, which an earlier run has written.
     "golden": golden,
 }
-# These kinds read files of the user.
+# These kinds read files that the user may specify.
 _OF_THE_USER = ("external", "golden")
 
 
 def verify(chosen: Selection) -> Iterator[Check]:
-    """Yield the checks that `chosen` requests, which are computed one after another."""
+    """Yield the checks that `chosen` requests, a `Selection`.
+
+    The checks are computed one after another, as they are requested from the iterator.
+    """
     suites = {kind: partial(attempts, chosen) for kind, attempts in KINDS.items()}
     return run_suites(suites, chosen.only, "verify", _OF_THE_USER)

@@ -1,7 +1,8 @@
-"""Checks of methods against the reference in every case, for omega and attitude.
+"""Checks of methods against the high-precision reference in the cases of Table 1.
 
-Methods are run by `solve` and as prepared solvers. A tolerance applies to the error relative to the
-largest omega, or to the angle in radians.
+Omega and attitude are compared. Methods are run by `solve` and as prepared solvers. A tolerance
+applies to the error of omega relative to the largest omega, or to the angle of the attitude error
+in radians.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -29,7 +30,7 @@ START: Quaternion = (0.5, -0.1, 0.7, 0.5)
 # Times (s): one far after the times of the cases, and the times for prepared solvers.
 _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
-# Methods that state an error, and those among them that also propagate the attitude.
+# Methods with a tolerance, and those among them that also propagate the attitude.
 _SOLVED = tuple(name for name in METHODS if METHODS[name].finest < 1.0 and name != "reference")
 _TURNED = tuple(name for name in _SOLVED if METHODS[name].attitude)
 _PREPARED = ("auto", "taylor", "quick", "closed-form")
@@ -37,9 +38,9 @@ _PREPARED_TURNED = ("auto", "taylor")
 
 
 def methods(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of omega, by every method that states an error, against the reference.
+    """Yield deferred checks of omega, by every method with a tolerance, against the reference.
 
-    Each case is compared at all its times and at one later time.
+    In each case of Table 1, omega is compared at all times of the case and at one later time.
     """
     for case in cases(chosen):
         scene = case_scene(case)
@@ -49,7 +50,8 @@ def methods(chosen: Selection) -> Iterator[Attempt]:
 def prepared(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of prepared solvers against the reference, forward and back in time.
 
-    In the scene's own steps, prepared solvers are compared bit for bit with the kernel.
+    Methods with a fixed step and Gauss collocation use the scene's step size. Their prepared
+    solvers are compared bit for bit with a run of the method that is not prepared.
     """
     for case in cases(chosen):
         scene = case_scene(case)
@@ -61,7 +63,7 @@ def prepared(chosen: Selection) -> Iterator[Attempt]:
 
 
 def attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of attitudes against the reference in every case.
+    """Yield deferred checks of attitudes against the reference in every case of Table 1.
 
     Every method that propagates the attitude is tried, by `solve` and as a prepared solver.
     """
@@ -74,7 +76,10 @@ def attitudes(chosen: Selection) -> Iterator[Attempt]:
 
 
 def cases(chosen: Selection, thin: Sequence[int] = (4, 5)) -> Sequence[int]:
-    """Return the numbers of the cases in which checks are made; in the self-test, return `thin`."""
+    """Return the numbers of the cases of Table 1 in which checks are made.
+
+    They are all cases, or `thin` if `chosen` is the selection of the self-test.
+    """
     return thin if chosen.thin else list(case_numbers())
 
 
@@ -105,10 +110,10 @@ def _prepared(
 
 
 def solve_tried(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> Tried:
-    """Return a run of a method by `solve` at all times (s), made when judged.
+    """Return a deferred run of a method by `solve`, with results at all `times` (s).
 
-    With attitude, a method of SciPy takes the finest tolerance that it can meet, if `tolerance` is
-    finer.
+    If the scene has an attitude and `tolerance` is too fine for a method of SciPy, the finest
+    tolerance that the method can meet is used instead.
     """
     if method in SCIPY_METHODS and scene.attitude:
         # SciPy's methods can't be requested to have so small an error over a long time.
@@ -117,9 +122,10 @@ def solve_tried(method: str, tolerance: float, scene: Scene, times: Sequence[flo
 
 
 def call_tried(method: str, tolerance: float, scene: Scene, time: float) -> Tried:
-    """Return a call of a prepared solver at one time (s), made when judged.
+    """Return a deferred call of a prepared solver with a result at one `time` (s).
 
-    Another call with another initial omega comes first, which must leave no trace.
+    Before this call, the solver is called with another initial omega, which must not affect the
+    result.
     """
     prepare = attitude_candidate if scene.attitude else prepared_candidate
     return by_end(method, prepare(method, tolerance, primed=True), tolerance, scene, time)
@@ -130,9 +136,10 @@ def _judged(tried: Callable[[], Tried], truth: Callable[[], Truth], name: Name) 
 
 
 def _same_steps(scene: Scene, name: Name) -> Check:
-    """Check that a prepared solver and the kernel itself give the same bits after 100 steps.
+    """Check the bits of a prepared solver that makes 100 steps of the scene's step size.
 
-    Both use the scene's own steps.
+    They must be those of `solve` for a method with a fixed step, and those of a direct call of the
+    kernel for Gauss collocation.
     """
     method, time = name.subject, 100.0 * scene.step_size
     found = prepared_candidate(method, 1.0).end(scene, time).omega

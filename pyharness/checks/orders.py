@@ -58,7 +58,7 @@ def _of_program(scene: Scene, truth: Callable[[], Reference], name: Name) -> Che
 def _of_velocity(scene: Scene, truth: Callable[..., Reference], name: Name) -> Check:
     def run(scene: Scene) -> Array:
         velocity = program_candidate(corrected(name.subject), may_stop=False).rows(scene).velocity
-        # A run without velocity counts as a run without rows, which never settles.
+        # A run without velocity counts as a run without rows, for which no order can be determined.
         return np.empty((0, 3)) if velocity is None else velocity
 
     due = PROGRAM_REGISTRY[name.subject].order
@@ -76,8 +76,8 @@ def _of_method(scene: Scene, truth: Callable[[], Reference], name: Name) -> Chec
 def judged_order(name: Name, found: Order) -> Check:
     """Return the check that a measured order is at most `_ORDER_SLACK` below the expected one.
 
-    The check also passes if the error is rounding error before an order can be observed. It fails
-    if the order can't be determined for another reason.
+    The check also passes if the error is as small as rounding before an order can be observed. It
+    fails if the order can't be determined for another reason.
     """
     missing = None if found.value is None else found.due - found.value
     passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK
@@ -85,7 +85,10 @@ def judged_order(name: Name, found: Order) -> Check:
 
 
 def _by_ivp(scene: Scene) -> Reference:
-    """Return the solution of `solve_ivp` as a true solution, accurate to its finest tolerance."""
+    """Return the solution of a scene by `solve_ivp`, as the true solution of the order checks.
+
+    Its error is estimated as the finest tolerance that `solve_ivp` meets, times the largest omega.
+    """
     tolerance = 1.01 * finest(_IVP, scene, scene.times()[-1])
     run = method_candidate(_IVP, tolerance).rows(scene)
     largest = float(np.abs(run.omega).max())

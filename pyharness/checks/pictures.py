@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from pyharness.checks.trials.length import Drift
 
-_FLOOR = 1e-18  # smaller values, and 0, are drawn here
+_FLOOR = 1e-18  # smaller values, and 0, are drawn at this value
 _TOP = 3.0
 _COLORS = {"fine": "#1040a0", "coarse": "#c02020", "steps": "#107040", "original": "#806000"}
 _MARKERS = {"error": "o", "drift": "v"}
@@ -30,11 +30,12 @@ _COARSE = 1e-6
 
 
 class _Mark(NamedTuple):
-    """A check as a mark in a picture: its method, its circumstance and its series.
+    """A check as a mark in a picture: its method, its circumstance and its series of marks.
 
-    `kind` is the part of the circumstance before its first number. `rank` is ``coarse`` or ``fine``
-    if the setting is a tolerance, and otherwise the setting itself. `what` is ``error`` or
-    ``drift`` if the check compares one of these, and otherwise empty.
+    `kind` is the part of the circumstance's name before its first number. The series is given by
+    `rank` and `what`. `rank` is ``coarse`` or ``fine`` if the setting is a tolerance, and otherwise
+    the setting itself. `what` is ``error`` or ``drift`` if the check compares one of these, and
+    otherwise empty.
     """
 
     method: str
@@ -56,17 +57,17 @@ def _mark(check: Check) -> _Mark:
     kind = re.split(r"[-^]?\d", name.circumstance, maxsplit=1)[0].rstrip("-")
     rank = name.setting or name.quantity
     with suppress(ValueError):
-        # Tolerances that differ form one series.
+        # All coarse tolerances form one series of marks, and all fine tolerances form another.
         rank = "coarse" if float(rank) >= _COARSE else "fine"
     what = name.quantity if name.quantity in _MARKERS else ""
     return _Mark(name.subject, kind, name.circumstance, rank, what, check)
 
 
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
-    """Return a picture of a trial's checks: values and limits, in a panel for each method.
+    """Return a picture of the checks of a trial: values and limits, in a panel for each method.
 
-    Circumstances whose names begin alike are drawn side by side, in the order in which they were
-    tried. Raise InputError if no check has a value.
+    On the horizontal axis, circumstances whose names begin alike are adjacent, in the order in
+    which they were tried. Raise InputError if no check has a value.
     """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -188,7 +189,8 @@ _OF_METHODS: dict[str, dict[str, Any]] = {
 def length_picture(found: Sequence["Drift"]) -> Picture:
     """Return a picture of errors in energy and phase against the number of steps.
 
-    There is a column of panels for each motion.
+    `found` has the errors for each motion, method and quantity. There is a column of panels for
+    each motion.
     """
     from matplotlib.figure import Figure
 
@@ -246,8 +248,9 @@ _LEAST = 1e-13
 def regions_picture(found: Regions) -> Picture:
     """Return a picture of the regions of stability in the plane of z.
 
-    z is the step size times an eigenvalue of the linearised equations. A second panel shows the
-    growth of a perturbation in a step along the imaginary axis.
+    z is the step size times an eigenvalue of the linearised equations. `found` has the region of
+    each program. A second panel shows the growth of a perturbation in a step, for z on the
+    imaginary axis.
     """
     from matplotlib.figure import Figure
 

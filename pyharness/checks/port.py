@@ -1,6 +1,7 @@
 """Checks of a port, an implementation of the programs in any language, against the twins.
 
-The results must agree bit for bit in all cells. `docs/how-to/ports.md` describes the protocol.
+The results must agree with those of the Python twins bit for bit, in all combinations of program,
+case and listing. `docs/how-to/ports.md` describes the protocol.
 """
 
 import math
@@ -29,8 +30,8 @@ Cell = tuple[str, Listing, int]
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
     """Return name, listing and case number of the requested cells.
 
-    A cell is a program with a case, defects and readings. `cells` are leading parts of names of
-    cells; if it is empty, all cells of the programs and cases are requested.
+    A cell is a program with a case, defects and readings. `cells` has the leading parts of names of
+    cells. If it is empty, all cells of the programs and cases are requested.
     """
     return [
         (cell_name(listing, case), listing, case)
@@ -42,10 +43,11 @@ def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[st
 
 
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[Check]:
-    """Yield checks that a port gives the same bits as the twins; `command` starts the port.
+    """Yield checks that a port gives the same bits as the Python twins in the given cells.
 
-    An invalid answer is a failed check and ends the comparison. `patience` is the longest time to
-    wait for an answer (s). Raise InputError if `command` is empty.
+    `command` is the command that starts the port. An invalid answer is a failed check and ends the
+    comparison. `patience` is the longest time to wait for an answer (s). Raise InputError if
+    `command` is empty.
     """
     verb = f"python -m pyharness verify --port {shlex.quote(command)}"
     name, again = Name("port", "start"), verb
@@ -69,10 +71,11 @@ def _held(name: Name, process: PortProcess, listing: Listing, scene: Scene) -> C
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
-    """Describe the differences of a port's answer from the twin; empty if there are none.
+    """Return texts that describe how a port's answer differs from the run of the Python twin.
 
-    They are the first row that differs, the number of rows, how the run ended, where the stop test
-    ended it, and the first IER that differs.
+    The texts report the first row that differs, the number of rows, how the run ended, where the
+    stop test ended it, and the first error code IER that differs. The list is empty if nothing
+    differs.
     """
     wanted, given = _rows(twin), answer.rows
     found = []

@@ -1,6 +1,7 @@
 """The process of a port, an implementation of the programs that answers requests line by line.
 
-The port must answer within a time limit. It is always ended, with all processes that it started.
+The port must answer within a time limit. In any case the port is ended, together with all processes
+that it started.
 """
 
 import contextlib
@@ -118,10 +119,10 @@ class PortProcess:
             file.close()
 
     def ask(self, line: bytes) -> bytes:
-        """Send a request to the port and return its answer, both one line without a line feed.
+        """Send the request `line` to the port and return its answer, each without a line feed.
 
-        Raise PortError if the port does not answer in time, ends, or writes too much or a second
-        line.
+        An answer is one line. Raise PortError if the port does not answer in time, if it ends, or
+        if it writes too much or a second line.
         """
         end = time.monotonic() + self._patience
         rest = line + b"\n"

@@ -34,7 +34,7 @@ class Answer:
     stop : Stop or None
         The step, variable and quotient at which the Lipschitz test stopped the run, if it did.
     ier : list of int, or None
-        IER of each step; None for a program that prints none.
+        The error code IER of the linear solver in each step; None for a program that prints none.
     """
 
     rows: Array
@@ -48,8 +48,8 @@ def request(
 ) -> bytes:
     """Return the line that requests a run from a port; its decimals reproduce floats exactly.
 
-    `lipschitz` is the constant of the stop test (1/s), by default its value in the decks. Without
-    `may_stop` the test does not end the run.
+    `lipschitz` is the constant of the stop test (1/s), by default the constant in the author's
+    decks. If `may_stop` is false, the test does not end the run.
     """
     asked = {
         "schema": SCHEMAS["port request"],
@@ -63,7 +63,7 @@ def request(
 
 
 def asked_scene(scene: Scene) -> dict[str, Any]:
-    """Return a scene as the dictionary that a request sends to a port."""
+    """Return a scene as the dictionary for the field `scene` of a request to a port."""
     return {
         **scene_record(scene),
         "masses": scene.masses,
@@ -136,9 +136,10 @@ def _whole(where: str, value: object) -> int:
 
 
 def _number(where: str, value: object) -> float:
-    """Return the value of a JSON number, or of one in text form: hexadecimal, decimal, inf, nan.
+    """Return the value of a JSON number, or of a number written as JSON text.
 
-    Raise PortError, with `where` in front of its message, if `value` is neither.
+    The text may be hexadecimal, decimal, inf or nan. Raise PortError, with `where` in front of its
+    message, if `value` is no such number or text.
     """
     if type(value) is float:
         return value

@@ -2,9 +2,9 @@
 
 The true omega comes from `integer_series`, and the true attitude from `reference`. Methods are run
 through every entry point, by `solve` and as prepared solvers. A tolerance applies to the error of
-omega at the requested times, or to the angle (rad). The error of omega is relative to the largest
-omega from 0 to the last of these times. If the motion amplifies perturbations K times, rounding
-alone causes errors of 2e-15 K.
+omega at the requested times, or to the angle of the attitude error (rad). The error of omega is
+relative to the largest omega from 0 to the last requested time. If the motion amplifies
+perturbations K times, rounding alone causes errors of 2e-15 K.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -39,10 +39,10 @@ from pyharness.scenes.random_scenes import Draw, draw
 from pyharness.theory.conditioning import along
 from pyharness.truth.integer_series import integer_series
 
-# A pair of draws has a plain scene and one of the kinds in `NASTY`. Methods are tried in one of 4
-# pairs, because the true solution costs more than the methods. Methods in Python or in decimal
-# arithmetic cost more than the true solution, and are tried in one of 60 pairs. Attitudes are tried
-# in one of 20 draws.
+# Of each pair of draws, one has a plain scene, and the other a scene of a kind in `NASTY`. Methods
+# are tried in one of 4 pairs, because the true solution takes longer than the methods. Methods in
+# Python or in decimal arithmetic take longer than the true solution, and are tried in one of 60
+# pairs. Attitudes are tried in one of 20 draws.
 _EVERY, _EVERY_SLOW, _EVERY_ATTITUDE = 4, 60, 20
 _EFFORT = 0.05  # factor on the work limit of the reference, for an attitude
 ROUNDING = 2e-15  # relative, for an error amplification of 1
@@ -75,16 +75,15 @@ def may_refuse(tried: Tried, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse the scene of `tried` with the message `why`.
 
     The automatic choice of a method may not refuse. A closed form may refuse only scenes near the
-    limits of the range of numbers. Any other method may refuse a scene of the kinds `_MAY_REFUSE`,
-    or one whose error amplification exceeds `_CALM`. `quick` may refuse every scene, and a method
-    of SciPy may refuse a tolerance that is too fine for it.
+    limits of the range of binary64. Any other method may refuse a scene of the kinds `_MAY_REFUSE`,
+    whose motion may diverge, or a scene whose error amplification exceeds `_CALM`. `quick` may
+    refuse every scene. A method of SciPy may refuse a tolerance that is too fine for it.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
         return False
     if method == "closed-form":
-        # A perturbation may be too small for its square to be a number, far from every ordinary
-        # scale.
+        # Far from ordinary scales, the square of a perturbation may underflow.
         return kind == "extreme"
     if kind in _MAY_REFUSE or truth.flow.amplification > _CALM or method == "quick":
         return True
@@ -103,17 +102,17 @@ def _limit(truth: Truth, tried: Tried) -> float:
 
 
 POLICY = Policy(_limit, may_refuse)
-"""Policy that grants the tolerance, plus `ROUNDING` times the error amplification.
+"""Policy whose limit is the tolerance plus `ROUNDING` times the error amplification.
 
-The tolerance is multiplied by the error amplification where that exceeds `LIVELY`.
+The tolerance is multiplied by the error amplification only if this exceeds `LIVELY`.
 """
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
     """Yield deferred checks of omega, by every entry point, against the true omega of each draw.
 
-    The draws come from the seed of `chosen`. A draw without a true solution yields one finished
-    check, which passes if the scene is of the kinds `_MAY_REFUSE`.
+    The draws come from the seed of `chosen`. If a draw has no true solution, a single check reports
+    this, and passes if the scene is of the kinds `_MAY_REFUSE`.
     """
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
@@ -137,8 +136,9 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
 def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks that compare attitudes with the true attitude in random scenes.
 
-    The attitudes come from the automatic choice of a method, from the Taylor series and from a
-    prepared solver. Draws without a usable true solution are left out.
+    The attitudes are computed by the automatic choice of a method, by the Taylor series and by a
+    prepared solver. A draw is left out if the true attitude can't be computed, or if rounding
+    leaves it no digit.
     """
     tolerance_at = METHODS["taylor"].finest
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
@@ -168,10 +168,10 @@ def _requested(chosen: Selection, number: int, entrances: Entrances) -> Entrance
 
 
 def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
-    """Return the calls to try in draw number `number`, by the subject of their checks.
+    """Return a deferred run for each entry point, in draw number `number`, by its name in the ids.
 
-    SciPy's methods and the reference are slow. They are tried in few draws, and in none with
-    `thin`, which the self-test sets.
+    SciPy's methods and the reference are slow. They are tried in few draws, and in no draw if
+    `thin` is set, as in the self-test.
     """
     forms = ["closed-form"] if closed_form(drawn.scene) else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
@@ -208,7 +208,8 @@ def _sampled(
 def _sample(tried: Callable[[], Tried], truth: Truth, policy: Policy, name: Name) -> Sample:
     """Run an entry point and return the check of its error, within the limit of the policy.
 
-    The check also has the tolerance and the error amplification, which determine its limit.
+    `tried` makes the run. The check also has the tolerance and the error amplification of the run,
+    for the report.
     """
     one = tried()
     found, tolerance = judge(name, one, truth, policy), tolerance_of(one)

@@ -9,7 +9,7 @@ from pyharness.model.records import build_record
 from pyharness.model.report import Column, Line, Report, Section, Table, counted, short, words
 
 _MOST_FAILURES = 50
-_FEW = 10  # number of checks up to which each one is shown
+_FEW = 10  # up to this number of checks, passed checks are shown too
 _GROUPS = (
     *words("checks"), Column("made"), Column("failed"), Column("worst/limit", short),
 )  # fmt: skip
@@ -47,8 +47,8 @@ def summary(
 ) -> list[Section]:
     """Return the printed sections: title, failures, a table of groups of checks, and verdict.
 
-    A group has the checks whose ids share their first `depth` parts. The section `more` is printed
-    between the table and the verdict.
+    A group consists of the checks whose ids have the first `depth` parts in common. The section
+    `more` is printed between the table and the verdict.
     """
     groups: dict[str, list[Check]] = {}
     for check in checks:
@@ -63,13 +63,13 @@ def summary(
 def told_singly(checks: Sequence[Check]) -> list[str]:
     """Return lines that show each failed check, with the command that repeats it.
 
-    At most `_MOST_FAILURES` are shown. If there are no more than `_FEW` checks, the lines also show
-    those that passed.
+    At most `_MOST_FAILURES` failed checks are shown. If `checks` has at most `_FEW` elements, the
+    lines also show the checks that passed.
     """
     failed = [check for check in checks if not check.passed]
     lines = []
     for check in failed[:_MOST_FAILURES]:
-        # The replay is never shortened, because it is there to be copied.
+        # The command is never shortened, so that it can be copied.
         lines += [f"FAILED {check.id}{_seen(check, ' > ')}", Line(f"  {check.replay}")]
     if len(failed) > _MOST_FAILURES:
         lines.append(f"... and {len(failed) - _MOST_FAILURES} more; --format json tells all")
@@ -95,10 +95,11 @@ _SAMPLES = (
 def samples(checks: Sequence[Check], rounding: float) -> Section:
     """Return a table of the worst ratio of error to tolerance, by entry point and tolerance.
 
-    Only checks of random scenes count. `rounding` is the relative rounding error for an error
-    amplification of 1. Before division by the tolerance, `rounding` times the error amplification
-    is subtracted from the error. For each of three ranges of the error amplification, the table has
-    the number of checks with a result, and the worst ratio among them.
+    Only checks in random scenes (`Sample`) are counted. `rounding` is the relative rounding error
+    for an error amplification of 1. Before division by the tolerance, `rounding` times the error
+    amplification is subtracted from the error. The table has columns for three ranges of the error
+    amplification. For each range it shows the number of checks with a result, and the worst ratio
+    among these checks.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:

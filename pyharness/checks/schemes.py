@@ -1,8 +1,8 @@
 """Checks of the corrected programs against their schemes, by recomputing every step.
 
-Fortran and the Python twin could have the same fault, too small to change the order. Here the
-scheme starts each step from the program's own state before that step. The two results may therefore
-differ only by the rounding of one step.
+Fortran and the Python twin could have the same fault, too small to change the order. To detect it,
+each step is recomputed by the scheme, from the program's own state before the step. The two results
+may therefore differ only by the rounding of one step.
 """
 
 from collections.abc import Iterator, Sequence
@@ -43,8 +43,8 @@ class Stage:
 def schemes(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks that compare every step of the corrected programs with its scheme.
 
-    The value of a check is the largest ratio of a difference in omega or translational velocity to
-    its rounding bound. The limit is 1.
+    The value of a check is the largest ratio of a difference to its rounding bound, for omega and
+    translational velocity. The limit is 1.
     """
     for case in cases(chosen, (7,)):
         for program in PROGRAMS:
@@ -78,7 +78,10 @@ def rows(run: Trajectory) -> Array:
 
 
 def stages(scene: Scene, run: Trajectory) -> tuple[Stage, Stage, Stage, Stage]:
-    """Return the four stages of the scheme of W. Kutta (1901) in every step of a complete run."""
+    """Return the four stages of the scheme of W. Kutta (1901) in every step of a run.
+
+    The run is complete, and each step starts from the state of `run` before the step.
+    """
     h = scene.step_size
     first = _beginning(scene, run)
     second = _stage(scene, 0.5, first.state + 0.5 * h * first.rate)
@@ -130,10 +133,11 @@ def _beginning(scene: Scene, run: Trajectory) -> Stage:
 
 
 def _stage(scene: Scene, part: float, state: Array) -> Stage:
-    """Return the rates of the given states in every step, with a bound of their rounding.
+    """Return the rates for given states in every step, with a bound on their rounding errors.
 
     `state` has the shape (n, 6), one row for each step. The rates are those of equations 16-18 and
-    of dV/dt = F/m - omega x V. `part` is the fraction of a step at which the torque is taken.
+    of dV/dt = F/m - omega x V. `part` is the fraction of the step size after which the torque is
+    taken.
     """
     omega, velocity = state[:, :3], state[:, 3:]
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)

@@ -1,4 +1,4 @@
-"""The selection of what `verify` checks: which checks, random draws and golden record."""
+"""The selection of the checks that one run of `verify` makes, with their seed and files."""
 
 import shlex
 from collections.abc import Sequence
@@ -21,9 +21,9 @@ class Selection:
     """The checks that one run of `verify` makes, with the seed and the files that they use."""
 
     only: Sequence[str] = ()  # leading parts of names, as in ``cells/two-term``; empty: all
-    seed: str = field(default_factory=weekly_seed)  # of the random draws; by default the week
+    seed: str = field(default_factory=weekly_seed)  # of random draws; by default the week
     draws: int = DRAWS  # number of random draws
-    record: Path = RECORD  # folder of the golden record; by default the checkout's
+    record: Path = RECORD  # folder of the golden record; by default tests/golden
     # problems with published results; None selects the problems of the package
     problems: Sequence["Problem"] | None = None
     thin: bool = False  # only a few checks of every kind, for `verify --self-test`
@@ -33,13 +33,16 @@ class Selection:
         return selected(id, self.only)
 
     def may_ask(self, id: str) -> bool:
-        """Return whether a check whose id begins with this id may be requested."""
+        """Return whether a check whose id begins with `id`, or is `id`, may be requested.
+
+        If it is not, these checks need not be computed.
+        """
         return may_hold(id, self.only)
 
     def drawn(self, number: int, subject: str = "") -> Name:
         """Return the name of the check of `subject`, a program or method, in random draw `number`.
 
-        The options of the name repeat the draw.
+        The options in the name contain the seed, so that the command of the check repeats the draw.
         """
         draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
         options = f"{draws} --seed {shlex.quote(self.seed)}"

@@ -1,8 +1,9 @@
 """Checks of the Runge-Kutta program's stop test against eq. 19, recomputed along its own run.
 
-Fortran and the Python twin could both test the same wrong quantity. Here the quotients of all steps
-are computed first. The program is then run with stop constants just below and just above each
-quotient that exceeds all earlier ones.
+The test stops a run if a quotient exceeds the stop constant. Fortran and the Python twin could both
+test the same wrong quotient. Here the quotients of all steps are therefore computed from the
+scheme. The program is then run with stop constants just below and just above each quotient that
+exceeds all earlier ones.
 """
 
 from collections.abc import Callable, Iterator
@@ -30,19 +31,19 @@ Stages = tuple[Stage, Stage, Stage, Stage]
 
 @dataclass(frozen=True, eq=False)
 class Quotients:
-    """The quotients that the program tests in every step, in the order of its tests.
+    """The quotients that the program compares with the stop constant, in the order of its tests.
 
     A quotient is the change of K over the change of U within a step, where K is the right-hand side
-    and U the state.
+    and U is the state.
     """
 
-    values: Array  # shape (n, m), 1/s
-    rounding: Array  # shape (n, m); bound on the difference of two computations
+    values: Array  # shape (n, m) for n steps, 1/s
+    rounding: Array  # shape (n, m); bound on the difference of two computations, 1/s
     names: list[str]  # names of the m quotients of a step
 
 
 def stops(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks that compare where the program stops with where eq. 19 requires it.
+    """Yield deferred checks that the Runge-Kutta program stops where eq. 19 requires it.
 
     The number of the step, the variable and the quotient are compared, for every form of the test
     that a listing can have. The value of a check is the largest ratio of a quotient's difference to
@@ -60,7 +61,7 @@ def stops(chosen: Selection) -> Iterator[Attempt]:
 def _run(scene: Scene) -> tuple[Trajectory, Stages | None]:
     """Return a run of the corrected program without the stop test, and the stages of its steps.
 
-    The stages are None if the run is not complete.
+    The stages are None if the run has no row for every step.
     """
     run = PROGRAM_REGISTRY[_PROGRAM].run(scene, corrected(_PROGRAM), may_stop=False)
     return run, stages(scene, run) if is_whole(scene, run) else None
@@ -132,7 +133,7 @@ def _constants(quotients: Quotients) -> list[float]:
 def _due(quotients: Quotients, constant: float) -> Stop | None:
     """Return the stop that must occur with a stop constant (1/s); None if none must occur.
 
-    It is at the first quotient above the constant.
+    The stop must occur at the first quotient above the constant.
     """
     above = np.argwhere(quotients.values > constant)
     if not len(above):

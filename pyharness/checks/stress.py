@@ -16,15 +16,19 @@ TRIALS = (
 LISTINGS = tuple(f(program) for program in PROGRAMS for f in (original, corrected))
 
 named = partial(Name, command="stress")
-"""Return the name of a check of a trial, a `Name` with the command `stress`."""
+"""Return the name of a check of a trial: a `Name` whose command is the verb `stress`.
+
+The arguments are those of `Name`.
+"""
 
 
 @dataclass(frozen=True)
 class Trial:
     """A group of checks of `stress` under one kind of extreme conditions.
 
-    `bound` explains the origin of the limits. `attempts` takes leading parts of ids, and returns
-    the attempts that may make the requested checks.
+    `title` describes the conditions, and `bound` explains how the limits are derived. `attempts`
+    takes the leading parts of the requested ids, and returns the attempts that may make these
+    checks.
     """
 
     name: str
@@ -34,25 +38,29 @@ class Trial:
 
 
 def trial(name: str) -> Trial:
-    """Return the trial with the given name, one of `TRIALS`; its module is imported here."""
+    """Return the trial with the given name, one of `TRIALS`.
+
+    The module of the trial is imported when the trial is first requested.
+    """
     found: Trial = import_module(f"pyharness.checks.trials.{name.replace('-', '_')}").TRIAL
     return found
 
 
 def stress(only: Sequence[str] = ()) -> Iterator[Check]:
-    """Yield the checks of all trials whose ids begin as in `only`, as in ``separatrix/taylor``.
+    """Yield the checks of all trials whose ids begin with an element of `only`.
 
-    Without `only`, yield the checks of all trials.
+    An element is the leading part of an id, as in ``separatrix/taylor``. If `only` is empty, yield
+    all checks of all trials.
     """
     suites = {name: lambda name=name: trial(name).attempts(only) for name in TRIALS}
     return run_suites(suites, only, "stress")
 
 
 def worst(checks: Iterable[Check]) -> dict[str, Check]:
-    """Return the check with the largest ratio of value to limit, by trial and method.
+    """Return the check with the largest ratio of value to limit, for each trial and method.
 
-    The keys have the form ``shapes/auto``. A failed check counts as worse than one that passed.
-    Only checks with a limit and a scene are considered.
+    The keys have the form ``trial/method``, as in ``shapes/auto``. A failed check counts as worse
+    than one that passed. Checks without a limit or without a scene are ignored.
     """
     found: dict[str, Check] = {}
     for check in checks:

@@ -1,4 +1,4 @@
-"""The report of `stress`: a description and a table for each trial, with a row for each method."""
+"""The report of `stress`: for each trial a description, and a table with a row for each method."""
 
 from collections.abc import Sequence
 from functools import partial

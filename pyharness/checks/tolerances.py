@@ -1,7 +1,7 @@
-"""Tolerances at which methods are tried, by suite, and the work that they may take.
+"""Tolerances at which the checks run each method, and limits on the work of a method.
 
-A work limit counts right-hand sides. It decides which tolerances are affordable, and sets no bound
-on errors.
+A work limit is a number of right-hand sides. It decides which tolerances are affordable, and sets
+no bound on errors.
 """
 
 import math
@@ -20,10 +20,10 @@ from pyharness.theory.conditioning import Conditioning
 OF_CASES = (1e-3, 1e-6, 1e-9, 1e-12)
 _SCIPY_OF_CASES = (1e-6, 1e-9)
 _OF_SELF_TEST = 1e-9
-# A middling tolerance, and the tolerances that are tried if a finer one is not possible.
+# A tolerance of medium size, and the tolerances that are tried if a finer one is not possible.
 MIDDLING = 1e-6
 _LADDER = (1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-7, MIDDLING, 1e-5, 1e-4, 1e-3)
-# At their finest tolerances these methods take minutes, where the others take seconds.
+# At their finest tolerances these methods take minutes, whereas the other methods take seconds.
 _ONLY_MIDDLING = ("quick", "rk45", "radau")
 # Work limits in right-hand sides, and the factor by which the coarsest tolerance may exceed them.
 _BUDGETS = {**dict.fromkeys(GAUSS, 1_000_000.0), **dict.fromkeys(SCIPY_METHODS, 4_000.0)}
@@ -33,7 +33,7 @@ _STAGES = {"dop853": 12, "lsoda": 2, "radau": 20, "rk45": 6}
 
 
 def of_case(name: str, thin: bool) -> list[float]:
-    """Return the tolerances at which the method `name` is tried in a case.
+    """Return the tolerances at which the method `name` is tried in a case of Table 1.
 
     With `thin`, which the self-test sets, there is only one tolerance.
     """
@@ -46,10 +46,11 @@ def of_case(name: str, thin: bool) -> list[float]:
 
 
 def finest(name: str, scene: Scene, time: float) -> float:
-    """Return the finest tolerance at which the method `name` is tried until `time` (s).
+    """Return the finest tolerance at which the method `name` is tried until `time` (s) in a scene.
 
-    It is the finest that the method claims to meet. If a method of `solve_ivp` can't meet this
-    tolerance in the scene, it is the finest value of `_LADDER` that the method can meet, or 1.
+    This is the finest tolerance that the method claims to meet. If a method of `solve_ivp` can't
+    meet this tolerance in the scene, return the finest value of `_LADDER` that it can meet, or 1 if
+    there is none.
     """
     met = finest_of(name, scene, time)
     claimed = REGISTRY[name].finest
@@ -57,10 +58,10 @@ def finest(name: str, scene: Scene, time: float) -> float:
 
 
 def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
-    """Return the tolerances at which a method is tried until `time` (s).
+    """Return the tolerances at which the method `name` is tried until `time` (s) in a scene.
 
-    They are its finest tolerance, and 1e-6 if this is coarser. A method that is slow at its finest
-    tolerance is tried only at 1e-6.
+    The tolerances are the finest one of the method and, if 1e-6 is coarser, also 1e-6. A method
+    that is slow at its finest tolerance is tried only at 1e-6.
     """
     if name in _ONLY_MIDDLING:
         return [MIDDLING]
@@ -69,11 +70,12 @@ def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
-    """Return the tolerances at which the method `name` is tried until `time` (s).
+    """Return the tolerances at which the method `name` is tried until `time` (s) in a scene.
 
-    They are the finest tolerance within the work limit, and a middling one. An element None means
-    the scene's own steps. These are used for methods with a fixed step, and also for Gauss
-    collocation. `flow` has the error amplification of the scene, on which the work depends.
+    They are the finest tolerance at which the method stays within its work limit, and 1e-6 if it is
+    affordable. None in place of a tolerance means that the method uses the scene's step size.
+    Methods with a fixed step always do so, and Gauss collocation is tried both ways. `flow` has the
+    error amplification of the scene, on which the work depends.
     """
     if name in FIXED_STEP:
         return [None]
@@ -81,8 +83,8 @@ def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list
         return [METHODS["closed-form"].finest]
     least = FEW_DIGITS if name == "quick" else finest(name, scene, time)
     if name in GAUSS:
-        # The two solutions that must agree can't if rounding separates them. A coarser tolerance of
-        # `_LADDER` is then taken.
+        # Gauss collocation compares two solutions, which can't agree to the tolerance if amplified
+        # rounding errors separate them. A coarser tolerance of `_LADDER` is then taken.
         meetable = [each for each in _LADDER if each >= 4.0 * flow.rounding]
         least = max(least, min(meetable, default=math.inf))
     radians = speed(scene, flow.largest) * abs(time)
@@ -106,8 +108,8 @@ def _within_budget(name: str, least: float, radians: float, amplification: float
 def _cost(name: str, tolerance: float, radians: float, amplification: float) -> float:
     """Return an estimate of the number of right-hand sides that a method takes at a tolerance.
 
-    `radians` is the fastest rate of the motion times the time, and `amplification` is the error
-    amplification. The estimate is 0 for a method without a work limit.
+    `radians` is the time multiplied by the largest rate of change of the motion, and
+    `amplification` is the error amplification. The estimate is 0 for a method without a work limit.
     """
     if name in GAUSS:
         stages = int(name[-1])

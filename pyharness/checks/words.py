@@ -1,4 +1,7 @@
-"""Checks of machine arithmetics: vectors of the CDC, and runs in our own arithmetic."""
+"""Checks of our arithmetic of machine words, by test vectors and by runs of the programs.
+
+The arithmetic reproduces the mantissa length and the rounding of a machine, as 48 bits for the CDC.
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -23,14 +26,14 @@ _THIN_CASE = 3
 def words(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of our arithmetic of machine words, bit for bit.
 
-    The test vectors of the CDC's arithmetic are checked first. Then, in each cell (program, case
-    and listing), two comparisons of runs follow. The Python twin in our arithmetic of 53 bits must
-    agree with the twin in floats. The compiled program in other words must agree with the twin in
-    the same words.
+    The test vectors of the CDC's arithmetic are checked first. Two comparisons of runs follow in
+    each cell, which is a program with a case and a listing. In the first comparison, the Python
+    twin in our arithmetic of 53 bits must agree with the twin in floats. In the second, the
+    program compiled for each machine word must agree with the twin in the same word.
 
-    Every cell is checked if `chosen.only` requests some checks. Otherwise the first comparison
-    covers listings that are original or have at most one defect or reading. The second covers the
-    original and the corrected listings.
+    If `chosen.only` requests some checks, both comparisons cover every cell. Otherwise the first
+    comparison covers the original listing, and listings with at most one defect or reading. The
+    second covers the original and the corrected listings.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():

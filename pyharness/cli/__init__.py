@@ -6,15 +6,17 @@ from typing import TextIO
 
 from pyharness.model.errors import printable
 
-# Control characters of lines and columns; a page of TAPE6 may contain a form feed.
+# Control characters that are not escaped: they separate lines, columns and pages. A printer page
+# (TAPE6) of the programs may contain a form feed.
 _LAYOUT = "\n\t\f"
 
 
 def shown(text: str) -> str:
-    """Return a text with its control characters replaced by escape sequences.
+    """Return a text with its control characters, except line breaks and tabs, as escape sequences.
 
-    Names may come from third-party files and command lines, and their control characters could
-    steer a terminal. Reports and messages are therefore written through this function.
+    Names in a text may come from third-party files, and their control characters could change the
+    state of a terminal. All reports and messages are therefore passed through this function. It
+    does not replace form feeds either.
     """
     return printable(text, _LAYOUT)
 
@@ -29,7 +31,7 @@ def write_text(stream: TextIO, text: str) -> None:
 
 
 def say(text: str) -> None:
-    """Write a text to stderr; a failure to write, as to a closed stderr, is ignored."""
+    """Write a text to stderr; an error in writing, for example if stderr is closed, is ignored."""
     with suppress(OSError, ValueError):
         write_text(sys.stderr, text)
         sys.stderr.flush()

@@ -1,6 +1,6 @@
-"""Limits of the number of random draws, and forecasts of their run time.
+"""Limits of the number of random draws that a user may request, and forecasts of their run time.
 
-Both are applied before the first draw.
+The number is checked, and a forecast is printed, before the first draw.
 """
 
 from typing import NamedTuple
@@ -8,13 +8,13 @@ from typing import NamedTuple
 from pyharness.cli import say
 from pyharness.model.errors import InputError
 
-_WORTH_SAYING = 60.0  # s
+_WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
 
 class Cost(NamedTuple):
-    """The cost of one random draw in time and memory, and the largest allowed number of draws.
+    """The time and memory that one random draw takes, and the largest allowed number of draws.
 
-    The cost was measured on one core of 2026.
+    Time and memory were measured on one core of a processor of 2026.
     """
 
     what: str  # plural noun for the draws, as in "random scenes"
@@ -23,17 +23,19 @@ class Cost(NamedTuple):
     most: int  # largest allowed number of draws
 
 
-# A draw leads to nearly three checks; each check stays in memory until the report.
+# Each draw of `verify` leads to nearly three checks, which stay in memory until the report.
 CHECKS = Cost("random draws", 0.035, 2e3, 1_000_000)
-# Every contender runs with every setting on a scene, and so does the reference.
+# On each random scene of `bench`, every solver runs with each of its settings, and the reference
+# solution is computed.
 SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 
 
 def check_count(option: str, count: int, least: int, cost: Cost) -> None:
     """Raise InputError if a number of random draws is not allowed.
 
-    `option` is the option with the number `count`, and `least` the smallest allowed number. If the
-    draws will take more than a minute, print a forecast of time and memory.
+    `option` is the option with the number `count`, `least` the smallest allowed number, and `cost`
+    has the largest. If the draws will take more than a minute, print a forecast of their time and
+    memory.
     """
     from pyharness.ensembles.forecast import duration
 

@@ -1,6 +1,6 @@
-"""Ctrl-C on the command line: one line on stderr and exit status 130, at any time.
+"""The handling of Ctrl-C: at any time it ends a command with one line and exit status 130.
 
-A KeyboardInterrupt can be raised between any two instructions, and not all code propagates it. An
+Python can raise KeyboardInterrupt between any two instructions, and not all code propagates it. An
 import may replace it by another exception, and a finalizer or a callback may drop it. This module
 therefore records the signal itself, and raises KeyboardInterrupt again if it was dropped.
 """
@@ -19,9 +19,9 @@ from typing import Any, TextIO
 from pyharness.cli import say
 from pyharness.cli.progress import end_progress
 
-_AGAIN = 0.25  # s, after which a dropped interrupt is raised again
-_MOST = 3  # the interrupt by the user at which the process ends at once
-_PATIENCE = 2.0  # s, for the cleanup at the end of a process
+_AGAIN = 0.25  # time (s) after which a dropped interrupt is raised again
+_MOST = 3  # number of interrupts by the user after which the process ends at once
+_PATIENCE = 2.0  # longest time (s) of the cleanup at the end of an interrupted process
 CODE = 130
 LINE = "pyharness: interrupted\n"
 
@@ -29,8 +29,8 @@ LINE = "pyharness: interrupted\n"
 class _Interruption:
     """The state of interruption of this process, and the handlers of its signals.
 
-    `count` is the number of interrupts by the user, and `is_reported` is true once the user was
-    told.
+    `count` is the number of interrupts by the user. `is_reported` is true after the line that
+    reports the interrupt was printed.
     """
 
     def __init__(self) -> None:
@@ -38,7 +38,10 @@ class _Interruption:
         self.is_reported = False
 
     def leave_at_once(self, *_: object) -> None:
-        """End the process at once with exit status 130, without any cleanup; a signal handler."""
+        """End the process at once with exit status 130, without cleanup; for use as signal handler.
+
+        The line that reports the interrupt is printed unless it was printed before.
+        """
         try:
             if not self.is_reported:
                 os.write(2, LINE.encode())
@@ -46,10 +49,11 @@ class _Interruption:
             os._exit(CODE)
 
     def interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Raise KeyboardInterrupt; this is the handler of SIGINT.
+        """Raise KeyboardInterrupt; this function is the handler of SIGINT.
 
-        A timer is started that raises the exception again if it is dropped. The third interrupt
-        ends the process at once.
+        A timer is started, which raises KeyboardInterrupt again if it is dropped. The third
+        interrupt ends the process at once. `number` and `frame` are the arguments of every signal
+        handler, and are not used.
         """
         self.count += 1
         if self.count >= _MOST:
@@ -59,7 +63,7 @@ class _Interruption:
         raise KeyboardInterrupt
 
     def _again(self, *_: object) -> None:
-        # Code that has installed its own handler is not interrupted.
+        # Code that has installed its own handler of SIGINT is not interrupted.
         is_ours = signal.getsignal(signal.SIGINT) == self.interrupt
         if is_ours and not self.is_reported and not _is_on_its_way():
             raise KeyboardInterrupt
@@ -77,10 +81,10 @@ def came() -> bool:
 def leave_when_interrupted() -> bool:
     """Make Ctrl-C end the process at once, and return True; return False if SIGINT is ignored.
 
-    The handler prints one line on stderr. It is for times that need no cleanup: while modules are
-    imported, and after the results are written.
+    The signal handler prints one line on stderr. It is used while no cleanup is needed, that is,
+    while modules are imported and after the results are written.
     """
-    # A shell starts a background process with SIGINT ignored. It then remains ignored.
+    # A shell starts a background process with SIGINT ignored; SIGINT then remains ignored.
     if not callable(signal.getsignal(signal.SIGINT)):
         return False
     signal.signal(signal.SIGINT, _STATE.leave_at_once)
@@ -113,7 +117,7 @@ def run_interruptible(main: Callable[[], int]) -> int:
 
 
 def report() -> int:
-    """Print the line that reports the interrupt, once, and return exit status 130."""
+    """Print the line that reports the interrupt, unless it was printed; return exit status 130."""
     if not _STATE.is_reported:
         _STATE.is_reported = came()
         end_progress()
@@ -124,9 +128,10 @@ def report() -> int:
 def leave(code: int) -> None:
     """Remove temporary files and end the process with the exit status `code`.
 
-    The normal exit of Python would wait for threads and free all memory piece by piece. On Ctrl-C
-    it would drop the interrupt, or end by its signal. After an interrupt this function ends child
-    processes, and waits at most two seconds for the cleanup.
+    It replaces Python's normal exit, which would wait for threads and free all memory object by
+    object. On Ctrl-C the normal exit would also drop the interrupt, or end the process by the
+    signal. After an interrupt this function ends child processes, and waits at most two seconds for
+    the cleanup.
     """
     if code == CODE:
         # The interrupt was reported; messages of ending threads and finalizers are suppressed.
@@ -149,7 +154,7 @@ def leave(code: int) -> None:
 
 
 def _is_on_its_way() -> bool:
-    """Return whether code is running now that handles a KeyboardInterrupt, as in a cleanup."""
+    """Return whether a KeyboardInterrupt is being handled at present, for example by a cleanup."""
     error: BaseException | None = sys.exception()
     while error is not None:
         if isinstance(error, KeyboardInterrupt):

@@ -1,4 +1,4 @@
-"""The command line: it finds the verb, runs it, and reports an error in one line."""
+"""The entry point of the command line: find the verb, run it, and report errors in one line."""
 
 import gc
 import os
@@ -45,15 +45,16 @@ VERBS = {verb: about for group in _GROUPS.values() for verb, about in group.item
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit status.
 
-    `arguments` follow the name of the command, and are by default the arguments of this process.
+    `arguments` are the arguments after the name of the command, by default those of this process.
     The exit status is 0 for expected results and 1 for an unexpected result, such as a failed
-    check. It is 2 for wrong usage or input, 3 if the extension is not built, and 130 after an
-    interrupt.
+    check. It is 2 for wrong usage or input, 3 if the Fortran extension is not built, and 130 after
+    an interrupt.
     """
-    # A command is short. Garbage collection during the imports costs 4 % and frees nothing.
+    # Garbage collection during the imports takes 4 % of the time of a command and frees nothing.
     gc.set_threshold(100_000)
-    # No matrix here is large enough for a second thread, and starting a pool of threads costs a
-    # seventh of `compare`. The variable has an effect only if NumPy is not imported yet.
+    # The matrices of this package are too small for a second thread, and starting a pool of threads
+    # takes a seventh of the time of `compare`. The variable has an effect only if NumPy is not
+    # imported yet.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if sys.stderr is None:  # closed by the caller, as in 2>&-
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115  (as long as the process)
@@ -119,7 +120,7 @@ def _complete() -> int:
     except ImportError:  # installed for the shell, but not in this environment
         return 1
     line, first = os.environ["COMP_LINE"], int(os.environ["_ARGCOMPLETE"])
-    # A word is complete if a blank follows it.
+    # A word of the command line is complete if a blank follows it.
     typed = f"{line[: int(os.environ['COMP_POINT'])]}|".split()[:-1]
     verb = typed[first] if len(typed) > first else ""
     parser = ArgumentParser("pyharness", add_help=False)
@@ -150,7 +151,8 @@ def _leave_stdout() -> None:
 
 def _complain(message: str, code: int) -> int:
     if came():
-        # Intermediate code may have replaced the KeyboardInterrupt by another exception.
+        # Code between the interrupt and this function may have replaced the KeyboardInterrupt by
+        # another exception.
         return report()
     line = " ".join(message.split())
     say(f"pyharness: {line}\n")

@@ -1,4 +1,4 @@
-"""Options that verbs (subcommands) share: their declaration, parsing and rejection."""
+"""Options that several verbs (subcommands) share: their help texts, parsing and checks."""
 
 import argparse
 import math
@@ -19,41 +19,55 @@ from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.scene_file import case_numbers, case_scene, read_scene
 
 FORMATS = ("table", "json", "csv", "markdown")
-# Options that several verbs share, each with its help. An option without a placeholder takes no
-# value.
+# Options that several verbs share, each with its help text. An option takes a value if a
+# placeholder, as N in "--case N", follows its name.
 SCENE = {
-    "--case N": "Take the scene of this case of Table 1, 1 to 7.",
-    "--scene FILE": "Take the scene from this scene file (TOML).",
-    "--omega0 A,B,C": "Initial angular velocity, rad/s (default: the scene's).",
-    "--step-size H": "Step size, s (default: the scene's).",
-    "--steps N": "Number of steps (default: the scene's).",
+    "--case N": "Use the scene (body, initial state, torque and steps) of this case of Table 1 of "
+    "the thesis, 1 to 7.",
+    "--scene FILE": "Read the scene (body, initial state, torque and steps) from this TOML file.",
+    "--omega0 A,B,C": "Three components of the initial angular velocity in the body's axes, rad/s "
+    "(default: those of the scene).",
+    "--step-size H": "Step size of the integration, s, above 0 (default: the scene's).",
+    "--steps N": "Number of integration steps from time 0, at least 1 (default: the scene's).",
 }
 LISTING = {
-    "--listing L": "Which listing to run: original (all defects active) or corrected (none).",
-    "--fix NAME,...": "Correct these defects, readings or conjectures of the original listing.",
-    "--keep NAME,...": "Keep these active in the corrected listing, and correct all others.",
-    "--reading NAME,...": "Read the cards of these readings in the way that we do not adopt.",
-    "--conjecture NAME,...": "Assume these where cards of the original are missing; none: nothing.",
-    "--lipschitz L": "Stop a run if a slope changes by more than L times the change of its "
-    "variable, L in 1/s (default 500, as on the cards).",
-    "--no-stop": "Run without the stop test of the Runge-Kutta program.",
+    "--listing L": "Version of the program: original (all its defects active) or corrected (none "
+    "active); by default `compare` uses both, and other verbs use the original.",
+    "--fix NAME,...": "Correct only these defects, readings or conjectures of the original listing "
+    "(`pyharness defects` lists the names).",
+    "--keep NAME,...": "Keep only these defects, readings or conjectures active, and correct all "
+    "others (`pyharness defects` lists the names).",
+    "--reading NAME,...": "For these readings (ambiguous passages of the cards), use the "
+    "interpretation that this edition does not adopt (`pyharness defects` lists the names).",
+    "--conjecture NAME,...": "Activate these conjectures about missing cards; none activates no "
+    "conjecture (default: the conjectures of the original listing).",
+    "--lipschitz L": "Constant of the Runge-Kutta program's stop test, 1/s (default 500): a run "
+    "stops if the slopes change by more than L times the change of the variables.",
+    "--no-stop": "Run the Runge-Kutta program without its stop test (see --lipschitz).",
 }
-EFFORT = {"--effort F": "Multiply the work limit by this factor (default 1, about ten seconds)."}
+EFFORT = {
+    "--effort F": "Multiply the limit of computational work by this factor, above 0 (default 1, "
+    "which allows about ten seconds)."
+}
 STRICT = {
-    "--strict": "Exit with status 1 if the motion amplifies rounding errors beyond the tolerance."
+    "--strict": "Exit with status 1 if the motion amplifies rounding errors so much that they "
+    "exceed the tolerance."
 }
 
 
-def outputs(formats: Sequence[str] = FORMATS, plot: str = "Draw a picture") -> dict[str, str]:
+def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict[str, str]:
     """Return the options --format, --plot and --out, each with its help text.
 
-    `formats` are the allowed formats, the default first. `plot` is the beginning of the help text
-    of --plot; if it is empty, there is no --plot.
+    `formats` are the allowed formats, the default first. `plot` says what the picture of --plot
+    shows, for the help text of --plot; if it is empty, the result has no option --plot.
     """
     first, *others = formats
-    form = {"--format F": f"Form of the result: {first} (default), {', '.join(others)}."}
-    picture = {"--plot FILE": f"{plot} in this file, and write its numbers beside it as CSV."}
-    out = {"--out FILE": "Write the result to this file instead of the terminal."}
+    form = {"--format F": f"Output format of the result: {first} (default), {', '.join(others)}."}
+    picture = {
+        "--plot FILE": f"Write a picture of {plot} to this file (.png, .svg or .pdf), and its "
+        "numbers to a .csv file of the same name."
+    }
+    out = {"--out FILE": "Write the result to this file instead of the standard output."}
     return {**form, **(picture if plot else {}), **out}
 
 
@@ -63,7 +77,10 @@ def chosen_effort(options: argparse.Namespace) -> float:
 
 
 def chosen_tolerance(options: argparse.Namespace) -> float | None:
-    """Return the relative tolerance that --tolerance gives, or None for the method's default."""
+    """Return the relative tolerance that --tolerance gives, or None if it is not given.
+
+    None stands for the default tolerance of the method.
+    """
     if options.tolerance is None:
         return None
     return positive(options.tolerance, "--tolerance", 1.0)
@@ -92,10 +109,11 @@ def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
 
 
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
-    """Return the names in the value of --only, each a kind of check, or kind and check, as in a/b.
+    """Return the names in the value `text` of --only, which select checks; an empty list for None.
 
-    `text` is the value of --only, None if not given. `what` is the noun for a kind in a message.
-    Raise InputError if a kind is not one of `allowed`.
+    Each name is a kind of check, or the beginning of the id of a check, as in ``cells/two-term``.
+    `what` is the noun for a kind in a message. Raise InputError if the kind, the part of a name
+    before the first slash, is not one of `allowed`.
     """
     only = names(text)
     for each in only:
@@ -107,11 +125,12 @@ def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[st
 def chosen_scene(
     options: argparse.Namespace, any_axes: bool = False, any_torque: bool = False
 ) -> Scene:
-    """Return the scene that --case or --scene requests, with the changes by further options.
+    """Return the scene that --case or --scene requests, as changed by further options.
 
-    The further options are --omega0, --step-size and --steps. A warning is printed if no rigid body
-    can have the moments, or if the attitude was normalised. Raise InputError for a full inertia
-    matrix unless `any_axes`, and for a torque about the axes of space unless `any_torque`.
+    The further options are --omega0, --step-size and --steps. Print a warning if no rigid body can
+    have the scene's moments of inertia, or if its attitude was normalised. Raise InputError for a
+    full inertia matrix unless `any_axes`, and for a torque about the axes of space unless
+    `any_torque`.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -145,16 +164,16 @@ def _norm(length: float) -> str:
 
 
 def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
-    """Return the program that --program names in a tuple, or by default all three programs."""
+    """Return a tuple with the program that --program names, or by default all three programs."""
     check_known("program", options.program, PROGRAMS)
     return PROGRAMS if options.program is None else (options.program,)
 
 
 def chosen_listing(options: argparse.Namespace) -> Listing:
-    """Return the listing of the requested program that --listing, --fix and --keep describe.
+    """Return the listing (version) of the requested program that the options describe.
 
-    The options --reading and --conjecture are taken into account too. A requested name without
-    effect leads to a warning.
+    The options are --listing, --fix, --keep, --reading and --conjecture. Print a warning for each
+    reading or conjecture that is requested, but has no effect.
     """
     chosen_programs(options)
     listing = subset(
@@ -170,7 +189,10 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
 
 
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
-    """Print a warning for each requested reading or conjecture that is active in no listing."""
+    """Print a warning for each reading or conjecture that is requested, but active in no listing.
+
+    `listings` are the listings that the command runs.
+    """
     asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
     active = {name for listing in listings for name in listing.active}
     for name in sorted(asked - active - set(names(options.fix))):
@@ -178,7 +200,10 @@ def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> N
 
 
 def listing_text(listing: Listing) -> str:
-    """Return a description of a listing in one line: its label and the active names."""
+    """Return a line that describes a listing: its label, and its active defects.
+
+    The line also has the names of the active readings and conjectures, if there are any.
+    """
     active = ", ".join(sorted(listing.defects)) or "no defects"
     more = {"readings": listing.readings, "conjectures": listing.conjectures}
     told = [f"; {what}: {', '.join(sorted(names))}" for what, names in more.items() if names]
@@ -188,10 +213,8 @@ def listing_text(listing: Listing) -> str:
 def chosen_lipschitz(options: argparse.Namespace) -> float:
     """Return the constant of the stop test (1/s) that --lipschitz gives.
 
-    The default is the constant on the cards of the programs.
-
-    Raise InputError if the program has no stop test but one of its options is given, or if both
-    --no-stop and --lipschitz are given.
+    The default is the constant on the published cards. Raise InputError if --lipschitz or --no-stop
+    is given although the program has no stop test, or if both options are given.
     """
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
@@ -201,9 +224,10 @@ def chosen_lipschitz(options: argparse.Namespace) -> float:
 
 
 def refuse(options: argparse.Namespace, chosen: str, names: Sequence[str]) -> None:
-    """Raise InputError if an option is given that has no meaning with the option `chosen`.
+    """Raise InputError if one of the options `names` is given, which have no meaning with `chosen`.
 
-    `names` are the options that have no meaning, without dashes, as in "no_stop".
+    The names are without leading dashes, as in "no_stop". `chosen` is the option that was given, or
+    a noun for the computation that was requested, as the message shows it.
     """
     for name in names:
         if getattr(options, name):
@@ -216,9 +240,9 @@ def names(text: str | None) -> list[str]:
 
 
 def numbers(text: str, option: str) -> list[float]:
-    """Return the finite numbers in a comma-separated list, as in 1,2.
+    """Return the numbers in a comma-separated list `text`, as in 1,2, which is an option's value.
 
-    `text` is the value of `option`, which an InputError names if the value is invalid.
+    Raise InputError, which names the option `option`, if an element is not a finite number.
     """
     return [number(part, option) for part in text.split(",")]
 
@@ -256,14 +280,14 @@ def whole(text: str, option: str) -> int:
 
 
 def warn(message: str) -> None:
-    """Print a warning on stderr."""
+    """Print a message as a warning on stderr."""
     say(f"pyharness: warning: {message}\n")
 
 
 def check_outputs(options: argparse.Namespace) -> None:
-    """Raise InputError if the file of --out or --plot can't be written.
+    """Raise InputError if a file that --out or --plot names can't be written.
 
-    Verbs call this before any computation.
+    Verbs call this before any computation, so that no computation is lost.
     """
     picture = getattr(options, "plot", None)
     if picture is None and options.out is None:
@@ -287,10 +311,10 @@ def show(
     options: argparse.Namespace,
     own: Mapping[str, Callable[[], str | bytes]] | None = None,
 ) -> None:
-    """Write a report in the requested format, and its picture if --plot is given.
+    """Write a report in the format of --format, and also its picture if --plot is given.
 
-    `own` maps a format that only this report has, as in "tape5", to a function that returns the
-    report in this format.
+    `own` maps each format that only this report has, such as "tape5", to a function that returns
+    the report in this format. Without --out the report is written to stdout.
     """
     from pyharness.views.render import render
 

@@ -1,4 +1,4 @@
-"""Writing of output files and folders, each as a whole or not at all."""
+"""Functions that write output files and folders, each either completely or not at all."""
 
 import json
 import os
@@ -19,10 +19,10 @@ _LARGEST_MARK = 1 << 24  # bytes of the file that lists the files written by a v
 
 
 def check_writable(path: str, option: str) -> None:
-    """Raise InputError if no file can be written at a path.
+    """Raise InputError if no file can be written at the path `path`.
 
-    Callers check this before any computation. `option` is the option that gave the path, for the
-    message.
+    The error message names `option`, the option that gave the path. Callers make this check before
+    any computation.
     """
     try:
         # A link is followed to its target, as in an ordinary write.
@@ -45,7 +45,8 @@ def check_writable(path: str, option: str) -> None:
         elif not os.access(folder, os.W_OK) or (target.exists() and not os.access(target, os.W_OK)):
             reason = "permission denied"
         else:
-            # Permissions do not show that a file system, as /proc, accepts no file.
+            # A temporary file is written, because permissions do not show that a file system, such
+            # as /proc, accepts no file.
             probe = _File(path)
             try:
                 probe.write(b"")
@@ -60,8 +61,8 @@ def check_writable(path: str, option: str) -> None:
 def check_apart(picture: str, out: str) -> None:
     """Raise InputError if the file of --out is also a file that --plot writes.
 
-    `picture` is the path in --plot, beside which the numbers are written as CSV. `out` is the path
-    in --out.
+    `picture` is the path in --plot; the option also writes a CSV file in the same folder. `out` is
+    the path in --out.
     """
     for path, what in ((picture, "the picture"), (numbers_beside(picture), "its numbers")):
         if os.path.realpath(path) == os.path.realpath(out):
@@ -71,12 +72,13 @@ def check_apart(picture: str, out: str) -> None:
 
 
 def write_files(contents: dict[str, bytes], option: str) -> None:
-    """Write several files, given by path, either all or none.
+    """Write several files, either all or none.
 
-    The files are first written under temporary names, and then all are renamed. `option` is the
-    option that gave the paths, for a message. After any failure or interrupt, Ctrl-C included, the
-    old files are restored. A path that is a special file (a device, a pipe) is written to first,
-    and never replaced.
+    `contents` has the content of each file by its path. The files are first written under temporary
+    names, and then all are renamed. After any failure or interrupt, Ctrl-C included, the previous
+    files are restored. A path that is a special file (a device, a pipe) is written to before the
+    other files, and is never replaced. Raise InputError, which names `option`, the option that gave
+    the paths, if a file can't be written.
     """
     path = ""
     try:
@@ -108,10 +110,10 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
 
 
 class _DeferredInterrupt:
-    """A context that defers Ctrl-C, because an interrupt could leave temporary files behind."""
+    """A context manager that defers Ctrl-C, which could otherwise leave temporary files behind."""
 
     def __enter__(self) -> Self:
-        """Defer interrupts from now on."""
+        """Install a signal handler that only records an interrupt."""
         self._came = False
         self._before = signal.getsignal(signal.SIGINT)
         # Python raises KeyboardInterrupt in the main thread alone.
@@ -137,10 +139,10 @@ class _DeferredInterrupt:
 
 
 class _File:
-    """A file that is being written.
+    """A file that is being written to a temporary path and is then renamed.
 
-    `target` is its path, `new` the temporary path of the new content, and `old` the path of a copy
-    of the previous content.
+    `target` is its final path, `new` the temporary path of the new content, and `old` the path of a
+    copy of the previous content.
     """
 
     def __init__(self, path: str) -> None:
@@ -189,15 +191,15 @@ def _remove(names: list[str]) -> None:
 
 
 def _is_special(path: str) -> bool:
-    """Return whether a path exists and is not an ordinary file: a device, a pipe or a folder."""
+    """Return whether a path exists and is a device, a pipe or a folder, not an ordinary file."""
     return Path(path).exists() and not Path(path).is_file()
 
 
 def check_folder(path: str, names: Iterable[str], option: str) -> None:
     """Raise InputError if the files `names` can't be written in the folder `path`.
 
-    The folder may be missing if it can be made. Callers check this before any computation. `option`
-    is the option that gave the path, for the message.
+    The folder may be missing if it can be made. The error message names `option`, the option that
+    gave the path. Callers make this check before any computation.
     """
     folder = Path(path)
     if not path or "\0" in path or os.path.lexists(folder):
@@ -213,10 +215,10 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
 
 
 def _why_not_made(folder: Path) -> str:
-    """Return the reason why a folder can't be made, after a colon; an empty text if it can.
+    """Return the reason why a folder can't be made, or an empty text if it can be made.
 
-    The folder is made and removed for this, because permissions do not show that a name is too
-    long, or that a file system accepts no folder.
+    The reason begins with a colon. To find it, the folder is made and removed again. Permissions
+    alone do not show that a name is too long, or that a file system accepts no folder.
     """
     if not folder.parent.is_dir():
         return ": there is no such folder"
@@ -229,10 +231,10 @@ def _why_not_made(folder: Path) -> str:
 
 
 def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
-    """Write files into a folder, either all or none; a missing folder is made.
+    """Write files into a folder, either all or none; the folder is made if it is missing.
 
-    `path` is the folder, and `contents` are the contents of the files by name. `option` is the
-    option that gave the path, for a message.
+    `path` is the folder, and `contents` has the content of each file by its name. Raise InputError,
+    which names `option`, the option that gave the path, if a file can't be written.
     """
     folder = Path(path)
     files = {str(folder / name): content for name, content in contents.items()}
@@ -254,15 +256,16 @@ def check_tree(path: str, mark: str, option: str) -> None:
     """Raise InputError if `write_tree` may not replace the folder `path`.
 
     The folder may be new or empty. Otherwise it may contain only the JSON file `mark`, and the
-    files that are listed in this JSON file under `files`. Callers check this before any
-    computation. `option` is the option that gave the path, for the message.
+    files that this JSON file lists under the key `files`. The error message names `option`, the
+    option that gave the path. Callers make this check before any computation.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
     new, _ = _beside(folder)
     try:
         reason = _why_not_anew(folder, mark)
-        # Permissions do not show that a name is too long, or that no file is accepted.
+        # A temporary folder is made, because permissions do not show that a name is too long, or
+        # that the file system accepts no file.
         if not reason:
             new.mkdir()
             try:
@@ -276,7 +279,7 @@ def check_tree(path: str, mark: str, option: str) -> None:
 
 
 def _why_not_anew(folder: Path, mark: str) -> str:
-    """Return the reason why a folder may not be replaced; an empty text if it may.
+    """Return the reason why a folder may not be replaced, or an empty text if it may be.
 
     `mark` is the name of the JSON file that lists the files which an earlier run wrote.
     """
@@ -305,10 +308,10 @@ def _listed(mark: Path) -> Iterable[str]:
 
 
 def _beside(folder: Path) -> tuple[Path, Path]:
-    """Return two temporary paths beside a folder, for use while the folder is replaced.
+    """Return two temporary paths for the time when the folder `folder` is replaced.
 
-    The first is for the folder with the new content, the second for the folder with the previous
-    content.
+    The first path is for the folder with the new content, the second path for the folder with the
+    previous content. Both are in the parent folder of `folder`.
     """
     new, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{what}") for what in ("new", "old"))
     return new, old
@@ -317,9 +320,10 @@ def _beside(folder: Path) -> tuple[Path, Path]:
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
     """Replace the folder `path` by a folder that has only the files in `contents`.
 
-    `contents` are the contents of the files by their paths in the folder. The files are written to
-    a temporary folder, which is then renamed. The previous folder is removed after that, so that a
-    failure leaves it unchanged. `option` is the option that gave the path, for a message.
+    `contents` has the content of each file by its path in the folder. The files are written to a
+    temporary folder, which is then renamed. The previous folder is removed only after the renaming,
+    so that a failure does not change it. Raise InputError, which names `option`, the option that
+    gave the path, if a file can't be written.
     """
     folder = Path(os.path.realpath(path))
     new, old = _beside(folder)

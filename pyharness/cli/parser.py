@@ -1,4 +1,4 @@
-"""The parser of a verb: its help in groups, and its errors in one line."""
+"""The parser of a verb's options, which prints grouped help and reports errors in one line."""
 
 import argparse
 import re
@@ -16,7 +16,7 @@ _NARROWEST, _WIDEST = 80, 100  # columns
 
 
 class _Formatter(argparse.HelpFormatter):
-    """A help formatter that keeps the lines of the example and names no option in the usage."""
+    """A help formatter whose usage line lists no options, and which does not reflow the example."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         if text.startswith("example:"):
@@ -30,12 +30,12 @@ class _Formatter(argparse.HelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """The parser of one verb, whose error messages are one line and suggest the nearest name."""
+    """The parser of one verb, whose error messages have one line and suggest the nearest name."""
 
     def __init__(self, verb: str, description: str = "") -> None:
-        """Declare the options of a verb, which are the OPTIONS of its module.
+        """Declare the options of the verb `verb`, which are the dictionary OPTIONS of its module.
 
-        `description` is the line of the overview about the verb.
+        `description` is the line about the verb in the overview of `pyharness help`.
         """
         self._width = _WIDEST
         self.module = import_module(f"pyharness.cli.verbs.{verb}")
@@ -63,14 +63,14 @@ class Parser(argparse.ArgumentParser):
         groups["output"].add_argument("-h", "--help", action="help", help="Print this help.")
 
     def format_help(self) -> str:
-        """Return the help text in the width of the terminal, but from 80 to 100 columns wide."""
+        """Return the help text in the terminal's width, but at least 80 and at most 100 columns."""
         from shutil import get_terminal_size
 
         self._width = min(max(get_terminal_size().columns, _NARROWEST), _WIDEST)
         return super().format_help()
 
     def error(self, message: str) -> NoReturn:
-        """Raise InputError with the message, because argparse would print the usage too."""
+        """Raise InputError with the message; argparse itself would also print the usage."""
         raise InputError(message)
 
     def option_names(self) -> list[str]:
@@ -80,8 +80,8 @@ class Parser(argparse.ArgumentParser):
     def read(self, verb: str, arguments: Sequence[str]) -> argparse.Namespace:
         """Return the parsed options of a command line.
 
-        `arguments` are those after the name of the verb. Raise InputError if an option or the
-        output format is unknown.
+        `arguments` are the arguments after the verb, and `verb` is its name for error messages.
+        Raise InputError if an option or the output format is unknown.
         """
         options, rest = self.parse_known_args(self._joined(arguments))
         if rest:
@@ -96,7 +96,7 @@ class Parser(argparse.ArgumentParser):
     def _joined(self, arguments: Sequence[str]) -> list[str]:
         """Return the arguments with each negative number joined to its option, as in --x=-1.
 
-        Otherwise argparse would take the number for an option.
+        Without this, argparse would take a negative number for an option.
         """
         result: list[str] = []
         for argument in arguments:

@@ -1,4 +1,4 @@
-"""One progress bar for all verbs, on standard error if that is a terminal."""
+"""The progress bar of all verbs, which is shown if standard error is a terminal."""
 
 import sys
 from contextlib import suppress
@@ -6,22 +6,22 @@ from typing import Any
 
 from pyharness.cli import shown
 
-_bar: Any = None  # the progress bar that is on the terminal
+_bar: Any = None  # the progress bar on the terminal; None if there is none
 
 
 class _Terminal:
-    """Standard error as a stream that ignores errors, as of a closed terminal."""
+    """Standard error as a stream that ignores errors in writing, as to a closed terminal."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(sys.stderr, name)
 
     def write(self, text: str) -> None:
-        """Write a text; a failure is ignored."""
+        """Write a text to standard error; a failure is ignored."""
         with suppress(OSError, ValueError):
             sys.stderr.write(text)
 
     def flush(self) -> None:
-        """Write the buffered text; a failure is ignored."""
+        """Flush the buffered text to standard error; a failure is ignored."""
         with suppress(OSError, ValueError):
             sys.stderr.flush()
 
@@ -39,7 +39,8 @@ def progress(done: int, total: int, what: str) -> None:
         end_progress()
         from tqdm import tqdm
 
-        # The monitor of tqdm would be a thread, and this process may start other processes.
+        # Otherwise tqdm would start a monitor thread, which is unwanted because this process may
+        # start other processes.
         tqdm.monitor_interval = 0
         _bar = tqdm(total=total, leave=False, dynamic_ncols=True, file=_Terminal())
     _bar.set_description_str(shown(what), refresh=False)

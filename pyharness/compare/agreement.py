@@ -1,6 +1,6 @@
-"""Two measures of agreement: errors against the reference, and bits between two languages.
+"""Errors of a trajectory against the reference, and differences between Fortran and Python.
 
-The languages are Fortran, in the compiled programs, and Python, in the twins.
+The compiled Fortran programs and their Python ports, the twins, should agree bit for bit.
 """
 
 import math
@@ -17,16 +17,19 @@ from pyharness.truth.reference import Reference
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """The errors of a trajectory against the reference solution."""
+    """The errors of a trajectory against the reference solution.
+
+    They are the errors of omega, velocity and attitude, and the drifts of conserved quantities.
+    """
 
     omega: tuple[float, float, float]  # largest error of each component (rad/s)
-    velocity: float | None  # largest error of any component of translational velocity (m/s)
+    velocity: float | None  # largest error of any component of the translational velocity (m/s)
     # Largest drifts of the energy and of the squared angular momentum, relative to the initial
     # values; None if a torque acts or the moments are unknown.
     energy: float | None
     momentum: float | None
     error: Array  # shape (n,): largest error of any component of omega at each time (rad/s)
-    turned: Array | None = None  # shape (n,): error of the attitude at each time (rad), if known
+    turned: Array | None = None  # shape (n,): error of the attitude at each time (rad)
     # Largest drift of the angular momentum in space, relative to its initial norm; None if a torque
     # acts, or if the moments or the attitude are unknown.
     momentum_in_space: float | None = None
@@ -40,8 +43,9 @@ class Accuracy:
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
     """Return the errors of a trajectory against the reference solution `truth`.
 
-    Both must have rows at the same times; if one ends earlier, the further rows of the other are
-    not compared. Energy and angular momentum are compared with their initial values instead.
+    Both must have rows at the same times. If one of them ends earlier, the comparison ends with it.
+    Energy and angular momentum, which are constant without torque, are compared with their initial
+    values in `scene`.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
@@ -86,8 +90,9 @@ def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float | None:
 def distance(first: Trajectory, second: Trajectory) -> float:
     """Return the largest distance of two trajectories of a program, in units in the last place.
 
-    TIME, the angular velocity U and the translational velocity V are compared element by element.
-    Two NaNs have the distance 0. If the numbers of rows differ, the distance is infinite.
+    The recorded times, the angular velocities and the translational velocities are compared element
+    by element. Two NaNs have the distance 0. If the numbers of rows differ, the distance is
+    infinite.
     """
     if len(first.time) != len(second.time):
         return math.inf
@@ -101,9 +106,10 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
     """Return the names of the results in which two trajectories of a program differ.
 
-    The number of steps or evaluations, how the run ended, and what the stop test found are compared
-    first. If any of them differ, only these are named. Otherwise the rows and the error code IER of
-    the linear solver are compared bit for bit. The list is empty if all agree.
+    First the numbers of steps and of evaluations, the status and the result of the stop test are
+    compared. If any of these differ, the list has only their names. Otherwise the rows and the
+    error code IER of the linear solver are compared bit for bit. The list is empty if all results
+    agree.
     """
     counts = (
         ("steps", first.steps, second.steps),
@@ -125,7 +131,7 @@ def differences(first: Trajectory, second: Trajectory) -> list[str]:
         found.append("IER")
     if first.exact is not None and second.exact is not None:
         pairs = zip(first.exact.ravel().tolist(), second.exact.ravel().tolist(), strict=True)
-        # As text, because nan is not equal to nan, and 0.0 is equal to -0.0.
+        # Compared as text, because nan is not equal to nan, and 0.0 is equal to -0.0.
         if any(x.m != y.m or str(x.e) != str(y.e) for x, y in pairs):
             found.append("numbers of the word")
     return found
@@ -136,10 +142,10 @@ def _velocity(trajectory: Trajectory) -> Array:
 
 
 def ulps(x: Array, y: Array) -> float:
-    """Return the largest distance of two arrays of the same shape, element by element.
+    """Return the largest distance between corresponding elements of two arrays of one shape.
 
-    The distance of two floats is the number of steps from one to the other through all
-    representable floats. It is 0 for two NaNs, and infinite for a NaN and a number.
+    The distance is in units in the last place: the number of steps from one float to the other
+    through all representable floats. It is 0 for two NaNs, and infinite for a NaN and a number.
     """
     both_nan = np.isnan(x) & np.isnan(y)
     one_nan = np.isnan(x) ^ np.isnan(y)

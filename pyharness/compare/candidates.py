@@ -1,6 +1,7 @@
-"""Candidates: methods, prepared solvers and programs behind one interface.
+"""Candidates, a common interface of methods, prepared solvers and programs.
 
-Checks and timings run a candidate on a scene without knowing which of the three it is.
+Checks and timings run a candidate on a scene in the same way, whichever of the three it is. A
+prepared solver solves one scene by one method, for many initial conditions.
 """
 
 import math
@@ -23,16 +24,16 @@ from pyharness.model.trajectory import STOP_VARIABLES, WITH_ALL_ROWS, Array, Tra
 from pyharness.original.compiled import program_arguments
 from pyharness.original.programs import BINARY64, PROGRAM_REGISTRY
 
-_SAME = 1e-9  # relative difference up to which two times are equal, because steps are rounded
+_SAME = 1e-9  # relative difference up to which two times are equal; the step size is rounded
 
 
 @dataclass(frozen=True, eq=False)
 class End:
     """The result of a candidate (a method, prepared solver or program) for a scene at one time."""
 
-    omega: Array  # rad/s; NaN if the candidate did not reach the time
+    omega: Array  # shape (3,), rad/s; NaN if the candidate did not reach the time
     ended: str = "complete"  # how the run ended: "complete", or why there is no full result
-    steps: int = 0  # as the candidate counts them
+    steps: int = 0  # number of steps, as the candidate counts them
     evaluations: int | None = None  # evaluations of the right-hand side, if they are counted
     attitude: Array | None = None  # shape (4,), scalar first, if it was propagated
 
@@ -43,18 +44,20 @@ class End:
 
     @property
     def has_result(self) -> bool:
-        """Return whether the candidate reached the time of the result.
+        """Return whether the candidate reached the requested time.
 
-        The result may still be sensitive: amplified rounding exceeds the tolerance.
+        The result may nevertheless be "sensitive": its amplified rounding error exceeds the
+        tolerance.
         """
         return self.ended in WITH_ALL_ROWS
 
 
 @dataclass(frozen=True)
 class Ready:
-    """An integration from time 0 to a time T, prepared so that it can be timed alone.
+    """An integration from time 0 to one time, divided so that only its main part is timed.
 
-    `run` is a function that only integrates. `read` converts the result of `run` to an End.
+    `run` is the function to time, which integrates without any preparation. `read` converts the
+    result of `run` to an End.
     """
 
     run: Callable[[], Any]
@@ -65,25 +68,25 @@ class Ready:
 class Candidate:
     """A method with its tolerance, a prepared solver, or a program with its listing.
 
-    Checks run it, judge it and time it through the same functions.
+    Checks and timings use the same functions for all three.
     """
 
     name: str
-    # Takes a scene and a time (s). Raises InputError if the candidate can't take them, as a program
-    # whose steps end at another time.
+    # Takes a scene and a time (s). Raises InputError if the candidate can't solve the scene, or has
+    # no result at the time, like a program whose steps end at another time.
     ready: Callable[[Scene, float], Ready]
-    # Takes a scene, and returns rows at the scene's own times. A method also takes other times as
-    # second argument. A prepared solver has no rows and raises InputError.
+    # Takes a scene, and returns its trajectory at the times of its steps. A method takes other
+    # times as an optional second argument. A prepared solver has no rows and raises InputError.
     rows: Callable[..., Trajectory]
 
     def end(self, scene: Scene, time: float) -> End:
-        """Return the result at one `time` (s); raise InputError if the scene is refused."""
+        """Return the result at one `time` (s); raise InputError if the candidate has none."""
         ready = self.ready(scene, time)
         return ready.read(ready.run())
 
 
 def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
-    """Return a candidate that runs the method `name` by `solve`.
+    """Return a candidate that runs the method `name` by the function `solve`.
 
     `tolerance` is relative to the largest component of omega, and `effort` is the factor on the
     work limit. The candidate's rows include the attitude if the scene has one.
@@ -101,11 +104,12 @@ def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candid
 
 
 def prepared_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a candidate that runs a solver prepared for the method `name`.
+    """Return a candidate that runs a solver prepared for a scene and the method `name`.
 
-    If `primed`, the solver is first called with another initial omega, which must have no effect on
-    the run that counts. `tolerance` is relative to the largest component of omega, None for the
-    method's own. A method with a fixed step, and Gauss collocation, use the scene's step size.
+    If `primed` is true, the solver is first called with another initial omega. This call must have
+    no effect on the result. `tolerance` is relative to the largest component of omega; None selects
+    the default of the method. A method with a fixed step, and Gauss collocation, use the scene's
+    step size.
     """
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -118,9 +122,9 @@ def prepared_candidate(name: str, tolerance: float | None, primed: bool = False)
 
 
 def attitude_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a candidate that runs a solver prepared for omega and the attitude.
+    """Return a candidate that runs a prepared solver for omega and the attitude.
 
-    The arguments are those of `prepared_candidate`.
+    The arguments have the same meanings as those of `prepared_candidate`.
     """
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -150,9 +154,10 @@ def program_candidate(
     effort: float = 1.0,
     word: str = BINARY64,
 ) -> Candidate:
-    """Return a candidate that runs the program of a listing.
+    """Return a candidate that runs a program of the thesis.
 
-    The other arguments are those of `Program.run`.
+    `listing` is the program with its active defects. The other arguments are those of
+    `Program.run`.
     """
     options = lipschitz, may_stop, velocity
 
@@ -177,9 +182,9 @@ def program_candidate(
 
 
 def unstopped(listing: Listing) -> Candidate:
-    """Return a candidate that runs a listing's compiled program without its stop test.
+    """Return a candidate that runs a listing's compiled program without its Lipschitz stop test.
 
-    The program does not return the translational velocity.
+    The program does not compute the translational velocity.
     """
     return program_candidate(listing, may_stop=False, velocity=False)
 
@@ -193,7 +198,7 @@ def plain(values: Iterable[float]) -> Array:
 
 
 def not_finite(why: str = "overflow") -> End:
-    """Return an End whose omega is NaN, for a run without result; `why` says how it ended."""
+    """Return an End with omega NaN, for a run without result; `why` says how the run ended."""
     return End(np.full(3, math.nan), why)
 
 

@@ -1,9 +1,8 @@
-"""Comparisons of original and corrected programs, of Fortran and twin, and with the reference.
+"""Comparisons of the original and corrected programs, and of other methods, on one scene.
 
-A twin is the Python port of a Fortran program. Two measures of agreement are never mixed. One is
-the distance between the results of Fortran and twin, in units in the last place. The other is the
-error against the reference solution, in rad/s, which has no meaning below the error bound of the
-reference itself.
+The results of each program are compared in two ways. The distance between the results of Fortran
+and of its Python port, the twin, is in units in the last place. The error against the reference
+solution is in rad/s; it has no meaning if it is below the error bound of the reference.
 """
 
 import itertools
@@ -43,12 +42,15 @@ _TIMING_SECONDS = 3e-4
 
 @dataclass(frozen=True, eq=False)
 class ProgramFinding:
-    """The results of one program with one listing, and how well they agree."""
+    """The results of one listing of a program, and their differences from the reference.
+
+    It also has the differences between Fortran and the twin, which is the Python port.
+    """
 
     listing: Listing
     trajectory: Trajectory
     accuracy: Accuracy
-    ulps: float | None  # between Fortran and the twin; None if another word runs in the twin alone
+    ulps: float | None  # distance of Fortran and the twin; None if only the twin was run
     differences: tuple[str, ...]  # names of the results in which Fortran and the twin differ
     order: Order | None  # measured for a corrected program in binary64 only
     seconds_per_step: float
@@ -57,7 +59,7 @@ class ProgramFinding:
 
     @property
     def who(self) -> str:
-        """Return the names of the program and of its listing, as in ``two-term original``."""
+        """Return the name of the program and the label of its listing: ``two-term original``."""
         return f"{self.listing.program} {self.listing.label}"
 
 
@@ -85,9 +87,9 @@ class Comparison:
     Attributes
     ----------
     scene : Scene
-        The scene, with the attitude that was integrated, if one was requested.
+        The scene. If attitudes were requested, it has the initial attitude.
     lipschitz : float
-        Constant of the stop test, 1/s.
+        The Lipschitz constant of the Runge-Kutta program's stop test, 1/s.
     reference : Reference
         The reference solution and its error bound.
     programs : tuple of ProgramFinding
@@ -95,10 +97,10 @@ class Comparison:
     methods : tuple of MethodFinding
         The results of the methods of `solve_ivp`.
     growth : float or None
-        Error amplification: the largest norm of the state-transition matrix of omega from any time
-        to the last; None if it is unknown.
+        The error amplification: the largest norm of the state-transition matrix of omega from any
+        earlier time to the last time. None if it is unknown.
     word : str
-        The arithmetic of the programs.
+        The name of the arithmetic in which the programs ran, as in ``binary64``.
     """
 
     scene: Scene
@@ -113,27 +115,27 @@ class Comparison:
 
     @property
     def digits(self) -> float | None:
-        """Return how many correct decimal digits amplified rounding leaves to any method.
+        """Return the number of correct decimal digits that amplified rounding errors permit.
 
-        The result is None if the error amplification is unknown.
+        It is a limit for all methods in binary64. It is None if the error amplification is unknown.
         """
         return None if self.growth is None else digits_left(ROUNDING * self.growth)
 
     @property
     def tolerance(self) -> float:
-        """Return the smallest tolerance of the methods of `solve_ivp` (relative)."""
+        """Return the smallest relative tolerance with which a method of `solve_ivp` was run."""
         return min(each.tolerance for each in self.methods)
 
     @property
     def is_sensitive(self) -> bool:
-        """Return whether rounding that the motion amplifies exceeds a fraction of `tolerance`."""
+        """Return whether the amplified rounding error exceeds a fraction, 0.3, of `tolerance`."""
         return is_sensitive(self.growth, self.tolerance)
 
     @property
     def unexpected(self) -> tuple[str, ...]:
-        """Return one sentence for each unexpected result; empty if there is none.
+        """Return a sentence for each unexpected result; the tuple is empty if there is none.
 
-        A result is unexpected if Fortran and the twin differ, or if the error of a corrected
+        A result is unexpected if Fortran and the Python port differ, or if the error of a corrected
         program does not decrease with the order of the program as the step is halved.
         """
         found = []
@@ -150,9 +152,10 @@ class Comparison:
 
     @property
     def not_judged(self) -> tuple[str, ...]:
-        """Return one sentence for each corrected program whose order this scene can't judge.
+        """Return a sentence for each corrected program whose order could not be determined.
 
-        The sentence names the program and the reason.
+        The order is that of convergence, measured on this scene. The sentence names the program and
+        the reason.
         """
         return tuple(
             f"{each.who}: {each.order}"
@@ -182,28 +185,28 @@ def compare_programs(
         The programs to run, each with its active defects; by default all three programs, original
         and corrected.
     lipschitz : float
-        Constant of the stop test (1/s), which only the Runge-Kutta program has.
+        The Lipschitz constant of the stop test (1/s), which only the Runge-Kutta program has.
     may_stop : bool
         Whether the stop test may end a run.
     tolerance : float, optional
-        The tolerance of each method of `solve_ivp`, relative to the largest component of omega; by
-        default it is the method's own, as in `solve`.
+        The tolerance of each method of `solve_ivp`, relative to the largest component of omega; the
+        default is the one that `solve` uses for the method.
     effort : float
         Factor on the work limit of each program, of each method and of the reference.
     attitude : bool
-        Whether attitudes are compared too. They start from the scene's attitude, or from the axes
-        of space if the scene has none. A program's attitude is integrated from row to row by a
-        method of order 4.
+        Whether attitudes are compared too. The initial attitude is the scene's, or, if the scene
+        has none, that in which body axes and axes of space are parallel. A program's attitude is
+        integrated from its rows of omega by a method of order 4.
     word : str
         The arithmetic of the programs, one of `pyharness.original.programs.WORD_NAMES`. If the
-        compiled programs do not support it, only the Python twins run, and they are not compared
-        with Fortran. Orders are measured in binary64 only.
+        compiled programs do not support it, only the Python ports run, and are not compared with
+        Fortran. Orders of convergence are measured in binary64 only.
 
     Returns
     -------
     Comparison
-        The results of all programs and methods. Its `unexpected` is empty if every result is as
-        expected.
+        The results of all programs and methods. Its property `unexpected` is empty if every result
+        is as expected.
 
     Raises
     ------
@@ -267,11 +270,12 @@ def listings_for(
 ) -> list[Listing]:
     """Return the listings to compare: for each program the original and the corrected listing.
 
-    If a name in `fix` (to correct) or `keep` (to leave active) applies to a program, the listing
-    with that selection comes between these two. A defect, reading or conjecture applies to the
-    programs that have it; raise InputError if no program has it. `base` is ``original`` or
-    ``corrected``: without `fix` and `keep` only this listing is returned, else the selection starts
-    from it.
+    `fix` has names of defects, readings or conjectures to correct, and `keep` has names to leave
+    active. If a program has any of these names, the listing with this selection comes between the
+    other two. The selection starts from the listing `base`, ``original`` or ``corrected``. If only
+    `base` is given, without `fix` and `keep`, it is the only listing of each program. `readings`
+    and `conjectures` have the same meaning as in `subset`. Raise InputError for a name that none of
+    `programs` has.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]

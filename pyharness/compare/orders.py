@@ -1,4 +1,7 @@
-"""Measured orders: the power of the step size with which the error against the reference falls."""
+"""Measured orders of convergence: powers of the step size with which the error decreases.
+
+The error is that of a program or a method against the reference solution.
+"""
 
 import itertools
 import math
@@ -20,19 +23,20 @@ from pyharness.truth.reference import Reference
 
 # A measured order may be below the expected one by at most this.
 ORDER_SLACK = 0.5
-# The order is measured once halving the step changes the result by less than `_SMALL_CHANGE`,
-# relative to the largest value, and a step turns body and torque by at most `_SMALL_ANGLE` (rad).
-# The angle is limited because steps that skip periods of the torque seem to converge too.
+# The order is measured when two conditions hold. Halving the step changes the result by less than
+# `_SMALL_CHANGE`, relative to the largest value. In a step the phases of the body's motion and of
+# the torque change by at most `_SMALL_ANGLE` (rad), because steps that skip whole periods of the
+# torque also seem to converge.
 _SMALL_CHANGE = 1e-3
 _SMALL_ANGLE = 0.5
 # The step is halved until this many steps are taken, and at least eight times.
 _MOST_STEPS = 2**18
 _HALVINGS = 8
-# If a textbook method of the same order converges with this many times fewer steps, a program that
-# does not converge is at fault.
+# A program that does not converge is incorrect if a textbook method of the same order converges
+# with fewer steps, by this factor.
 _MARGIN = 4
 _TEXTBOOK = {2: "improved-euler", 4: "rk4"}
-# Number of rounding errors of omega in a step.
+# Assumed number of rounding errors of omega in a step.
 _ROUNDINGS = 8.0
 # A matrix with a larger condition number may be found singular.
 _CONDITION = 1e15
@@ -42,17 +46,17 @@ State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensit
 
 @dataclass(frozen=True)
 class Order:
-    """The order of convergence measured by halving the step, or the reason why it is unknown."""
+    """An order of convergence, measured by halving the step, or the reason why it is unknown."""
 
-    due: int  # the expected order, which theory gives to the method
-    # `as due`: the order was observed. `rounding`: the error was rounding error before the order
-    # could be observed. `misses`: the error decreases more slowly. The last four leave the order
-    # undecided: no step was small enough (`unsettled`), the program found its matrix singular
-    # (`singular`), the motion amplifies rounding too much (`sensitive`), or the solution is
-    # unbounded (`unbounded`).
+    due: int  # the expected order, known from theory
+    # `as due`: the expected order was observed. `rounding`: before the order could be observed, the
+    # error was only rounding error. `misses`: the error decreases more slowly than expected. In the
+    # other four states the order is undecided: no step was small enough (`unsettled`), the program
+    # found its matrix singular (`singular`), the motion amplifies rounding errors too much
+    # (`sensitive`), or the solution is unbounded (`unbounded`).
     state: State
     value: float | None  # the measured order, if it could be measured
-    step_size: float  # the smallest that was tried (s); if `singular`, the longest singular one
+    step_size: float  # smallest step size tried (s); if `singular`, the largest singular one
     steps: int = 0  # number of steps of the finest run that was compared with the reference
     error: float = math.inf  # the largest error of that run (rad/s)
     time: float = math.nan  # the time of that error (s)
@@ -63,7 +67,7 @@ class Order:
         return self.state in ("as due", "rounding", "misses")
 
     def __str__(self) -> str:
-        """Return the measured order as text, or in a few words why it is unknown."""
+        """Return the measured order as text, or, if it is unknown, the reason in a few words."""
         if self.value is not None:
             return f"order {self.value:.2f}"
         return {
@@ -87,9 +91,9 @@ def measured_order(
 ) -> Order:
     """Measure the order with which omega of a listing's compiled program converges to `truth`.
 
-    The measurement and the result are those of `order_of`, which explains `truth` and `pairs`. An
-    error that may be amplified rounding counts as `sensitive`, not as `misses`. Failure to converge
-    counts as `misses` if a textbook method of the same order converges.
+    `order_of` measures the order, and explains the arguments `truth` and `pairs` and the result.
+    The state is `sensitive` instead of `misses` if the error may be amplified rounding error. It is
+    `misses` if the program does not converge, but a textbook method of the same order converges.
     """
 
     def omega(finer: Scene) -> Array:
@@ -123,12 +127,13 @@ def order_of(
 ) -> Order:
     """Measure the order of a numerical solution by halving the step size until it is small.
 
-    `scene` has the longest step, and `truth` is the reference solution at the times of `scene`.
-    `solution` takes a scene and returns the judged `quantity` after each step of that scene, shape
-    (n, 3), with fewer rows if it overflows. `due` is the expected order. The order is decided if it
-    appears, or fails to appear, in `pairs` consecutive halvings. The step is halved as long as
-    there are at most `most_steps` steps; by default until there are 2**18 steps, and at least eight
-    times. The result is an Order, with the state that was found and the measured order.
+    `scene` has the largest step size, and `truth` is the reference solution at its times.
+    `solution` takes a scene and returns its `quantity` after each step, shape (n, 3), with fewer
+    rows after an overflow. `due` is the expected order. The measurement ends when the order is at
+    least `due` - 0.5 in `pairs` consecutive halvings, when it is smaller in as many halvings, or
+    when the error is only rounding error. There are at most `most_steps` steps; by default at most
+    2**18, or eight halvings if these need more. The result is an Order, which has the measured
+    order and the state of the measurement.
     """
     n = len(truth.time)
     if n < scene.steps:
@@ -155,7 +160,7 @@ def order_of(
         steps = finer.steps
         if state != "singular":
             step_size = finer.step_size
-        if len(found) < n:  # overflow: the step is far too large
+        if len(found) < n:  # after an overflow, because the step is far too large
             previous = None
             continue
         errors = np.abs(found - right).max(axis=1)
@@ -187,7 +192,8 @@ def _shows(order: float, due: int) -> bool:
 def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
     """Yield the scene with its own step size, with half of it, with a quarter, and so on.
 
-    All have the same last time, and at most `most_steps` steps.
+    All these scenes have the same last time. They have at most `most_steps` steps, or, if it is
+    None, as many as `order_of` uses by default.
     """
     most = max(_MOST_STEPS, scene.steps << _HALVINGS) if most_steps is None else most_steps
     for halvings in itertools.count():
@@ -216,10 +222,10 @@ def _fastest(scene: Scene, omega: Array) -> float:
 
 
 def _is_grown_rounding(scene: Scene, found: Order) -> bool:
-    """Return whether the error of a measured order may be rounding that the motion amplifies.
+    """Return whether the error in a measurement of an order may be amplified rounding error.
 
-    `found` is the measurement. Its error may be rounding if it is not above the bound on amplified
-    rounding errors, or if this bound can't be computed.
+    `found` is the measurement, and its error is `found.error`. The result is true if this error is
+    not above the bound on amplified rounding errors, or if the bound can't be computed.
     """
     if not found.steps or not math.isfinite(found.error):
         return False
@@ -231,9 +237,10 @@ def _is_grown_rounding(scene: Scene, found: Order) -> bool:
 
 
 def _may_be_singular(program: str, step_size: float) -> bool:
-    """Return whether LEQT1F may find a program's collocation matrix at a step size (s) singular.
+    """Return whether the linear solver LEQT1F may find a program's collocation matrix singular.
 
-    It may if the matrix overflows, or if its condition number is not below 1e15.
+    The matrix depends on `step_size` (s). The result is true if an element overflows, or if the
+    condition number is not below 1e15. `program` is the name of the program.
     """
     from pyharness.theory.collocation_matrices import PARTS
 

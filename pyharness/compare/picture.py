@@ -1,4 +1,4 @@
-"""The picture of a comparison: omega over time, its error below, one column for each program."""
+"""The picture of a comparison: for each program, omega over time, and its errors below."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -12,15 +12,15 @@ from pyharness.model.scene_report import heading
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Distinguishable without colour, by dash and width.
+# The lines can be distinguished without colour, by their dashes and widths.
 _STYLES: dict[str, dict[str, Any]] = {
     "original": {"color": "#c02020", "linestyle": (0, (5, 2)), "linewidth": 1.4},
     "custom": {"color": "#107040", "linestyle": (0, (6, 1, 1, 1)), "linewidth": 1.4},
     "corrected": {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.0},
 }
 _REFERENCE: dict[str, Any] = {"color": "#b8b8b8", "linestyle": "-", "linewidth": 3.5}
-# For a trajectory of a single row, which a line does not show. Markers that lie on one another can
-# still be distinguished.
+# A trajectory of a single row is drawn as a marker, because a line would not show it. The markers
+# can be distinguished even at the same point.
 _MARKERS: dict[str, dict[str, Any]] = {
     "reference": {"marker": "s", "markersize": 11.0},
     "original": {"marker": "o", "markersize": 8.0, "markerfacecolor": "none"},
@@ -32,9 +32,10 @@ _MARKERS: dict[str, dict[str, Any]] = {
 def comparison_picture(comparison: Comparison) -> Picture:
     """Return the picture of a comparison, and the table of numbers that it shows.
 
-    Each program has a column of panels: three with a component of omega (rad/s) over time, from its
-    listings and from the reference solution, and below them the errors of omega (rad/s) and, if
-    attitudes were requested, of the attitude (rad).
+    Each program has a column of panels. Three panels show the components of omega (rad/s) over
+    time, for the program's listings and for the reference solution. A panel below shows the error
+    of omega (rad/s). If attitudes were requested, another panel shows the error of the attitude
+    (rad).
     """
     from matplotlib.figure import Figure
 
@@ -111,8 +112,8 @@ def _line(axes: "Axes", time: np.ndarray, values: np.ndarray, label: str) -> Non
 def _frame(axes: "Axes", truth: np.ndarray) -> None:
     """Limit the vertical range of a panel to values near the reference solution.
 
-    `truth` is a component of the reference omega (rad/s). The curve of a program that diverges
-    leaves the range.
+    `truth` has the values of a component of the reference omega (rad/s). The curve of a program
+    that diverges is cut off at the limits.
     """
     if not len(truth):
         return

@@ -1,4 +1,4 @@
-"""The report of the verb `compare`: tables, verdict, picture and data of a comparison."""
+"""The report of the verb `compare`: the tables, verdict, picture and data of a comparison."""
 
 from typing import Any
 
@@ -31,7 +31,10 @@ _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 
 
 def comparison_report(comparison: Comparison) -> Report:
-    """Return the report of a comparison: programs, methods of SciPy's `solve_ivp`, our verdict."""
+    """Return the report of a comparison, with the results of programs and methods, and a verdict.
+
+    The methods are those of SciPy's `solve_ivp`.
+    """
     in_floats = comparison.word == BINARY64
     scene, truth = heading(comparison.scene), comparison.reference
     reference = (
@@ -86,9 +89,9 @@ def comparison_report(comparison: Comparison) -> Report:
 def verdict(comparison: Comparison) -> list[str]:
     """Return our verdict on a comparison, as a list of sentences.
 
-    It is one sentence if all results are as expected, else one for each unexpected result. Further
-    sentences say if the scene is sensitive to rounding, and name each corrected program whose order
-    of convergence this scene can't judge.
+    If all results are as expected, the first sentence says so; otherwise there is a sentence for
+    each unexpected result. A further sentence says if the scene is sensitive to rounding errors. A
+    sentence names each corrected program whose order of convergence could not be determined.
     """
     told = [f"UNEXPECTED: {each}" for each in comparison.unexpected] or [_as_expected(comparison)]
     if comparison.is_sensitive:
@@ -152,7 +155,7 @@ def _methods(comparison: Comparison) -> Table:
 
 
 def _attitudes(comparison: Comparison) -> list[list[Table]]:
-    """Return the table of attitude errors, as a list of blocks of the report's text.
+    """Return the table of attitude errors as a section of the report, in a list.
 
     The list is empty if attitudes were not requested.
     """
@@ -174,7 +177,7 @@ def _attitudes(comparison: Comparison) -> list[list[Table]]:
 
 
 def _data(comparison: Comparison) -> Table:
-    """Return the results of all programs and methods as one table with a row for each."""
+    """Return the results as one table for CSV, with a row for each program and method."""
     names = (
         "method listing active steps ended stop_variable stop_quotient error_w1 error_w2 error_w3 "
         "error_v energy_drift momentum_drift ulps order order_state evaluations seconds"
@@ -194,7 +197,8 @@ def _data(comparison: Comparison) -> Table:
         }
         rows.append(each | row)
     for each in map(_method, comparison.methods):
-        # A method chooses its own steps, so none are listed. A failure is listed as its ending.
+        # A method of `solve_ivp` chooses its own steps, whose number is not written. If the method
+        # failed, the reason is written as its ending.
         row = {"steps": None, "ended": each["failure"] or each.get("ended", "")}
         rows.append(each | row | ({"seconds": None} if each["failure"] else {}))
     for each in rows:

@@ -1,4 +1,4 @@
-"""Timing of calls in interleaved batches, so that other load on the machine affects all alike."""
+"""Timing of calls in interleaved batches, so that other load on the machine affects all equally."""
 
 import contextlib
 import gc
@@ -10,7 +10,7 @@ from time import perf_counter
 
 import numpy as np
 
-SLOW = 20e-3  # s; calls slower than this are timed in fewer rounds
+SLOW = 20e-3  # s; functions whose call takes longer are timed in fewer rounds
 Run = Callable[[], object]
 Clock = Callable[[], float]
 
@@ -26,11 +26,12 @@ def seconds(
 ) -> list[float]:
     """Return the time of one call of each function in `runs` (s), measured in several rounds.
 
-    In each of the `rounds` rounds, each function is called for about `length` seconds; the first
-    call of all is not counted. A function whose call takes longer than `slow` (s) has at most three
-    rounds. The result is the median over the rounds, or another `statistic`. `say` is called with a
-    message at the beginning of each round. `clocks` has a clock (s) for each function; by default
-    it is the wall clock.
+    In each of the `rounds` rounds, each function is called repeatedly for about `length` seconds. A
+    first call before the rounds is not counted. If this call takes longer than `slow` (s), the
+    function is timed in at most three rounds; if it takes longer than five times `slow`, in one
+    round. The result is the median of the
+    times of the rounds, or another `statistic`. `say` is called with a message at the beginning of
+    each round. `clocks` has a clock (s) for each function; by default it is the wall clock.
     """
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))
@@ -44,7 +45,7 @@ def seconds(
                 say(f"round {number} of {rounds}")
                 for (run, clock), times, most in zip(timed, seen, due, strict=True):
                     if number <= most:
-                        # The latest time counts, because the first call may have been slow.
+                        # Use the latest time, because the first call may have been slow.
                         calls = max(1, round(length / max(times[-1], 1e-9)))
                         times.append(batch_seconds(run, calls, clock))
     finally:
@@ -56,7 +57,8 @@ def seconds(
 def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> float:
     """Return the time of one call of the function `run` (s), averaged over consecutive calls.
 
-    `calls` is the number of calls that are timed. If it is above 1, an untimed call precedes them.
+    `calls` is the number of calls that are timed. If there are several, an untimed call precedes
+    them.
     """
     if calls > 1:
         run()

@@ -1,1 +1,1 @@
-"""The edition as a static web site, built from the project's data and findings."""
+"""The edition of the thesis and its programs as a static web site, built from data files."""

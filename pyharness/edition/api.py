@@ -12,7 +12,7 @@ from pyharness.edition.markdown import inline
 
 
 class Item(NamedTuple):
-    """A parameter, attribute, result or exception: its name, its type and its description."""
+    """A parameter, attribute, result or exception of a docstring: name, type and description."""
 
     name: str
     type: str
@@ -22,8 +22,9 @@ class Item(NamedTuple):
 class Entry(NamedTuple):
     """A public name on the API page: its signature, its docstring in parts, its methods if a class.
 
-    `anchor` is its anchor in the page. `summary` is the first line of the docstring, `text` has the
-    further paragraphs, and `groups` has the sections with their titles, such as Parameters.
+    `anchor` is the anchor of the entry in the page, and `kind` is "function", "class" or
+    "property". `summary` is the first line of the docstring, `text` has the further paragraphs, and
+    `groups` has the sections with their titles, such as Parameters.
     """
 
     name: str
@@ -84,7 +85,7 @@ def _signature(of: Any) -> str:
             told = re.sub(r" -> \w+$", "", told)
     except (TypeError, ValueError):
         return ""
-    # Write types without their modules, and arrays as the sources write them.
+    # Types are written without their modules, and array types as in the source files.
     told = re.sub(r"<class '(.*?)'>", r"\1", told).replace("NoneType", "None")
     told = re.sub(r"numpy\.ndarray\[tuple\[.*?\], numpy\.dtype\[(.*?)\]\]", _array, told)
     return re.sub(r"\b(?:[a-z_]+\.)+(?=[A-Za-z])", "", told)

@@ -1,8 +1,9 @@
 """Bundling of JavaScript (ES) modules into one classic script.
 
-Browsers do not import modules into a page that is opened from a file, but they run such a script.
-Every module becomes a function that returns the exports of the module, in order of dependency.
-Only the forms of import and export that the project's modules use are known; any other is an error.
+Browsers do not import modules into a page that is opened from a file, but they run classic scripts.
+In the script, every module is a function that returns the exports of the module. A module comes
+after all modules that it imports. Only the forms of import and export that the project's modules
+use are supported; any other form is an error.
 """
 
 import re
@@ -13,7 +14,7 @@ _IMPORT = re.compile(
     r'^import (?:\{(?P<names>[^}]*)\}|\* as (?P<all>\w+)) from "(?P<path>\.\.?/[\w./-]+)";$', re.M
 )
 _EXPORT = re.compile(r"^export (?=(?:function|const|class) (?P<name>\w+))", re.M)
-# Any other form of import or export that remains when the known forms are replaced.
+# An unsupported form of import or export, which remains after the supported forms are replaced.
 _UNKNOWN = re.compile(r"^\s*(?:import|export)\b.*|\bimport\s*[(.]", re.M)
 
 
@@ -21,8 +22,8 @@ def bundle(entry: Path) -> str:
     """Return the text of one script with the module in the file `entry` and all that it imports.
 
     The script runs inside a function, so that it defines no global names. Raise ValueError, with
-    file and line, for an unknown form of import or export, an import of a missing file or name, and
-    modules that import each other.
+    file and line, for an unsupported form of import or export, for an import of a missing file or
+    name, and for modules that import each other.
     """
     exports: dict[Path, list[str]] = {}
     parts: list[str] = []
@@ -33,10 +34,10 @@ def bundle(entry: Path) -> str:
 def _add(
     path: Path, importing: tuple[Path, ...], exports: dict[Path, list[str]], parts: list[str]
 ) -> None:
-    """Append the text of the module in the file `path` to `parts`, after the modules it imports.
+    """Append the modules that a module imports, and then the module itself, to the script `parts`.
 
-    `importing` is the chain of modules that import this one. The names that each appended module
-    exports are stored in `exports`.
+    `path` is the file of the module. `importing` is the chain of modules that import it. The names
+    that each appended module exports are stored in `exports`.
     """
     text = path.read_text(encoding="utf-8")
     for found in _IMPORT.finditer(text):
@@ -71,7 +72,10 @@ def _add(
 
 
 def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
-    """Yield the exported and the local name of each item in braces of an import statement."""
+    """Yield the exported and the local name of each name in the braces of an import statement.
+
+    `found` is the match of the statement.
+    """
     for each in (found["names"] or "").split(","):
         name, _, alias = each.strip().partition(" as ")
         if name:
@@ -79,10 +83,10 @@ def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
 
 
 def _as_constant(found: re.Match[str], path: Path, modules: list[Path]) -> str:
-    """Return the declaration, with as many lines, that replaces an import statement in a script.
+    """Return the declaration of constants that replaces an import statement in the script.
 
-    `found` is the match of the statement in the module `path`. `modules` has the paths of the
-    modules that are in the script already, in their order.
+    It has as many lines as the statement. `found` is the match of the statement in the module
+    `path`. `modules` has the paths of the modules that are already in the script, in their order.
     """
     number = modules.index((path.parent / found["path"]).resolve())
     renamed = ", ".join(f"{name}: {here}" for name, here in _names(found))

@@ -1,7 +1,8 @@
-"""The data of the listing's pages: each card with its scan, port, twin and apparatus entries.
+"""The data of the pages that show the listings card by card, with the scan and the ports.
 
-The port is the program in Fortran of today, and the twin is the program in Python. An entry of the
-critical apparatus explains, for example, a defect, or a difference between a card and the scan.
+A card has one line of a program. The port is the program in modern Fortran, and the twin is the
+program in Python. An entry of the critical apparatus explains, for example, a defect, or a
+difference between a card and the scan.
 """
 
 from collections.abc import Iterable
@@ -10,8 +11,8 @@ from typing import Any, NamedTuple
 from pyharness.history.ablation import entries
 from pyharness.original.cards import Card, Place, deck, parallels, tight
 
-# Kinds of apparatus entries by precedence: a card with entries of several kinds has the colour of
-# the first one.
+# Kinds of apparatus entries in order of precedence. A card with entries of several kinds has the
+# colour of the first of these kinds.
 _ORDER = (
     "defect", "reading", "conjecture", "missing text", "unreachable", "unread", "redundant",
     "dialect", "normalization", "misreading",
@@ -21,8 +22,8 @@ _ORDER = (
 class Run(NamedTuple):
     """A run of consecutive characters of a card, or of the line of the scan that shows the card.
 
-    `entry` is the apparatus entry that explains why card and scan differ in these characters. It is
-    None if they agree.
+    `entry` is the identifier of the apparatus entry that explains why card and scan differ in these
+    characters. It is None if card and scan agree.
     """
 
     text: str
@@ -32,10 +33,11 @@ class Run(NamedTuple):
 class CardView(NamedTuple):
     """A card as a page shows it, with its line of the scan and its apparatus entries.
 
-    `card` is the text of the card and `scan` the line of the scan, which is None if the scan lacks
-    the card. `port` and `twin` are the card's lines in the Fortran port and the Python twin.
-    `absent` is the reason why the port has no statement for the card, and `otherwise` the reason
-    why its statement is different. `parallels` are the cards of other decks with the same text.
+    `card` is the text of the card. `scan` is its line in the scan, or None if the scan lacks the
+    card. `port` and `twin` are the lines of the Fortran port and of the Python twin that correspond
+    to the card. `absent` is the reason why the port has no statement for the card, or None.
+    `otherwise` is the reason why the port's statement is different, or None. `parallels` are the
+    cards of the other programs with the same text.
     """
 
     number: int
@@ -44,14 +46,14 @@ class CardView(NamedTuple):
     port: list[Place]
     twin: list[Place]
     entries: list[dict[str, Any]]
-    kinds: list[str]  # the first gives the colour
+    kinds: list[str]  # kinds of the entries by precedence; the first determines the colour
     absent: str | None
     otherwise: str | None
     parallels: list[Card]
 
 
 def card_views(program: str) -> list[CardView]:
-    """Return the views of a program's cards, in the order of the cards."""
+    """Return a view of each card of a program, in the order of the cards."""
     by_name = {each["id"]: each for each in entries()}
     found = deck(program)
     return [
@@ -72,7 +74,10 @@ def card_views(program: str) -> list[CardView]:
 
 
 def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
-    """Return the number of cards for each kind of apparatus entry, in the kinds' precedence."""
+    """Return, by kind of apparatus entry, how many cards have an entry of this kind.
+
+    The kinds are in order of precedence; kinds without cards are omitted.
+    """
     counts = dict.fromkeys(_ORDER, 0)
     for view in views:
         for kind in view.kinds:
@@ -81,9 +86,10 @@ def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
 
 
 def _scan(card: Card) -> list[Run] | None:
-    """Return the line of the scan that shows a card, as runs: number, dash and text.
+    """Return the line of the scan that shows a card, as runs of characters.
 
-    Return None if the scan lacks the card.
+    The runs are the card number, a dash and the text without blanks. Return None if the scan lacks
+    the card.
     """
     if card.lost:
         return None

@@ -1,4 +1,4 @@
-"""The documents of the folder `docs` as pages of the site."""
+"""The Markdown documents of the folder `docs` as pages of the web site."""
 
 import posixpath
 from collections.abc import Iterator
@@ -11,14 +11,14 @@ from pyharness.model.facts import shipped
 
 # Suffixes of the pictures in the documents.
 _PICTURES = (".png", ".svg")
-# Documents with an entry of their own in the menu of the site.
+# Documents to which an entry in the menu of the site links.
 _OF_THE_MENU = ("index.md", "explanation/findings.md", "explanation/methods.md")
 
 
 def documents_folder(given: str | None = None) -> Path:
-    """Return the folder of the documents: `given`, or by default the folder of the checkout.
+    """Return the folder of the documents: `given`, or by default the folder `docs` of the checkout.
 
-    Raise InputError if it has no documents; an installed package does not include them.
+    Raise InputError if the folder lacks the documents, which an installed package does not include.
     """
     folder = shipped("docs") if given is None else Path(given)
     missing = [name for name in _OF_THE_MENU if not (folder / name).is_file()]
@@ -36,7 +36,7 @@ def documents_folder(given: str | None = None) -> Path:
 
 
 def documents(folder: Path) -> Iterator[tuple[str, Document]]:
-    """Yield the path in the site and the rendered text of each document in a folder."""
+    """Yield, for each Markdown document in a folder, its path in the site and its rendered text."""
     for file in sorted(folder.rglob("*.md")):
         name = file.relative_to(folder).as_posix()
         text = file.read_text(encoding="utf-8")
@@ -44,7 +44,7 @@ def documents(folder: Path) -> Iterator[tuple[str, Document]]:
 
 
 def page_of(name: str) -> str:
-    """Return the path in the site of the document with the path `name` in its folder."""
+    """Return the path in the site of a document, from `name`, its path in the documents' folder."""
     return f"docs/{name.removesuffix('.md')}.html"
 
 
@@ -58,9 +58,10 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def _link(folder: Path, name: str, target: str) -> str | None:
-    """Return the site's link for `target`, a link in the document `name` in `folder`.
+    """Return the link in the site that replaces the link `target` of a document.
 
-    Return None if the site lacks the target.
+    `name` is the path of the document in `folder`, the documents' folder. Return None if the site
+    does not have the target.
     """
     path, hash_, anchor = target.partition("#")
     if "://" in target or not path:

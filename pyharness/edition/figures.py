@@ -1,6 +1,7 @@
-"""The figures of the thesis as pictures for the site: Figures 6 to 12, and Figure 7 with a limit.
+"""Figures 6 to 12 of the thesis as pictures for the web site, drawn from computed curves.
 
-The limit is the function to which an original program tends as its step size goes to 0.
+A further picture shows Figure 7 with the limit of its original program: the function to which
+omega converges as the step size goes to 0.
 """
 
 from collections.abc import Mapping
@@ -18,8 +19,8 @@ from pyharness.views.pictures import saved
 class Drawn(NamedTuple):
     """A figure of the thesis, drawn with the original or with the corrected programs.
 
-    `finding` has its computed curves. `files` has the content of its files by name: the picture
-    (SVG) and the plotted numbers (CSV).
+    `finding` has the computed curves of the figure. `files` has the content of two files by name:
+    the picture (SVG) and the plotted numbers (CSV).
     """
 
     finding: FigureFinding
@@ -27,7 +28,10 @@ class Drawn(NamedTuple):
 
 
 def drawn() -> dict[str, Drawn]:
-    """Compute and draw all figures; return each by the name of its files without the suffix."""
+    """Compute and draw all figures of the site.
+
+    The result maps the name of a figure's files, without the suffix, to the drawn figure.
+    """
     return {
         each.plan.stem: Drawn(each, saved(figure_picture(each), f"{each.plan.stem}.svg"))
         for each in findings()
@@ -37,7 +41,7 @@ def drawn() -> dict[str, Drawn]:
 def together(figures: Mapping[str, Drawn]) -> dict[str, bytes]:
     """Draw the original and the corrected Figure 7 and its limit in one picture.
 
-    `figures` is the result of `drawn`. Return the content of the files by name: the picture (SVG)
+    `figures` is the result of `drawn`. Return the content of two files by name: the picture (SVG)
     and the plotted numbers (CSV).
     """
     original, corrected = (figures[name].finding for name in ("figure-07", "figure-07-corrected"))

@@ -1,6 +1,6 @@
 """The data of the laboratory, the page that runs the programs of the thesis in the browser.
 
-The data include one computed run for readers without JavaScript.
+The data include the results of one run, for readers without JavaScript.
 """
 
 from functools import cache
@@ -21,11 +21,11 @@ from pyharness.original.programs import run_program
 from pyharness.truth.reference import reference
 
 DEFAULTS: dict[str, Any] = {"case": 2, "program": "runge-kutta", "listing": "original"}
-"""The run that the page shows if its address specifies none."""
+"""The run that the page shows if the page's address does not specify a run."""
 MOST_STEPS = 3000
-"""The most steps of a run on the page, which it draws without a pause.
+"""The largest number of steps of a run on the page, so that it is drawn without a noticeable delay.
 
-They cover 3 s with a tenth of the decks' step size.
+They suffice for 3 s with steps of 0.001 s, a tenth of the programs' step size.
 """
 _KINDS = {
     "defect": "Defects left in",
@@ -41,7 +41,8 @@ def context() -> dict[str, Any]:
 
     `data` is the object that the page's script reads as `window.laboratoryData`. `switches` has the
     defects, readings and conjectures that a reader can switch on or off, each kind with a heading.
-    `first` is the run that `DEFAULTS` specifies, computed here.
+    `first` has the results of the run that `DEFAULTS` specifies. `titles` has the names of the
+    cases, and `programs` the names of the programs.
     """
     given = data()
     kinds = [
@@ -58,7 +59,7 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the data with which the page's script can run any case and program, as JSON values."""
+    """Return the data, as JSON values, with which the page's script runs any case and program."""
     return {
         "scenes": [asked_scene(case_scene(number)) for number in case_numbers()],
         "headings": {number: _told(case_scene(number)) for number in case_numbers()},
@@ -84,7 +85,7 @@ def data() -> dict[str, Any]:
 
 
 def _told(scene: Scene) -> list[str]:
-    """Return lines about a case: body, torque and further remarks, without the initial omega."""
+    """Return lines that describe the body and the torque of a case, with any remarks."""
     lines = heading(scene)
     body, torque, *_ = lines[1].split("; ")
     return [f"{body}; {torque}", *lines[2:]]
@@ -93,8 +94,9 @@ def _told(scene: Scene) -> list[str]:
 def _first() -> dict[str, Any]:
     """Return the values with which the page shows the run that `DEFAULTS` specifies.
 
-    They include how the run ended, the largest error of its omega (rad/s) against the reference,
-    its first and last rows, the page that the program prints, and the command that repeats the run.
+    They include how the run ended, its first and last rows, and the largest error of omega (rad/s)
+    against the reference solution. They also include the page that the program prints, and the
+    command that repeats the run.
     """
     scene = case_scene(DEFAULTS["case"])
     program = DEFAULTS["program"]
@@ -117,10 +119,11 @@ def _first() -> dict[str, Any]:
 
 
 def _row(run: Trajectory, number: int, error: float) -> list[str]:
-    """Return the texts of the table's row for the step with the index `number`.
+    """Return the cells of the row for one step, as texts, in the table of results.
 
-    They are the step, the time (s), omega (rad/s), the translational velocity (m/s), TIME as the
-    program writes it (s), IER, and `error`, the error of omega (rad/s).
+    `number` is the index of the step, from 0. The cells are the number of the step, the time (s),
+    omega (rad/s), the translational velocity (m/s), the variable TIME of the program (s), IER, and
+    `error`, the error of omega (rad/s).
     """
     assert run.velocity is not None
     values = [run.time[number], *run.omega[number], *run.velocity[number]]

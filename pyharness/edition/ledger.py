@@ -1,4 +1,8 @@
-"""The data of the pages on claims, sentences and apparatus: computed verdicts and reports."""
+"""The data of the pages on claims, sentences and apparatus: computed verdicts and reports.
+
+A claim is a statement of the thesis that we test, and a judgement has our verdicts on it. The
+critical apparatus lists the defects, readings and conjectures with their evidence.
+"""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
@@ -20,7 +24,8 @@ from pyharness.views import html
 class SentenceVerdicts(NamedTuple):
     """A sentence of the thesis with the verdicts on the claims that it makes.
 
-    `judged` has the judgements of these claims, and `anchor` is the sentence's anchor in the page.
+    `judged` has a judgement, with its verdicts, for each of these claims. `anchor` is the anchor of
+    the sentence in the page.
     """
 
     sentence: Sentence
@@ -29,19 +34,20 @@ class SentenceVerdicts(NamedTuple):
 
     @property
     def statements(self) -> str:
-        """Return the statements of the sentence's claims as one text."""
+        """Return the statements of the claims that the sentence makes, as one text."""
         return " ".join(each.claim["statement"] for each in self.judged)
 
 
 def judgements() -> list[Judgement]:
-    """Return the judgement of every claim."""
+    """Return the judgement, with our verdicts, of every claim of the thesis."""
     return [judgement(entry["id"]) for entry in claims()]
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
-    """Return, for each verdict, the numbers of claims of the kind `result` that received it.
+    """Return, for each verdict, the numbers of claims about results that received the verdict.
 
-    `judged` has the judgements of all claims. The first number is for the original programs, the
+    `judged` has the judgements of all claims; only claims of the kind `result` are counted. The
+    first number is for the original programs, the
     second for the corrected programs.
     """
     judged = [each for each in judged if each.claim["kind"] == "result"]
@@ -58,15 +64,15 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def kinds(judged: Sequence[Judgement]) -> Markup:
-    """Return an HTML table of the verdicts in the judgements `judged`, by kind of claim."""
+    """Return an HTML table: how often each verdict occurs in `judged`, by kind of claim."""
     return Markup(html.table(kinds_table(judged), "verdicts by kind of claim"))
 
 
 def account() -> dict[str, Markup]:
-    """Return, by identifier, the texts that pages and documents share, as HTML.
+    """Return, by identifier, the texts that occur both in pages and in documents, as HTML.
 
-    The texts are the statements of ``data/account.toml``, and the descriptions of the effect of
-    single defects in ``data/apparatus.toml``.
+    The texts are the statements in ``data/account.toml``, and the descriptions in
+    ``data/apparatus.toml`` of the effects of single defects.
     """
     texts = {each["id"]: each["text"] for each in facts("account")["statement"]}
     texts |= {each["id"]: each["part"] for each in entries() if "part" in each}
@@ -76,7 +82,7 @@ def account() -> dict[str, Markup]:
 def context(judged: Sequence[Judgement]) -> dict[str, Any]:
     """Return the data of the claims page: the tables, each claim in detail, and the evidence.
 
-    `judged` has the judgements of all claims.
+    `judged` has the judgements of all claims. The values are HTML or judgements with HTML.
     """
     table = claims_report(judged).data
     assert table is not None
@@ -97,7 +103,8 @@ def context(judged: Sequence[Judgement]) -> dict[str, Any]:
 def apparatus() -> list[tuple[dict[str, Any], Markup]]:
     """Return each entry of the critical apparatus with its report as HTML.
 
-    The report shows the effect of the entry in every case, if the entry can be switched.
+    If the entry is a defect, reading or conjecture, the report shows its effect on the results in
+    every case.
     """
     found = []
     for entry in entries():
@@ -109,9 +116,9 @@ def apparatus() -> list[tuple[dict[str, Any], Markup]]:
 
 
 def thesis(judged: Iterable[Judgement]) -> dict[str, list[SentenceVerdicts]]:
-    """Return the sentences of the thesis with their verdicts by section, in the thesis's order.
+    """Return, by section of the thesis, its sentences with the verdicts on their claims.
 
-    `judged` has the judgements of all claims.
+    `judged` has the judgements of all claims. Sections and sentences are in the thesis's order.
     """
     by_name = {each.claim["id"]: each for each in judged}
     found: dict[str, list[SentenceVerdicts]] = {}

@@ -1,4 +1,4 @@
-"""The libraries that write the pages; they are optional and installed on request."""
+"""The third-party libraries that write the pages; a user installs these optional packages."""
 
 from importlib import import_module
 
@@ -12,7 +12,7 @@ LIBRARIES = (
 
 
 def check_libraries() -> None:
-    """Raise InputError if one of the libraries is missing."""
+    """Raise InputError, with the command that installs the libraries, if one of them is missing."""
     for name in LIBRARIES:
         try:
             import_module(name)

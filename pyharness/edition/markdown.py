@@ -1,4 +1,8 @@
-"""The project's Markdown as HTML, with GitHub's anchors, MathML formulas and the site's links."""
+"""Conversion of the project's Markdown to HTML for the web site.
+
+Headings have the same anchors as on GitHub, formulas become MathML, and links between documents
+become links between pages.
+"""
 
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -14,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Part(NamedTuple):
-    """The text under one heading of a document, for the search."""
+    """The text under one heading of a document, with its anchor and title, for the search page."""
 
     anchor: str
     title: str
@@ -22,7 +26,7 @@ class Part(NamedTuple):
 
 
 class Document(NamedTuple):
-    """A rendered document: its title, its HTML without the title, and the text of its parts."""
+    """A rendered document: its title, its HTML without the title, and its text by heading."""
 
     title: str
     html: Markup
@@ -30,16 +34,17 @@ class Document(NamedTuple):
 
 
 def document(text: str, link: Callable[[str], str | None]) -> Document:
-    """Render the Markdown text of a document that begins with its title.
+    """Render the Markdown text of a document, whose first line is its title, as HTML.
 
-    `link` maps a target in the text to a link of the site, or to None if the site lacks the target.
-    Raise ValueError if the site lacks a picture.
+    `link` maps the target of a link or picture in the text to a link of the site. It returns None
+    if the site does not have the target: a link then becomes plain text. Raise ValueError if the
+    site does not have a picture.
     """
     tokens = _parser().parse(text)
     for token in _all(tokens):
         if token.type == "link_open":
             target = link(str(token.attrs["href"]))
-            # Without a target the text remains, but is no link.
+            # Without a target, the text of the link remains as plain text.
             token.attrs = {} if target is None else {"href": target}
         elif token.type == "image":
             source = link(str(token.attrs["src"]))
@@ -49,7 +54,7 @@ def document(text: str, link: Callable[[str], str | None]) -> Document:
     _anchor(tokens)
     title = tokens[1].content
     html = _parser().renderer.render(tokens[3:], _parser().options, {})
-    # An empty corner cell is not the head of a column.
+    # The empty cell in the corner of a table is not the head of a column.
     html = html.replace("<th></th>", "<td></td>")
     return Document(_plain(title), Markup(html), list(_parts(tokens)))
 
@@ -60,7 +65,7 @@ def inline(text: str) -> Markup:
 
 
 def formula(tex: str, display: bool = False) -> Markup:
-    """Return a LaTeX formula as MathML; with `display`, for a line of its own."""
+    """Return a LaTeX formula, `tex`, as MathML; if `display` is true, for a separate line."""
     from latex2mathml.converter import convert
 
     return Markup(convert(tex, display="block" if display else "inline"))
@@ -80,7 +85,7 @@ def _parser() -> "MarkdownIt":
     )
     renderer: Any = parser.renderer
     rules = renderer.rules
-    # Elements that may be wider than the page scroll separately, by keyboard too.
+    # Elements that may be wider than the page can be scrolled separately, also by keyboard.
     rules["table_open"] = lambda *_: f"{_OPEN}<table>\n"
     rules["table_close"] = lambda *_: "</table></div>\n"
     rules["math_block"] = _block
@@ -113,7 +118,10 @@ def _all(tokens: Sequence["Token"]) -> Iterator["Token"]:
 
 
 def _anchor(tokens: Sequence["Token"]) -> None:
-    """Give headings the same anchors as GitHub, so that links between documents work here too."""
+    """Add to the headings the same anchors as on GitHub, so that links to headings work.
+
+    `tokens` are the tokens of a parsed document, which are changed in place.
+    """
     seen: dict[str, int] = {}
     for opening, content in pairwise(tokens):
         if opening.type == "heading_open":

@@ -1,4 +1,4 @@
-"""The report of `edition`: the number and size of the written files, by kind."""
+"""The report of the verb `edition`: the number and size of the files of the site, by type."""
 
 from collections.abc import Mapping
 from pathlib import PurePosixPath
@@ -7,23 +7,24 @@ from typing import Any
 from pyharness.model.records import build_record
 from pyharness.model.report import Column, Report, Section, Table, digits, words
 
-# The file that marks a folder as made by `edition`; it lists the files that were written.
+# The file that marks a folder as written by the verb `edition`; it lists the files of the site.
 MARK = "edition.json"
 _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 
 
 def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return the JSON record of a site's files: sizes in bytes, and the build that wrote them.
+    """Return the JSON record of a site: the build that wrote it, and its files' sizes in bytes.
 
-    `content` has the content of the files by path.
+    `content` maps the path of each file to its content.
     """
     return {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
 
 
 def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Report the number and size (kB) of the files of a site that was written to a folder, by kind.
+    """Return the report of the verb `edition`: the number and size (kB) of files, by type.
 
-    `content` has the content of the files by path.
+    `folder` is the folder to which the site was written. `content` maps the path of each file to
+    its content. The type of a file is the suffix of its name.
     """
     sizes: dict[str, list[int]] = {}
     for name, each in content.items():

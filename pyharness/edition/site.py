@@ -1,8 +1,8 @@
-"""The pages of the site and their content.
+"""The pages of the web site and their content.
 
-Every page is a template filled with data and with the text of reports. Each result is computed only
-once. A page works if it is opened from a file, under any path, and without JavaScript, and it
-fetches nothing from a network.
+Every page is a template that is filled with data and with the text of reports. Each result is
+computed only once. A page can be opened from a web server or from a file, under any path. It can be
+read without JavaScript, and loads nothing from other sites.
 """
 
 import json
@@ -48,7 +48,7 @@ _DECKS = {"two-term": "Two-term collocation", "four-term": "Four-term collocatio
 
 
 class Found(NamedTuple):
-    """An entry of the search index: a link into a page, and the title, kind and text there."""
+    """An entry of the search index: a link to a place in a page, its title, its kind, its text."""
 
     href: str
     title: str
@@ -59,8 +59,8 @@ class Found(NamedTuple):
 class Page(NamedTuple):
     """A page of the site, before it is rendered.
 
-    `template` is the name of its template, and `context` has the values for the template. `found`
-    has the page's entries of the search index.
+    `template` is the name of the page's template, and `context` has the values for the template.
+    `found` has the entries of the search index that link to the page.
     """
 
     path: str
@@ -68,11 +68,11 @@ class Page(NamedTuple):
     template: str
     context: Mapping[str, Any] = {}
     found: Sequence[Found] = ()
-    menu: str = ""  # path of the page's menu entry; if empty, the page's own path
+    menu: str = ""  # path of the menu entry to highlight; if empty, the page's own path
 
 
 def build_site(progress: Progress = no_progress, docs: Path | None = None) -> dict[str, bytes]:
-    """Return the content of the site's files by path.
+    """Compute all results, and return the content of each file of the site by its path.
 
     `progress` is called before each of five parts of the work, with the number of completed parts,
     the number of all parts, and the name of the part. `docs` is the folder of the documents, by
@@ -177,7 +177,8 @@ def _documents(docs: Path) -> Iterator[Page]:
 
 
 def _rendered(page: Page) -> bytes:
-    # The relative path from the page to the top of the site, so that links work under any path.
+    # The relative path from the page to the top of the site. With relative links, the site works
+    # under any path.
     root = "../" * page.path.count("/")
     html = _templates().get_template(page.template).render(
         {"page": page, "root": root, "menu": MENU, "here": page.menu or page.path,
@@ -207,16 +208,20 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
 
 
 def script(name: str, value: Any) -> bytes:
-    """Return a script that assigns `value`, as JSON, to the global variable `name`.
+    """Return a JavaScript file that assigns `value`, as JSON, to the global variable `name`.
 
-    The site has its data in scripts because a page that is opened from a file can't fetch data.
+    The data of the site are in scripts, because a page that is opened from a file can't load JSON
+    files.
     """
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     return f"window.{name}={text};\n".encode()
 
 
 def vendor() -> list[dict[str, Any]]:
-    """Return the third-party packages that the pages include: names, versions, checksums."""
+    """Return the entries of `vendor.toml`, the third-party JavaScript packages that pages use.
+
+    An entry has, for example, the name, the version and the checksums of a package.
+    """
     with open(shipped("web") / "vendor" / "vendor.toml", "rb") as file:
         packages: list[dict[str, Any]] = tomllib.load(file)["package"]
     return packages

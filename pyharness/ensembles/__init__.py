@@ -1,1 +1,1 @@
-"""Sweeps: many scenes on a grid, solved chunk by chunk and kept in a store that can be resumed."""
+"""Sweeps: grids of scenes, solved chunk by chunk; an interrupted sweep can be continued."""

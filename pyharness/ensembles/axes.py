@@ -1,4 +1,4 @@
-"""Axes of a sweep: the fields that vary over its grid, and their values."""
+"""Axes of a sweep's grid: each varies one field of the scene or of the solver."""
 
 import math
 import zlib
@@ -17,10 +17,10 @@ from pyharness.model.values import finite, integer
 
 Floats = NDArray[np.float64]
 
-# Limit of the number of values on one axis, because they are held in memory.
+# Largest number of values on one axis; it is limited because all values are in memory at once.
 MOST_VALUES = 100_000_000
 SPACINGS = ("linear", "log")
-# Distributions, and the keys of a sweep file that give the parameters of each.
+# Random distributions, each with the keys of a sweep file that give its parameters.
 DRAWS = {
     "uniform": ("from", "to"),
     "log-uniform": ("from", "to"),
@@ -37,15 +37,15 @@ _SAMPLE = "sample"
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of a sweep's grid: a field of the scene or of the solver, and the values it takes.
+    """One axis of a sweep's grid: a field of the scene or of the solver, and the field's values.
 
-    Axes with the same dimension vary together: the scenes with index i along the dimension have
-    value i of each of these axes.
+    Axes with the same dimension vary together. This means that the scenes with index i along the
+    dimension have value i of each of these axes.
 
     Attributes
     ----------
     field : str
-        The field of a scene, or of its solver, that takes the values.
+        The field of a scene, or of its solver, that has the values, as in ``omega.1``.
     dimension : str
         The name of the dimension of the store's arrays along which the values vary. By default it
         is the field's name, or `sample` if the values are drawn from a distribution.
@@ -54,10 +54,10 @@ class Axis:
     how : str
         The source of the values: `listed`, a spacing of `SPACINGS`, or a distribution of `DRAWS`.
     values : tuple of float or str
-        The listed values; or the two parameters of a spacing or distribution, which are both ends
-        of the range, or mean and deviation. The distribution `sphere` has no parameters.
+        The listed values, or the parameters of the spacing or distribution. The parameters are both
+        ends of the range, or mean and standard deviation; the distribution `sphere` has none.
     seed : int
-        The seed of a distribution.
+        The seed of the random numbers of a distribution.
     """
 
     field: str
@@ -69,7 +69,7 @@ class Axis:
 
     @property
     def is_choice(self) -> bool:
-        """Return whether the values are names, as of programs or methods, and not numbers."""
+        """Return whether the values are names, for example of programs, and not numbers."""
         return self.field in CHOICES
 
     def coordinates(self) -> NDArray[Any]:
@@ -101,8 +101,8 @@ def _coordinates(axis: Axis) -> NDArray[Any]:
 
 
 def _drawn(axis: Axis) -> Floats:
-    # All values are drawn at once, so that they do not depend on the chunks. Each field has its own
-    # random numbers.
+    # All values of the axis are drawn at once, so that they do not depend on the chunks. Each field
+    # has its own sequence of random numbers.
     seeds = np.random.SeedSequence([axis.seed, zlib.crc32(axis.field.encode())])
     source = np.random.Generator(np.random.Philox(seeds))
     if axis.how == "sphere":
@@ -134,7 +134,7 @@ def _between(first: float, last: float, made: Callable[[float, float], Floats]) 
 def axis_of(table: object, number: int) -> Axis:
     """Return the axis that a table [[axis]] of a sweep file describes.
 
-    `number` is the number of the table in the file, from 1, which error messages name. Raise
+    `number` is the number of the table in the file, counted from 1; error messages name it. Raise
     InputError if a key of the table is missing, or has a value that is not allowed.
     """
     where = f"[[axis]] {number}"
@@ -223,8 +223,8 @@ def _refuse(where: str, table: dict[str, Any], chosen: str, keys: Iterable[str])
 def _checked(where: str, axis: Axis) -> Axis:
     """Return `axis` itself; raise InputError if its field does not allow its extreme values.
 
-    The extreme values are the smallest and largest of the listed or normally distributed values;
-    for other axes they are both ends of the range. The distribution `sphere` is not checked.
+    The extreme values are the smallest and the largest of the listed or normally distributed
+    values; for other axes they are the ends of the range. The distribution `sphere` is not checked.
     `where` is the beginning of the error message.
     """
     field = NUMBERS[axis.field]

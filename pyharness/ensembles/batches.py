@@ -1,4 +1,4 @@
-"""Batches of a sweep: groups of scenes that share a solver and its settings, as arrays."""
+"""Division of the scenes of a sweep into batches, which share a solver and its settings."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -19,9 +19,9 @@ Columns = dict[str, Array]
 def listing_of(program: str, listing: str, reading: str) -> Listing:
     """Return the listing of a program that the fields `listing` and `reading` of a sweep describe.
 
-    `listing` is ``original`` or ``corrected``, or ``fix:`` or ``keep:`` with the names of defects
-    to correct or to keep, joined by ``+``. `reading` is ``adopted``, or the names of the readings
-    to activate, joined by ``+``. Raise InputError for an unknown name.
+    `listing` is ``original`` or ``corrected``, or ``fix:`` or ``keep:`` followed by the names of
+    defects to correct or to keep, joined by ``+``. `reading` is ``adopted``, or the names of the
+    readings to activate, joined by ``+``. Raise InputError for an unknown name.
     """
     how, _, names = listing.partition(":")
     readings = [] if reading == "adopted" else reading.split("+")
@@ -44,10 +44,11 @@ def looped_fields(sweep: Sweep) -> list[str]:
 
 
 def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch]]:
-    """Yield the batches of the scenes at `where`, each after the positions of its scenes there.
+    """Yield batches that contain all selected scenes, each with the positions of its scenes.
 
-    `where` has an array for each dimension of the grid: the index of every scene along this
-    dimension. The positions are indices into these arrays.
+    `where` selects the scenes. It has an array for each dimension of the grid: the index of every
+    selected scene along this dimension. The positions, which precede the batch, are indices into
+    these arrays.
     """
     columns = value_columns(sweep, where)
     looped = looped_fields(sweep)
@@ -87,8 +88,8 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
 def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | None:
     """Return the components of a quantity for n scenes, shape (n, 3); None if no axis varies them.
 
-    `name` is the quantity, as in ``omega``, of which ``omega.1`` is a field. `own` has the values
-    of the scenes by field. `base` has the numbers of the components that no axis varies.
+    `name` is the quantity, such as ``omega``, whose first component is the field ``omega.1``. `own`
+    has the values of the scenes by field. `base` has the values of components that no axis varies.
     """
     fields = [f"{name}.{axis}" for axis in (1, 2, 3)]
     if not any(field in own for field in fields):
@@ -98,11 +99,11 @@ def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | 
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return the kind of numbers that describe the bodies, and these numbers, shape (n, 3).
+    """Return the kind of numbers that describe the bodies of n scenes, and these numbers.
 
-    The kind is `moments` (kg m2) or `coefficients` (A, B, C of Euler's equations). `own` has the
-    values of the n scenes by field. If no axis varies the body, the kind is empty and the numbers
-    are None.
+    The kind is `moments` (kg m2) or `coefficients` (A, B, C of Euler's equations). The numbers have
+    the shape (n, 3). `scene` is the scene of the sweep, and `own` has the values of the n scenes by
+    field. If no axis varies the body, the kind is empty and the numbers are None.
     """
     if scene.coefficients is not None:
         found = _three("body.coefficients", scene.coefficients, own, n)
@@ -116,8 +117,8 @@ def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
     if "body.square.1" in own or "body.square.2" in own:
         middle = own.get("body.square.1", np.ones(n))
         least = own.get("body.square.2", np.ones(n))
-        # Every real body has integrals of x^2, y^2 and z^2 over its mass. They are in units of the
-        # largest one here.
+        # A real body has three integrals of x^2, y^2 and z^2 over its mass, which determine its
+        # moments. Here the integrals are in units of the largest of them.
         x2, y2, z2 = np.ones(n), middle, middle * least
         size = max(scene.moments) / (x2 + y2)
         return "moments", np.stack([(y2 + z2) * size, (x2 + z2) * size, (x2 + y2) * size], axis=1)
@@ -145,11 +146,11 @@ def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
 
 
 def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) -> Array:
-    """Return unit vectors, shape (n, 3), by two angles that refer to the body's principal axes.
+    """Return unit vectors, shape (n, 3), given by two angles relative to the body's principal axes.
 
     `tilt` (rad) is the angle from the axis of the middle moment. `azimuth` (rad) is the angle about
-    this axis, from the axis of the least moment. `moments` are those of the n bodies; if None, all
-    scenes have the body of `scene`.
+    this axis, from the axis of the least moment. `moments` are the moments of the n bodies, shape
+    (n, 3); if None, all scenes have the body of `scene`.
     """
     bodies = np.array([scene.moments]) if moments is None else moments
     order = np.broadcast_to(np.argsort(bodies, axis=1, kind="stable"), (len(tilt), 3))
@@ -161,10 +162,10 @@ def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) ->
 
 
 def _on_sphere(height: Array, longitude: Array) -> Array:
-    """Return unit vectors, shape (n, 3), by their third component `height` and their longitude.
+    """Return unit vectors, shape (n, 3), given by their third component and their longitude.
 
-    The longitude (rad) is the angle about the third axis, from the first axis. Equal intervals of
-    the third component are equal areas of the sphere.
+    `height` is the third component. `longitude` (rad) is the angle about the third axis, from the
+    first axis. Equal intervals of the third component correspond to equal areas of the unit sphere.
     """
     across = np.sqrt(1.0 - height * height)
     return np.stack([across * np.cos(longitude), across * np.sin(longitude), height], axis=1)

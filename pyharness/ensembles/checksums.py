@@ -1,7 +1,7 @@
-"""Checksums of a store: the SHA-256 of each file, bound to its path, its sweep and its version.
+"""Checksums of the files of a sweep's store, which detect damaged and exchanged files.
 
 A file of checksums is text that `sha256sum --check` reads. Its first line names the version
-of pyharness, the sweep and the part of the store. Each further line has the checksum and the path
+of pyharness, the sweep and the part of the store. Each further line has the SHA-256 and the path
 of a file in the store. A file that was exchanged with another one, or that belongs to another
 store, therefore fails the check.
 """
@@ -18,19 +18,19 @@ _PIECE = 1 << 20  # bytes read at once
 
 
 class DamageError(Exception):
-    """A file of a store is not as it was written; the message names the file and the damage."""
+    """The error that a file of a store is not as it was written; the message names the damage."""
 
 
 class Label(NamedTuple):
-    """The identity of a store: its schema, the version of pyharness, the SHA-256 of its sweep."""
+    """The identity of a store: its format, and the pyharness version and sweep that made it."""
 
-    schema: object  # an integer, if pyharness wrote the store
-    version: str
-    fingerprint: str
+    schema: object  # number of the store's format; an integer if pyharness wrote the store
+    version: str  # of pyharness
+    fingerprint: str  # SHA-256 of the sweep
 
 
 def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], limit: int) -> bytes:
-    """Return the content of a file of checksums, for files of a store as they are now.
+    """Return the content of a file of checksums, computed from the present files of a store.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def check_files(
 ) -> None:
     """Raise DamageError if files of a store differ from their checksums in the file `checksums`.
 
-    `checksums` is the path of this file in the store. The other arguments are the same as those of
-    `checksum_text`, with which the file was made.
+    `checksums` is the path of the file of checksums in the store. The other arguments are the same
+    as those of `checksum_text`, which made the content of this file.
     """
     found = checksum_text(label, part, folder, names, limit)
     known = read_bounded(folder, checksums, 2 * len(found))
@@ -79,7 +79,7 @@ def check_files(
 def read_bounded(folder: Path, name: str, limit: int) -> bytes:
     """Return the content of the file `name` of a store.
 
-    Raise DamageError if it is missing, is no regular file, or has more than `limit` bytes.
+    Raise DamageError if the file is missing, is no regular file, or has more than `limit` bytes.
     """
     handle = _opened(folder, name, limit)
     try:
@@ -93,7 +93,7 @@ def _digest(folder: Path, name: str, limit: int) -> str:
     digest = hashlib.sha256()
     try:
         with open(_opened(folder, name, limit), "rb", buffering=0) as file:
-            # A limited loop, because a file that grows meanwhile might never end.
+            # The loop is limited, because the end of a file that grows might never be reached.
             for _ in range(limit // _PIECE + 2):
                 piece = file.read(_PIECE)
                 if not piece:
@@ -116,7 +116,7 @@ def _opened(folder: Path, name: str, limit: int) -> int:
     except FileNotFoundError:
         raise DamageError(f"'{name}' is missing") from None
     except PermissionError:
-        raise  # for the user to correct: the content need not be damaged
+        raise  # the user can correct the permissions, and the content need not be damaged
     except OSError as error:
         raise DamageError(f"'{name}': {error.strerror or error}") from None
     status = os.fstat(handle)
@@ -134,7 +134,10 @@ def _opened(folder: Path, name: str, limit: int) -> int:
 
 
 def exists(folder: Path, name: str) -> bool:
-    """Return whether a store has the path `name`; raise DamageError if it can't be checked."""
+    """Return whether the path `name` exists in a store, whose folder is `folder`.
+
+    Raise DamageError if this can't be determined.
+    """
     try:
         os.lstat(folder / name)
     except FileNotFoundError:
@@ -145,10 +148,10 @@ def exists(folder: Path, name: str) -> bool:
 
 
 def clear(folder: Path, name: str) -> None:
-    """Remove whatever is at the path `name` in a store, so that a file can be written there.
+    """Remove any file or folder at the path `name` in a store, so that a file can be written there.
 
-    Also remove any file that has the name of one of its parent folders. A link is removed, but not
-    its target.
+    A file in the place of one of the parent folders of `name` is removed too. If a link is at the
+    path, the link is removed, but not its target.
     """
     path = folder
     for part in Path(name).parts[:-1]:
@@ -163,7 +166,7 @@ def clear(folder: Path, name: str) -> None:
 
 
 def place(folder: Path, name: str, content: bytes) -> None:
-    """Write the file `name` of a store atomically, so that it never has only part of `content`."""
+    """Write `content` to the file `name` of a store atomically, so that it is never incomplete."""
     path = folder / name
     path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_name(f"{path.name}.{os.urandom(8).hex()}.partial")

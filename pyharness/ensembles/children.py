@@ -14,11 +14,11 @@ from multiprocessing import connection, resource_tracker
 def deaf_children() -> Iterator[None]:
     """Block Ctrl-C (SIGINT) in all processes and threads that this thread starts in this context.
 
-    A terminal sends SIGINT to all processes, but only the parent process is to handle the signal.
-    If a signal arrives during the context, this thread receives it when the context ends.
+    A terminal sends SIGINT to all of its processes, but only the parent process is to handle the
+    signal. If a signal arrives during the context, this thread receives it when the context ends.
     """
-    # Children inherit a blocked signal. Python would start its resource tracker with the first
-    # child, and would then unblock the signal.
+    # Children inherit the blocking of a signal. The resource tracker is started before, because
+    # Python would otherwise start it with the first child, and would then unblock the signal.
     _start_tracker()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -30,9 +30,9 @@ def deaf_children() -> Iterator[None]:
 def _start_tracker() -> None:
     """Start Python's resource tracker so that it does not warn about leftover semaphores.
 
-    The tracker is a process that removes the semaphores that other processes leave behind. After a
-    Ctrl-C the tracker outlives this process, and would write the warnings after this process's last
-    line.
+    The tracker is a process that removes semaphores that other processes have not removed. After
+    Ctrl-C the tracker ends later than this process, and its warnings would follow this process's
+    last line.
     """
     warning = "ignore:resource_tracker"
     sys.warnoptions.append(warning)

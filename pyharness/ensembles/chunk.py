@@ -1,4 +1,4 @@
-"""Functions that solve scenes of a sweep: all scenes of a chunk of its grid, or a selection."""
+"""Functions that solve scenes of a sweep: all scenes of a chunk, or selected scenes."""
 
 from pyharness.ensembles.batches import batches
 from pyharness.ensembles.reductions import empty, reduced
@@ -8,9 +8,9 @@ from pyharness.ensembles.sweep import Arrays, Indices, Sweep, points
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
     """Solve all scenes of a chunk, and return the values of each reduction by its name.
 
-    `chunk` is the number of the chunk, from 0. Each array has the shape of the chunk, and a last
-    dimension of components if a scene has several values. Every executor runs this function as its
-    task.
+    `chunk` is the number of the chunk, from 0. Each array has the shape of the chunk, and one more
+    dimension if the reduction has several components. Every executor calls this function for each
+    chunk.
     """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)
@@ -19,10 +19,11 @@ def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
-    """Solve the scenes at `where`, and return the values of each reduction by its name.
+    """Solve selected scenes of a sweep, and return the values of each reduction by its name.
 
-    `where` has an array for each dimension of the grid: the index of every scene along this
-    dimension. The first dimension of each returned array counts these scenes.
+    `where` selects the scenes. It has an array for each dimension of the grid: the index of every
+    selected scene along this dimension. The first dimension of each returned array runs over the
+    selected scenes.
     """
     n = len(where[0])
     found = {asked.name: empty(asked, n) for asked in sweep.reductions}

@@ -1,4 +1,4 @@
-"""Executors, which compute the chunks of a sweep; all of them give the same results."""
+"""Executors compute the chunks of a sweep, here or elsewhere; all give the same results."""
 
 import asyncio
 import contextlib
@@ -24,17 +24,20 @@ from pyharness.model.errors import InputError
 EXECUTORS = ("here", "processes", "dask")
 Results = Iterator[tuple[int, Arrays]]
 
-_ATTEMPTS = 3  # consecutive deaths of a process, without a finished chunk, that end the sweep
+# The number of consecutive deaths of a process, with no chunk completed between them, at which the
+# sweep ends.
+_ATTEMPTS = 3
 _AHEAD = 2  # chunks submitted for each process, so that no process waits for the disk
-_ANSWER = 4.0  # s, in which a scheduler must answer, and in which it must have a worker
+_ANSWER = 4.0  # time (s) in which a scheduler must answer, and in which it must have a worker
 _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(?P<port>\d{1,5})")
 
 
 class Engine(NamedTuple):
     """A started executor: its number of workers, and a function that computes chunks.
 
-    The function takes a sweep and numbers of its chunks. It yields the number of each chunk with
-    the chunk's arrays by name, in the order in which the chunks are completed.
+    The function `computed` takes a sweep and the numbers of the chunks to compute. For each
+    chunk it yields the number of the chunk, and the arrays of the chunk by the name of the
+    reduction. The chunks are in the order in which they are completed.
     """
 
     workers: int
@@ -46,12 +49,13 @@ class Engine(NamedTuple):
 def engine(
     executor: str, workers: int | None = None, address: str | None = None
 ) -> Iterator[Engine]:
-    """Start one of `EXECUTORS`, yield its engine, and end it when the context ends.
+    """Start the executor `executor`, yield its engine, and end it when the context ends.
 
-    `workers` is the number of processes, by default the number of processors. `address` is the
-    address of a Dask scheduler; without it, `dask` starts a cluster on this machine. Raise
-    InputError if no scheduler with a worker answers at the address. The results that the engine
-    computes raise InputError if no process or worker is left to compute them.
+    `executor` is one of `EXECUTORS`. `workers` is the number of processes, by default the number of
+    processors. `address` is the address of a Dask scheduler; without it, the executor `dask` starts
+    a cluster on this machine. Raise InputError if no scheduler with a worker answers at the
+    address. The iterator over the results raises InputError if no process or worker is left to
+    compute them.
     """
     if executor == "here":
         yield Engine(1, _here, is_here=True)
@@ -64,7 +68,7 @@ def engine(
 
 
 def _processors() -> int:
-    # The processors that this process may use, if the system reports them.
+    # Count only the processors that this process may use, if the system reports them.
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -84,7 +88,7 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
                 left.remove(chunk)
                 yield chunk, found
         except BrokenProcessPool:
-            # A process was killed. Its chunks are lost, and so are those that were waiting.
+            # A process was killed. All chunks that were submitted, but not completed, are lost.
             deaths = 1 if len(left) < before else deaths + 1
             if deaths == _ATTEMPTS:
                 raise InputError(
@@ -94,7 +98,8 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
 
 
 def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
-    # Not by fork: the fork of a process with threads, as NumPy and Zarr start them, may hang.
+    # Processes are spawned and not forked, because a fork of a process with threads may hang, and
+    # NumPy and Zarr start threads.
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(workers, context, end_with_parent)
     waiting: dict[Future[Arrays], int] = {}
@@ -102,7 +107,7 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
     try:
         while True:
             while len(waiting) < _AHEAD * workers and (chunk := next(rest, None)) is not None:
-                # The pool starts a process here while it has too few.
+                # `submit` starts a process if the pool has fewer than `workers`.
                 with deaf_children():
                     waiting[pool.submit(solve_chunk, sweep, chunk)] = chunk
             if not waiting:
@@ -110,7 +115,7 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 yield waiting.pop(future), future.result()
     finally:
-        # Chunks in computation are discarded, because waiting for them might never end.
+        # Chunks that are being computed are discarded, because waiting for them might never end.
         processes = list((pool._processes or {}).values())
         pool.shutdown(wait=False, cancel_futures=True)
         for process in processes:
@@ -128,7 +133,7 @@ def check_dask() -> None:
 @contextlib.contextmanager
 def _client(workers: int, address: str | None) -> Iterator[Any]:
     dask: Any = import_module("distributed")
-    # Its log of workers that come and go is meant for administrators of a cluster.
+    # Dask's log of workers that start and end is meant for the administrators of a cluster.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     if address is not None:
         with _connected(dask, address) as client:
@@ -163,8 +168,8 @@ def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
         except Exception as error:
             errors.append(error)
 
-    # The start takes seconds. The cluster's threads and processes do not receive Ctrl-C; this
-    # thread does.
+    # The start takes seconds, and is therefore made in another thread. The threads and processes of
+    # the cluster do not receive Ctrl-C, but this thread does.
     thread = threading.Thread(target=start, daemon=True)
     thread.start()
     try:
@@ -183,7 +188,7 @@ def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
 def _connected(dask: Any, address: str) -> Any:
     """Return a client of the Dask scheduler at `address`; `dask` is the module `distributed`.
 
-    Raise InputError if no scheduler answers there, or if it has no worker.
+    Raise InputError if no scheduler answers at this address, or if the scheduler has no worker.
     """
     found = _ADDRESS.fullmatch(address)
     allowed = "allowed: the address of a Dask scheduler with workers, as in tcp://host:8786"
@@ -193,7 +198,8 @@ def _connected(dask: Any, address: str) -> Any:
     place = found["host"].strip("[]"), int(found["port"])
     answered: list[bool] = []
     try:
-        # A plain connection fails at once if nobody listens; Dask would retry again and again.
+        # A plain connection is tried first, because it fails at once if no server listens. Dask
+        # would try again and again.
         socket.create_connection(place, timeout=_ANSWER).close()
         asyncio.run(asyncio.wait_for(_has_workers(dask, address, answered), _ANSWER))
         return dask.Client(address, timeout=_ANSWER, set_as_default=False)
@@ -209,11 +215,12 @@ def _connected(dask: Any, address: str) -> Any:
 async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
     """Wait until the Dask scheduler at `address` has workers; the caller limits the time.
 
-    Append True to `answered` each time when the scheduler answers that it has no workers. The
-    caller can therefore distinguish it from a server that is silent. `dask` is the module
-    `distributed`.
+    Append True to `answered` each time the scheduler answers that it has no workers. The caller can
+    therefore distinguish a scheduler without workers from a server that does not answer. `dask` is
+    the module `distributed`.
     """
-    # A client would wait for half a minute if a server accepts the connection and stays silent.
+    # The scheduler is called directly, because a Dask client would wait for half a minute if a
+    # server accepts the connection and does not answer.
     async with dask.rpc(address) as scheduler:
         while not (await scheduler.identity())["workers"]:
             answered.append(True)
@@ -223,8 +230,9 @@ async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
 def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
     """Yield the number and the arrays of each chunk as soon as a Dask cluster has computed it.
 
-    `client` is a client of the cluster. All workers are kept busy with submitted chunks. If a
-    worker dies, Dask computes its chunks again on another worker.
+    `client` is a client of the cluster, and `chunks` has the numbers of the chunks. More chunks are
+    submitted than there are workers, so that no worker is idle. If a worker dies, Dask computes its
+    chunks again on another worker.
     """
     dask: Any = import_module("distributed")
     n_threads = sum(client.nthreads().values())
@@ -234,8 +242,8 @@ def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
 
     def submit() -> None:
         if (chunk := next(rest, None)) is not None:
-            # Each task has the sweep, because data sent once may be lost with the workers that
-            # have it.
+            # Each task includes the sweep. If the sweep were sent only once, it could be lost with
+            # the workers that have received it.
             future = client.submit(solve_chunk, sweep, chunk, pure=False)
             chunk_of[future.key] = chunk
             running.add(future)

@@ -1,4 +1,4 @@
-"""Fields that an axis may vary: numbers of a scene or solver, and names that select a solver."""
+"""Fields that an axis of a sweep may vary: numbers of a scene or solver, and names of solvers."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,12 +15,13 @@ CHOICES = {
 
 @dataclass(frozen=True)
 class Field:
-    """The properties of a number of a scene, or of its solver, that an axis may vary.
+    """A number of a scene, or of its solver, that an axis of a sweep may vary.
 
-    `units` is its unit and `title` its description. `takes` returns whether a value is allowed, and
-    `allowed` describes the allowed values. If `looped`, all scenes of a batch must have the same
-    value; programs accept two of these fields as arrays, however (`OF_PROGRAMS` in
-    `pyharness.methods.batch`). If `whole`, values are rounded to integers.
+    `units` is the unit of the number and `title` its description. The function `takes` returns
+    whether a value is allowed, and `allowed` describes the allowed values. If `looped`, all scenes
+    that one call solves must have the same value. Two of these fields (`OF_PROGRAMS` in
+    `pyharness.methods.batch`) are an exception, because programs accept an array of values. If
+    `whole`, values are rounded to integers.
     """
 
     units: str
@@ -76,7 +77,8 @@ NUMBERS = {
         "1/s", "constant of the stop test", "a number from 0", lambda v: v >= 0.0, looped=True
     ),
 }
-# Alternative groups of fields for the same quantity; a sweep may use only one of each pair.
+# Pairs of groups of fields that exclude each other, mostly because they describe the same quantity.
+# Each field is given by the beginning of its name. A sweep may use fields of one group of a pair.
 RIVALS = (
     (
         ("omega.1", "omega.2", "omega.3"),
@@ -97,5 +99,5 @@ def field_names() -> list[str]:
 
 
 def units_of(field: str) -> str:
-    """Return the unit of a field; an empty string for a field whose values are names."""
+    """Return the unit of a field, or an empty string if the values of the field are names."""
     return NUMBERS[field].units if field in NUMBERS else ""

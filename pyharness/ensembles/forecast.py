@@ -1,4 +1,4 @@
-"""Forecast of a sweep's duration, measured on a sample of its scenes and of its files."""
+"""Forecast of a sweep's duration, from measurements with a sample of its scenes and files."""
 
 import math
 import time
@@ -13,17 +13,20 @@ from pyharness.ensembles.reductions import empty
 from pyharness.ensembles.store import scratch
 from pyharness.ensembles.sweep import Arrays, Indices, Sweep, spread
 
-# Numbers of scenes in the samples, which are taken from all over the grid, the smallest first.
+# Numbers of scenes in the samples. The scenes are evenly spread over the grid, and the smallest
+# sample is measured first.
 _SAMPLES = (8, 256, 2048, 8192)
-_ENOUGH = 0.2  # s, after which a sample is large enough
-# Even after `_ENOUGH`, a larger sample is taken if it is at most the fraction `_PART` of all scenes
-# and takes at most `_LONGEST`. In a small sample the constant cost of a batch would count as the
+_ENOUGH = 0.2  # time (s) for a sample; if it took longer, it is usually large enough
+# A larger sample is taken nevertheless if it is at most the fraction `_PART` of all scenes and
+# takes at most `_LONGEST`. In a small sample, the constant cost of a batch would be counted as a
 # cost of its scenes.
 _PART = 0.01
 _LONGEST = 60.0  # s
-_PLACES = 5  # distinct values in a sample along a dimension whose value a batch shares
+# Number of distinct values in a sample along a dimension for which all scenes of a batch have the
+# same value.
+_PLACES = 5
 _PACE = 3e8  # bytes that are compressed and written in a second
-_FILES = 20  # largest number of chunks that are tried for a sample
+_FILES = 20  # largest number of chunks that are solved, or written and read, for a measurement
 
 
 @dataclass(frozen=True)
@@ -31,8 +34,9 @@ class Estimate:
     """The expected cost of computing the missing chunks of a sweep.
 
     `n_scenes` and `n_chunks` count the scenes and chunks of the whole sweep, and `n_missing` the
-    chunks to compute. `n_bytes` is the size of these chunks on disk, before compression. `memory`
-    is the memory that all workers need together, in bytes. `seconds` is the duration.
+    chunks to compute. `n_bytes` is the size of the missing chunks on disk, before compression.
+    `memory` is the memory that all workers need together, in bytes. `seconds` is the expected
+    duration (s).
     """
 
     n_scenes: int
@@ -46,9 +50,9 @@ class Estimate:
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
     """Return the seconds to solve and write the missing chunks of a store, and to read all chunks.
 
-    `path` is the path of the store, and `own` the engine that computes the chunks. If other
-    processes compute, this process writes at the same time. In this case only the longer of the
-    times to solve and to write counts.
+    `n_missing` is the number of missing chunks, `path` the path of the store, and `own` the engine
+    that computes the chunks. If other processes compute the chunks, this process writes them at the
+    same time. In this case only the longer of the times to solve and to write counts.
     """
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
@@ -57,10 +61,10 @@ def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
 
 
 def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
-    """Return the mean seconds to write and to read the files of a chunk, measured next to `path`.
+    """Return the mean seconds to write and to read the files of one chunk of a store.
 
     The measurement uses a temporary store in the folder that contains the store `path`. Both times
-    are 0 if the disk refuses the files; the sweep itself then reports the error.
+    are 0 if the files can't be written; the sweep itself then reports the error.
     """
     times = []
     try:
@@ -77,16 +81,16 @@ def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
                     break
     except OSError:
         return 0.0, 0.0
-    # The first chunk does not count, because it imports what Zarr needs.
+    # The first chunk does not count, because modules that Zarr needs are imported in its time.
     write, read = np.mean(times[1:] or times, axis=0)
     return float(write), float(read)
 
 
 def _pattern(sweep: Sweep, chunk: int) -> Arrays:
-    """Return arrays like the results of a chunk, but with random values.
+    """Return arrays like the results of the chunk with the number `chunk`, but with random values.
 
-    A file of equal values would be compressed to almost nothing, and written too fast. The number
-    `chunk` is the seed of the random values.
+    Equal values would be compressed to almost nothing, so that the measured time would be too
+    short. The number of the chunk is the seed of the random values.
     """
     draw = np.random.default_rng(chunk)
     shape = tuple(part.stop - part.start for part in sweep.box(chunk))
@@ -100,12 +104,16 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def seconds_per_chunk(sweep: Sweep) -> float:
-    """Return the seconds to solve a chunk in this process, measured on scenes or whole chunks."""
+    """Return the seconds to solve a chunk in this process.
+
+    They are computed from the measured time of sample scenes. If the result is below 0.2 s, whole
+    chunks are measured instead.
+    """
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)
     if seconds > _ENOUGH:
         return seconds
-    # Only whole chunks show the constant cost of a chunk.
+    # For fast chunks the constant cost of a chunk matters, which only whole chunks show.
     begin = time.perf_counter()
     count = min(_FILES, sweep.n_chunks)
     for i in range(count):
@@ -117,7 +125,7 @@ def seconds_per_chunk(sweep: Sweep) -> float:
 
 
 def seconds_per_scene(sweep: Sweep) -> float:
-    """Return the seconds to solve a scene in this process, measured on samples of the grid."""
+    """Return the mean seconds to solve a scene in this process, measured on samples of the grid."""
     seconds = math.nan
     # This call is not timed, because it imports the solver's modules.
     solve_points(sweep, spread(sweep, 1))
@@ -134,12 +142,12 @@ def seconds_per_scene(sweep: Sweep) -> float:
 
 
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
-    """Return the indices of sampled scenes, moved so that many of them share a batch.
+    """Return the indices of sampled scenes, changed so that many of the scenes share a batch.
 
-    `where` and the result have an array for each dimension of the grid: the indices of the scenes
-    along this dimension. All scenes of a batch have the same value along some of the dimensions.
-    The scenes are moved to at most five values along these. The batches of the sample therefore
-    have many scenes, as the batches of a chunk do.
+    `where` has the indices of the scenes: an array for each dimension of the grid, as the result.
+    All scenes of a batch must have the same value along some dimensions. Along these dimensions the
+    indices are changed to at most five distinct values. The batches of the sample therefore have
+    many scenes, as the batches of a chunk do.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found = []
@@ -152,7 +160,7 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
 
 
 def format_estimate(estimate: Estimate) -> str:
-    """Return an estimate as a line of text."""
+    """Return the estimated cost of a sweep as a line of text: time, disk space and memory."""
     missing = estimate.n_missing
     rest = "" if missing == estimate.n_chunks else f", {short_count(missing)} of them missing"
     return (
@@ -175,12 +183,12 @@ def duration(seconds: float) -> str:
 
 
 def short_count(number: int) -> str:
-    """Return a count as text, with all its digits, or with four digits from ten million."""
+    """Return a count as text: exactly below ten million, and with four significant digits above."""
     return str(number) if number < 10**7 else f"{float(number):.4g}"
 
 
 def byte_count(number: float) -> str:
-    """Return a number of bytes as text, with three digits and a decimal unit, as in 1.25 MB."""
+    """Return a number of bytes as text with three significant digits and a unit, as in 1.25 MB."""
     for unit in ("bytes", "kB", "MB", "GB", "TB"):
         if number < 1000.0:
             return f"{number:.3g} {unit}"

@@ -1,6 +1,6 @@
-"""The picture of a sweep: a reduction over one or two dimensions of the grid, in panels.
+"""The picture of a sweep: a stored quantity over one or two dimensions of the grid, in panels.
 
-Each panel has fixed values along the other dimensions.
+Each panel is for other values along the remaining dimensions of the grid.
 """
 
 import itertools
@@ -22,16 +22,19 @@ if TYPE_CHECKING:
 
 _MOST_PANELS = 6
 _MOST_PLACES = 200  # values along an axis of a map; more would not be visible
-_MOST_DOTS = 5000
-_COLUMNS = 3
-_ORDERS = 3.0  # orders of magnitude above which positive values are shown on a logarithmic scale
+_MOST_DOTS = 5000  # values in a panel with a line or dots
+_COLUMNS = 3  # of panels
+# A logarithmic scale is used if all values are positive, or 0, and the positive values extend over
+# more than this number of orders of magnitude.
+_ORDERS = 3.0
 
 
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
-    """Return the reduction to draw: the reduction `name`, or by default the first with numbers.
+    """Return the reduction (stored quantity) of a sweep that the picture shows.
 
-    A reduction whose integers represent outcomes, such as `status`, is the default only if the
-    sweep has no other reductions. Raise InputError if the sweep has no reduction `name`.
+    It is the reduction `name`. If `name` is None, it is the first reduction with numerical values.
+    If the values of all reductions represent outcomes, as for `status`, it is the first reduction.
+    Raise InputError if the sweep has no reduction `name`.
     """
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
@@ -41,10 +44,11 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 
 
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
-    """Return the picture of the reduction `asked`, with the values in a store.
+    """Return the picture of the values in a store of the reduction `asked`.
 
-    The picture is a map over the last two dimensions that have several numbers, listed or with a
-    spacing. If the grid has fewer than two such dimensions, the picture is a line or dots.
+    The picture is a map over two dimensions of the grid. They are the last two dimensions with
+    several numbers that are not random. If there are fewer than two such dimensions, the picture is
+    a line or dots.
     """
     from matplotlib.figure import Figure
 
@@ -52,8 +56,8 @@ def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     axis_of = {axis.dimension: axis for axis in reversed(sweep.axes)}
     long = [d for d, axis in axis_of.items() if axis.count > 1 and not axis.is_choice]
     ordered = [d for d in sweep.dimensions if d in long]
-    # Two dimensions of a grid make a map. Values from a distribution have no order, and are shown
-    # as dots.
+    # Two dimensions of the grid give a map. Values from a random distribution have no order, and
+    # are shown as dots.
     shown = [d for d in ordered if not _is_drawn(axis_of[d])][-2:] or ordered[-1:]
     panels = _panels(store, asked, axis_of, shown)
     rows = -(-len(panels) // _COLUMNS)
@@ -95,11 +99,12 @@ Panel = tuple[str, list[Array], Array]
 def _panels(
     store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], shown: list[str]
 ) -> list[Panel]:
-    """Return the panels of the picture of a reduction: title, indices and values of each.
+    """Return the title, the indices and the values of each panel of the picture of a reduction.
 
-    `shown` names the dimensions that each panel shows, and `axis_of` has the axis of every
-    dimension. The title states the fixed values along the other dimensions, and the component of
-    the reduction. The indices, an array for each dimension of `shown`, select the drawn values.
+    `asked` is the reduction. `shown` names the dimensions of the grid that each panel shows, and
+    `axis_of` has an axis for every dimension. The title states the panel's values along the
+    remaining dimensions, and the component of the reduction. The indices, an array for each
+    dimension in `shown`, tell which values along this dimension are drawn.
     """
     reduction = REDUCTIONS[asked.reduction]
     most = _MOST_PLACES if len(shown) == 2 else _MOST_DOTS

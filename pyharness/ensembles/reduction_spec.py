@@ -1,4 +1,4 @@
-"""The reductions that a sweep file requests, checked against the available ones."""
+"""Reading and checking of the reductions (quantities to store) that a sweep file requests."""
 
 from collections.abc import Mapping
 
@@ -15,8 +15,9 @@ def reduction_spec_of(entry: object, claims: Mapping[str, str]) -> ReductionSpec
     """Return the reduction that an entry of the list `reductions` of a sweep file requests.
 
     The entry is a name, or a table with a name and parameters. `claims` has, by the identifier of
-    each claim, the function that checks it, as in ``package.module:name``. Raise InputError if the
-    entry has an unknown name or a value that is not allowed.
+    each claim of the thesis, the name of the function that checks the claim, as in
+    ``package.module:name``. Raise InputError if the entry has an unknown name or a value that is
+    not allowed.
     """
     table = {"name": entry} if isinstance(entry, str) else entry
     if not isinstance(table, dict) or "name" not in table:

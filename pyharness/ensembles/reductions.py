@@ -1,4 +1,4 @@
-"""Reductions: the quantities that a sweep keeps for each scene, and how each is computed."""
+"""Reductions: the quantities that a sweep can store for each scene, and their computation."""
 
 import importlib
 from collections.abc import Callable, Mapping
@@ -24,7 +24,7 @@ _NOT_YET = -1
 
 @dataclass(frozen=True)
 class Reduction:
-    """A quantity that a sweep can keep for each scene, and the scenes for which it is available.
+    """A quantity that a sweep can store for each scene, with its computation and requirements.
 
     Attributes
     ----------
@@ -32,17 +32,17 @@ class Reduction:
         The description of the quantity in words, and its unit.
     compute : callable
         A function of a batch of n scenes, and of the parameters by name. It returns an array of n
-        values, or of n rows if `labels` is not empty.
+        values or, if `labels` is not empty, of n rows with a value for each label.
     dtype : str
         The NumPy type of the array. NaN, or -1 in an integer array, marks values not computed yet.
     labels : tuple of str
-        The labels of the values if a scene has several values.
+        The labels of the values if each scene has several values, else empty.
     dimension : str
         The name of the last dimension of the array, along which `labels` run; empty without labels.
     only : str
-        `program` or `method` if only one of these can give the quantity.
+        `program` or `method` if only one of these solvers can compute the quantity, else empty.
     needs : tuple of str
-        The requirements on scene and method, from `moments`, `no torque` and `attitude`.
+        The requirements on the scene and the method: `moments`, `no torque` or `attitude`.
     parameters : mapping
         The names of the parameters, with their default values.
     flags : mapping
@@ -99,7 +99,7 @@ def _stop_variable(batch: Batch, _: Mapping[str, Any]) -> Found:
 
 
 def _overflow_time(batch: Batch, _: Mapping[str, Any]) -> Found:
-    # The time of the first step without a finite row.
+    # The time of the first step whose result is not finite.
     time = (batch.n_rows + 1) * batch.step_sizes
     return np.where(batch.status == Statuses.OVERFLOW, time, np.nan)
 
@@ -123,7 +123,8 @@ def _claim(batch: Batch, given: Mapping[str, Any]) -> Found:
 
 def _largest_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
     start, rows = _unit(batch.omega0)[:, None, :], _unit(batch.rows(given["samples"]))
-    # Angle of two unit vectors; the arc cosine would lose half of the digits of a small angle.
+    # This formula gives the angle between two unit vectors. The arc cosine of their product would
+    # lose half of the digits of a small angle.
     angles: Found = 2.0 * np.arctan2(
         np.linalg.norm(rows - start, axis=2), np.linalg.norm(rows + start, axis=2)
     )
@@ -136,7 +137,7 @@ def _axis_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
     axis = np.argsort(batch.bodies, axis=1, kind="stable")[:, RANKS.index(given["of"])]
     column = np.broadcast_to(axis, (len(squares),))
     is_own = np.arange(3) == column[:, None, None]
-    # The squares of the half angle's cosine and sine.
+    # The squares of the cosine and the sine of half the angle from the initial to the present axis.
     along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)
     across = np.where(is_own, 0.0, squares[:, :, 1:]).sum(axis=2)
     largest: Found = 2.0 * np.arctan2(np.sqrt(across), np.sqrt(along)).max(axis=1)
@@ -260,15 +261,18 @@ REDUCTIONS = {
 
 
 def empty(asked: ReductionSpec, n: int) -> Found:
-    """Return an array for the results of the reduction `asked` in n scenes, none computed yet."""
+    """Return an array for the values of the reduction `asked` in n scenes, all marked missing."""
     reduction = REDUCTIONS[asked.reduction]
     shape = (n, len(reduction.labels)) if reduction.labels else (n,)
     return np.full(shape, reduction.fill, dtype=reduction.dtype)
 
 
 def reduced(asked: ReductionSpec, batch: Batch) -> Found:
-    """Compute the reduction `asked` for a batch; return an array with a row for each scene."""
+    """Compute the reduction `asked` for a batch; return an array with a row for each scene.
+
+    A row is a single value if the reduction has no labels.
+    """
     given = {**dict(asked.parameters), "function": asked.function}
-    # Infinities and NaN are results like others.
+    # NumPy's warnings are suppressed, because infinities and NaN are valid results.
     with np.errstate(all="ignore"):
         return REDUCTIONS[asked.reduction].compute(batch, given)

@@ -1,4 +1,4 @@
-"""The report of `sweep`: the axes, and statistics of the reductions, read chunk by chunk."""
+"""The report of `sweep`: the axes of its grid, and statistics of the stored quantities."""
 
 from collections import Counter
 from typing import Any, NamedTuple
@@ -27,11 +27,12 @@ _FLAGS = (*words("reduction value"), Column("scenes"))
 
 
 class Found(NamedTuple):
-    """Statistics over all scenes of a reduction, or of one component of its values.
+    """Statistics, over all scenes of a sweep, of one component of a reduction (a stored quantity).
 
-    `name` is the name of the reduction and `label` the component, which is empty if there is only
-    one. `scenes` counts the scenes with a finite value, and `none` the other scenes. `least`,
-    `mean` and `largest` of the finite values are in `units`; they are None without such values.
+    `name` is the name of the reduction, and `label` the name of the component. The label is empty
+    if the reduction has only one component. `scenes` counts the scenes with a finite value, and
+    `none` the scenes without one. `least`, `mean` and `largest` are of the finite values, in
+    `units`; they are None if no value is finite.
     """
 
     name: str
@@ -45,10 +46,11 @@ class Found(NamedTuple):
 
 
 def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
-    """Return statistics of the reduction `asked` over all scenes of a store, by component.
+    """Return statistics of the reduction `asked` over all scenes of a store, for each component.
 
-    If the values are integers that represent outcomes, as for `status`, the statistics are empty,
-    and the second result counts the scenes with each integer. Otherwise it is empty.
+    If the values are integers that represent outcomes, as for `status`, there are no statistics,
+    and the second result counts the scenes with each integer. For other reductions the second
+    result is empty. The values are read chunk by chunk.
     """
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)
@@ -87,7 +89,8 @@ def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[in
 def sweep_report(store: Store, outcome: Outcome, path: str) -> Report:
     """Return the report of a sweep: its axes, statistics of its results, and the work of this run.
 
-    `outcome` describes the work of this run, and `path` is the path of the store.
+    `outcome` has the numbers of chunks that this run computed or repaired, and its duration. `path`
+    is the path of the store.
     """
     sweep = store.sweep
     found: list[Found] = []

@@ -1,4 +1,4 @@
-"""The run of a sweep: check its size, forecast its duration, and compute the missing chunks."""
+"""Functions that run a sweep: check its size, forecast its duration, compute missing chunks."""
 
 import contextlib
 import math
@@ -17,19 +17,19 @@ from pyharness.ensembles.sweep import Sweep
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
 
-# Memory that a process needs, divided by the size of a chunk: the process holds several chunks at
-# once, and computing them takes more.
+# Ratio of the memory that a process needs to the size of a chunk. The process holds several chunks
+# at once, and needs additional memory to compute them.
 _COPIES = 12
 _MOST_CHUNKS = 1_000_000
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The work that one run of a sweep did.
+    """The numbers of chunks that one run of a sweep computed, and its duration.
 
-    `estimate` is the forecast, or None if no chunk was missing. `before` counts the chunks that the
-    store had before, and `computed` the chunks that were computed in `seconds`. `repaired` counts
-    the computed chunks that had been damaged.
+    `estimate` is the forecast of the cost, or None if no chunk was missing. `before` counts the
+    chunks that the store had before the run. `computed` counts the chunks that the run computed,
+    which took `seconds` (s). `repaired` counts those computed chunks that had been damaged before.
     """
 
     estimate: Estimate | None
@@ -45,11 +45,12 @@ def bytes_per_scene(sweep: Sweep) -> int:
 
 
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
-    """Return the bytes that `missing` chunks need on disk, and the bytes of memory for `workers`.
+    """Return the bytes that the missing chunks need on disk, and the memory (bytes) of all workers.
 
-    `path` is the path of the store, and `workers` the number of processes. Raise InputError if the
-    disk or half of the memory can't hold these bytes, or if there are too many chunks. The check
-    allocates nothing, so that a grid of any size is refused at once.
+    `missing` is the number of missing chunks, `path` the path of the store, and `workers` the
+    number of processes. Raise InputError if the free disk space or half of the machine's memory is
+    too small, or if there are too many chunks. The check allocates no arrays, so that even the
+    largest grid is refused at once.
     """
     n_bytes = sweep.n_scenes * bytes_per_scene(sweep) * missing // sweep.n_chunks
     shown = f"{short_count(sweep.n_scenes)} scenes in {short_count(sweep.n_chunks)} chunks"
@@ -94,14 +95,15 @@ def swept(
 ) -> Iterator[tuple[Store, Outcome]]:
     """Compute the missing chunks of a sweep, and yield the open store and the outcome of the run.
 
-    The parameters and errors are the same as those of `run_sweep`. The store is locked against
-    other processes until the context ends.
+    The parameters and errors are the same as those of `run_sweep`. Until the context ends, the
+    store is locked against other processes.
     """
     is_there = check_store(sweep, path)
     check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)
     with contextlib.ExitStack() as stack:
         try:
-            # A scheduler that does not answer is found before any file is written.
+            # The engine is started first. A scheduler that does not answer is therefore reported
+            # before any file is written.
             with engine(executor, workers, address) as own:
                 store = stack.enter_context(opened(sweep, path, repair))
                 outcome = _completed(store, own, before, progress)
@@ -128,7 +130,7 @@ def run_sweep(
     Parameters
     ----------
     sweep : Sweep
-        The sweep.
+        The sweep, as `read_sweep` returns it.
     path : str
         The path of the store, a folder, which is made if it is missing.
     executor : {"here", "processes", "dask"}
@@ -150,9 +152,9 @@ def run_sweep(
     Raises
     ------
     InputError
-        If the store belongs to another sweep or is damaged, or if the cluster does not answer. Also
-        if the disk or the memory can't hold the sweep, or if the disk is full. Computed chunks stay
-        in the store, and the next call computes the remaining ones.
+        If the store belongs to another sweep or is damaged, if the cluster does not answer, or if
+        the disk or the memory can't hold the sweep. Chunks that were computed before the error stay
+        in the store, and the next call computes the remaining chunks.
     """
     with swept(sweep, path, executor, workers, address, before, progress, repair) as (_, outcome):
         return outcome
@@ -180,7 +182,7 @@ def _completed(
             store.write(chunk, found)
             progress(n, len(missing), "chunks")
     finally:
-        # Processes and connections end here, and not only at garbage collection.
+        # Closing the iterator ends processes and connections now, and not at garbage collection.
         close = getattr(results, "close", None)
         if close is not None:
             close()

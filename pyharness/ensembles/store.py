@@ -1,9 +1,9 @@
 """The store of a sweep: a Zarr group in a folder, with one array for each reduction.
 
-A chunk of the grid is stored in one file of each array, and in a file with the checksums of these
-files, which is written last. Every file is written under another name and then renamed. A chunk
-with checksums is therefore complete, whenever and however the writing ended. The checksums show
-whether the files still are as they were written.
+Each chunk of the grid has one file for each array, and a file with the checksums of these files,
+which is written last. Every file is written under a temporary name and then renamed. A chunk with a
+file of checksums is therefore complete, even if the process was killed at any time. The checksums
+show whether the files were changed after they were written.
 """
 
 import contextlib
@@ -53,16 +53,16 @@ def check_zarr() -> None:
 
 
 class Store:
-    """The open store of one sweep: a folder with an array for each reduction. `opened` makes it.
+    """The open store of one sweep, a folder with an array for each reduction; made by `opened`.
 
     Attributes
     ----------
     sweep : Sweep
-        The sweep whose results it holds.
+        The sweep whose results the store contains.
     folder : Path
         The folder of the store.
     repaired : int
-        The number of damaged chunks that were removed at opening, to be computed again.
+        The number of damaged chunks that were removed when the store was opened.
     """
 
     def __init__(self, sweep: Sweep, folder: Path) -> None:
@@ -71,7 +71,7 @@ class Store:
 
         self.sweep, self.folder, self.repaired = sweep, folder, 0
         group = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
-        # Zarr must also write a chunk that holds only the fill value.
+        # With this setting, Zarr also writes a file for a chunk that contains only the fill value.
         with zarr.config.set({"array.write_empty_chunks": True}):
             self._arrays: dict[str, Any] = {
                 asked.name: group[asked.name] for asked in sweep.reductions
@@ -111,9 +111,10 @@ class Store:
         return list(self._done)
 
     def write(self, chunk: int, found: Arrays) -> None:
-        """Write the arrays of a chunk, `found` by the name of the reduction, and their checksums.
+        """Write the results of a chunk, and the checksums of the written files.
 
-        Raise OSError if the disk refuses one of the files; the chunk is then not complete.
+        `found` has the array of results of each reduction by its name. Raise OSError if one of the
+        files can't be written; the chunk then remains incomplete.
         """
         for name, array in self._arrays.items():
             array[self.sweep.box(chunk)] = found[name]
@@ -129,7 +130,7 @@ class Store:
         return self._arrays[name][self.sweep.box(chunk)]
 
     def array(self, name: str) -> Any:
-        """Return the Zarr array of the reduction `name`, which reads only the indexed parts."""
+        """Return the Zarr array of the reduction `name`; indexing reads only the indexed part."""
         return self._arrays[name]
 
     def _is_done(self, chunk: int) -> bool:
@@ -138,7 +139,8 @@ class Store:
         if exists(self.folder, checksums):
             check_files(*self._described(chunk), checksums)
             return True
-        # The chunk was not finished. Its files will be overwritten, so they must be regular files.
+        # The chunk is incomplete. Files of it that exist will be overwritten, and must therefore be
+        # regular files.
         for name in self._files(chunk):
             if exists(self.folder, name) and not (self.folder / name).is_file():
                 raise DamageError(f"'{name}' is no ordinary file")
@@ -163,9 +165,9 @@ class Store:
 def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
     """Make or open the store of a sweep, lock it against other processes, check it, and yield it.
 
-    Raise InputError if `path` is the store of another sweep, a folder that is no store, or a
-    damaged store; its files then stay as they are. With `repair`, damage is no error: damaged
-    chunks are removed and count as not computed yet, and damaged metadata are written again.
+    Raise InputError if the folder `path` is the store of another sweep, no store, or a damaged
+    store; its files are then not changed. With `repair`, damage is not an error: damaged chunks are
+    removed and count as not computed yet, and damaged metadata are written again.
     """
     check_zarr()
     folder = Path(path)
@@ -176,7 +178,7 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            # Other errors come from file systems without locks, and are ignored.
+            # Other errors occur on file systems without locks, and are ignored.
             if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
                 raise InputError(
                     f"--out '{path}': another sweep is writing to it; wait until it ends, or "
@@ -199,7 +201,7 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
 def check_store(sweep: Sweep, path: str) -> bool:
     """Return whether `path` is the store of this sweep; return False if it is missing or empty.
 
-    Raise InputError if the path is anything else, or if no store can be made there.
+    Raise InputError if `path` is any other file or folder, or if no store can be made at this path.
     """
     folder = Path(path)
     if not path or "\0" in path:
@@ -224,8 +226,8 @@ def check_store(sweep: Sweep, path: str) -> bool:
         raise InputError(
             f"--out '{path}': is not empty, and is not the store of a sweep; give a new name"
         )
-    # The store states its identity in two files. One of them may be damaged, which is found and
-    # reported when the store is opened.
+    # The store states its identity in two files. If one of them is damaged, this is detected when
+    # the store is opened.
     if any(type(each.schema) is int and each == ours for each in known):
         return True
     found = known[0]
@@ -262,15 +264,15 @@ def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
 
 
 def _make(sweep: Sweep, folder: Path) -> None:
-    """Make the store of a sweep under another name, and rename it to `folder`.
+    """Make the store of a sweep under a temporary name, and then rename it to `folder`.
 
-    The folder is therefore either a complete store or absent.
+    At any time, `folder` is therefore either a store with all of its metadata or missing.
     """
     with filled(sweep, folder) as new:
         try:
             os.rename(new, folder)
         except OSError as error:
-            # Another process has made the store meanwhile, and its store is used.
+            # If another process has made the store of this sweep meanwhile, that store is used.
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST) or not check_store(
                 sweep, str(folder)
             ):
@@ -281,7 +283,7 @@ def _make(sweep: Sweep, folder: Path) -> None:
 def scratch(sweep: Sweep, path: str) -> Iterator[Store]:
     """Yield a temporary store of a sweep without results, and remove it when the context ends.
 
-    The store is in the folder that contains `path`. It serves to measure the speed of the disk.
+    The store is in the folder that contains `path`. It is used to measure the speed of the disk.
     """
     with filled(sweep, Path(path)) as new:
         yield Store(sweep, new)

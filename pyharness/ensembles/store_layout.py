@@ -1,4 +1,4 @@
-"""The layout of a store: its arrays, their metadata, and the identity of the store."""
+"""The layout of a sweep's store: its arrays, their metadata, and the identity of the store."""
 
 import contextlib
 import json
@@ -35,15 +35,15 @@ _HEAD = re.compile(
 
 
 def label(sweep: Sweep) -> Label:
-    """Return the identity that this version of pyharness gives to the store of a sweep."""
+    """Return the identity of the store that this version of pyharness makes for a sweep."""
     return Label(SCHEMAS["sweep store"], version(), sweep.fingerprint)
 
 
 def labels(folder: Path) -> list[Label]:
-    """Return the identities that the files of a store state, at most two.
+    """Return the identities that two files of the store in `folder` state, at most two.
 
-    One identity is from the metadata, the other from the first line of the file with the checksums
-    of the metadata. An identity that can't be read is left out.
+    One identity is in the metadata, and one in the first line of the file with the checksums of the
+    metadata. An identity that can't be read is left out. In an undamaged store both are equal.
     """
     found = []
     with contextlib.suppress(
@@ -62,9 +62,9 @@ def labels(folder: Path) -> list[Label]:
 
 
 def metadata_files(sweep: Sweep) -> list[str]:
-    """Return the paths of the files of a store that belong to no chunk.
+    """Return the paths of those files in the store of a sweep that belong to no chunk of results.
 
-    These files have the metadata, the values of the axes, and the labels of components.
+    These files contain the metadata, the values of the axes, and the labels of components.
     """
     labels = {
         reduction.dimension
@@ -81,9 +81,10 @@ def metadata_files(sweep: Sweep) -> list[str]:
 
 @contextlib.contextmanager
 def filled(sweep: Sweep, folder: Path) -> Iterator[Path]:
-    """Make a store without results next to `folder`, and yield its path.
+    """Make a store without results in a temporary folder next to `folder`, and yield its path.
 
-    When the context ends, all of its files that the caller has not moved are removed.
+    When the context ends, all files of the temporary folder that the caller has not moved are
+    removed.
     """
     new = folder.absolute().with_name(f".pyharness-{os.urandom(8).hex()}-new")
     try:
@@ -109,7 +110,8 @@ def _fill(sweep: Sweep, folder: Path) -> None:
     with zarr.config.set({"array.write_empty_chunks": True}):
         _fill_group(zarr.create_group(folder, zarr_format=3, attributes=attributes), sweep)
     with warnings.catch_warnings():
-        # xarray warns if consolidated metadata are missing; Zarr warns if they are made.
+        # xarray warns if consolidated metadata are missing, and Zarr warns if they are made.
+        # They are therefore made, and Zarr's warning is suppressed.
         warnings.filterwarnings("ignore", "Consolidated metadata", UserWarning)
         zarr.consolidate_metadata(folder)
     text = checksum_text(label(sweep), "metadata", folder, metadata_files(sweep), LARGEST_METADATA)
@@ -163,8 +165,8 @@ def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> Non
         name,
         shape=shape,
         chunks=chunk,
-        # Not Zarr's default, which another version may change: a chunk that is computed again must
-        # have the same bytes.
+        # A chunk that is computed again must have the same bytes. The compressor is therefore
+        # fixed, because another version of Zarr may have another default.
         compressors=ZstdCodec(level=0, checksum=False),
         dtype=reduction.dtype,
         fill_value=reduction.fill,
@@ -174,6 +176,6 @@ def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> Non
 
 
 def largest_chunk(sweep: Sweep) -> int:
-    """Return an upper bound for the size of one file of a chunk in bytes, compressed or not."""
+    """Return an upper bound (bytes) of the size of any file of a chunk, compressed or not."""
     scenes = math.prod(sweep.chunk_shape)
     return 65536 + 2 * scenes * max(empty(asked, 1).nbytes for asked in sweep.reductions)

@@ -1,4 +1,4 @@
-"""A sweep: a scene, the axes of a grid, a solver, reductions, and the division into chunks."""
+"""The data of a sweep: scene, axes of the grid, solver, stored quantities, and chunks."""
 
 import itertools
 import math
@@ -18,11 +18,11 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class ReductionSpec:
-    """A reduction that a sweep requests, with its parameters and the name of its array.
+    """A reduction (quantity to store) that a sweep requests, with its parameters and array name.
 
-    `name` is the name of the array, and `reduction` a key of `REDUCTIONS`. If the reduction is
-    `claim`, `function` names the function that checks the claim, as in ``package.module:name``; for
-    other reductions it is empty.
+    `name` is the name of the array in the store, and `reduction` a key of `REDUCTIONS`. If the
+    reduction is `claim`, `function` names the function that checks the claim, as in
+    ``package.module:name``; for other reductions it is empty.
     """
 
     name: str
@@ -33,24 +33,25 @@ class ReductionSpec:
 
 @dataclass(frozen=True)
 class Sweep:
-    """One sweep as a sweep file describes it: scenes on a grid, their solver and the results kept.
+    """A sweep as a sweep file describes it: a grid of scenes, their solver, and stored quantities.
 
     Attributes
     ----------
     name : str
         The name of the sweep.
     scene : Scene
-        The scene that supplies everything that is not on an axis.
+        The scene that supplies all quantities that no axis varies.
     axes : tuple of Axis
-        The axes, in the order of the file.
+        The axes of the grid, in the order of the file.
     solver : Solver
         The method or program that solves the scenes, with its settings.
     reductions : tuple of ReductionSpec
-        The quantities that are kept.
+        The quantities that are stored for each scene.
     chunk : int
         The largest number of scenes in a chunk.
     text, fingerprint : str
-        The text of the file, and the SHA-256 of the text and of the scene file that it names.
+        The text of the sweep file, and the SHA-256 of this text together with the scene file that
+        it names.
     """
 
     name: str
@@ -81,9 +82,9 @@ class Sweep:
     def chunk_shape(self) -> tuple[int, ...]:
         """Return the number of scenes of a chunk along each dimension of the grid.
 
-        A chunk covers the last dimensions completely and one dimension in part. It has length 1
-        along all dimensions before this one, and along dimensions of programs, methods, listings or
-        readings, so that a chunk has only one of each.
+        A chunk covers some of the last dimensions completely, and the dimension before them in
+        part. Along earlier dimensions it has length 1. It also has length 1 along dimensions of
+        programs, methods, listings or readings, so that all of its scenes have the same solver.
         """
         single = {axis.dimension for axis in self.axes if axis.is_choice}
         room = self.chunk
@@ -122,7 +123,8 @@ class Sweep:
 def points(sweep: Sweep, box: tuple[slice, ...]) -> list[Indices]:
     """Return the indices of all scenes in a part of the grid, an array for each dimension.
 
-    `box` has a slice of each dimension. The index along the last dimension varies fastest.
+    `box` is the part of the grid, a slice for each dimension. In the result, the index along the
+    last dimension varies fastest.
     """
     ranges = [np.arange(part.start, part.stop) for part in box]
     return [each.ravel() for each in np.meshgrid(*ranges, indexing="ij")]
@@ -131,10 +133,10 @@ def points(sweep: Sweep, box: tuple[slice, ...]) -> list[Indices]:
 def spread(sweep: Sweep, count: int) -> list[Indices]:
     """Return the indices of `count` scenes that are evenly spread over the grid.
 
-    The result has an array for each dimension of the grid. Two or more scenes include the first and
-    the last scene of the grid.
+    The result has an array for each dimension of the grid. If there are two or more scenes, they
+    include the first and the last scene of the grid.
     """
-    # Python integers, because a grid may have more scenes than 64 bits can count.
+    # The numbers are Python integers, because a grid may have more scenes than 64 bits can count.
     total = sweep.n_scenes
     count = min(count, total)
     flat = [i * (total - 1) // max(1, count - 1) for i in range(count)]
@@ -147,19 +149,20 @@ def spread(sweep: Sweep, count: int) -> list[Indices]:
 
 
 def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]:
-    """Return, by field, the values of every axis for the scenes at `where`.
+    """Return the values of the axes of a sweep for selected scenes, by the field of the axis.
 
-    `where` has an array for each dimension of the grid: the index of every scene along this
-    dimension. Each array of the result has one value for each scene.
+    `where` selects the scenes. It has an array for each dimension of the grid: the index of every
+    selected scene along this dimension. Each array of the result has one value for each scene.
     """
     at = dict(zip(sweep.dimensions, where, strict=True))
     return {axis.field: axis.coordinates()[at[axis.dimension]] for axis in sweep.axes}
 
 
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
-    """Return the groups of the indices 0 to n - 1 that have the same values in all `columns`.
+    """Group the indices 0 to n - 1 so that all columns have equal values at the indices of a group.
 
-    For each group, return its indices in ascending order, and its values, one from each column.
+    Each column has n values. For each group, return its indices in ascending order, and its values,
+    one from each column. Without columns there is one group.
     """
     if not columns:
         return [(np.arange(n), ())]

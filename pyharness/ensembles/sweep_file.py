@@ -1,4 +1,4 @@
-"""Reading and checking of a sweep file, the TOML text that describes a sweep."""
+"""Reading and checking of sweep files, which are TOML files that describe sweeps."""
 
 import hashlib
 import itertools
@@ -49,12 +49,13 @@ def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = 
     Parameters
     ----------
     path : path
-        The path of the file. The path of a scene file that it names is relative to its folder.
+        The path of the sweep file. If it names a scene file, the scene file's path is relative to
+        the folder of the sweep file.
     claims : mapping, optional
-        The function that checks each claim, by the claim's identifier, as in
-        ``package.module:name``. It takes a `Batch` of n scenes and returns an integer for each
-        scene: 1 if the claim holds, 0 if it fails, 2 if it does not apply to the scene, and 3 if it
-        holds in part.
+        The name of the function that checks each claim, as in ``package.module:name``, by the
+        claim's identifier. The function takes a `Batch` of n scenes, and returns an integer for
+        each scene. It is 1 if the claim holds, 0 if it fails, 2 if it does not apply to the scene,
+        and 3 if it holds in part.
 
     Raises
     ------
@@ -103,8 +104,8 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, str
 def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
     """Return the scene from which all scenes of a sweep are made, and the bytes of its scene file.
 
-    `table` is the table [scene] of the sweep file, and `path` the path of the sweep file. A zero
-    byte precedes the bytes, which are empty if the table names no scene file.
+    `table` is the table [scene] of the sweep file, and `path` the path of the sweep file. The bytes
+    begin with an additional zero byte. They are empty if the table names no scene file.
     """
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
@@ -266,7 +267,8 @@ def _choices(sweep: Sweep, field: str, default: str | None) -> Iterable[str]:
 def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
     """Yield each combination of program, method, listing and reading that occurs on the axes.
 
-    A combination has the names by field. Axes of one dimension vary together.
+    A combination has the name of the program, method, ... by field. Axes with the same dimension
+    vary together.
     """
     words = [axis for axis in axes if axis.is_choice]
     counts = {axis.dimension: axis.count for axis in words}
@@ -278,7 +280,7 @@ def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
 def _check_solvers(sweep: Sweep) -> None:
     """Raise InputError if the sweep has an unknown program, method, listing or reading.
 
-    Also raise it if a method does not allow the tolerance, or if a time `t_end` is 0.
+    Also raise InputError if a method does not allow the tolerance, or if an end time `t_end` is 0.
     """
     solver = sweep.solver
     for program in _choices(sweep, "program", solver.program):

@@ -1,4 +1,8 @@
-"""The effect of each defect: corrected alone, kept alone, and in every subset of defects."""
+"""The effects of the defects of the programs on the errors of a run.
+
+Each defect is corrected alone and kept alone, and every subset of the defects is run. The errors
+are against the reference solution.
+"""
 
 import math
 from collections.abc import Iterator
@@ -23,9 +27,10 @@ from pyharness.truth.reference import Reference, reference
 class Effect:
     """The outcome of one listing on one scene: its largest errors, and how the run ended.
 
-    `omega` (rad/s) and `velocity` (translational, m/s) are the largest errors of any component over
-    the completed `steps`. `ended` is how the run ended, as in `Trajectory`. `stop` is the variable
-    and step at which the stop test ended the run, or None.
+    A listing is a program with a choice of its defects. `omega` (rad/s) and `velocity`
+    (translational, m/s) are the largest errors of any component over the completed `steps`. `ended`
+    is how the run ended, as in `Trajectory`. `stop` is the variable and step at which the stop test
+    ended the run, or None.
     """
 
     listing: Listing
@@ -40,8 +45,10 @@ class Effect:
 class CaseEffects:
     """The effect of one apparatus entry in one program and case, shown by four listings.
 
-    The listings are the original program, the original with this entry alone corrected, the
-    corrected program with this entry alone kept, and the corrected program.
+    An entry of the critical apparatus describes, for example, one defect. The listings are the
+    original program, the original with this entry alone corrected, the corrected program with this
+    entry alone kept, and the corrected program. For a reading or a conjecture, `effects_of`
+    describes the listings.
     """
 
     program: str
@@ -55,7 +62,7 @@ class CaseEffects:
 def entries(kind: str | None = None) -> list[dict[str, Any]]:
     """Return the apparatus entries of one kind, as in `data/apparatus.toml`; None means all kinds.
 
-    Raise InputError if no entry has that kind.
+    `kind` is, for example, ``defect`` or ``reading``. Raise InputError if no entry has that kind.
     """
     everything: list[dict[str, Any]] = facts("apparatus")["entry"]
     kinds = sorted({entry["kind"] for entry in everything})
@@ -75,8 +82,8 @@ def entry(name: str) -> dict[str, Any]:
 def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0) -> Effect:
     """Run a listing on a scene, and return its largest errors and how the run ended.
 
-    `truth` is the reference solution at the scene's times, with the translational velocity.
-    `effort` is a factor on the work limit.
+    `truth` is the reference solution at the end of each step of the scene, with the translational
+    velocity. `effort` is a factor on the work limit.
     """
     run = run_program(scene, listing, effort=effort)
     found = accuracy(scene, run, truth)
@@ -86,7 +93,10 @@ def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0
 
 @cache
 def case_truth(case: int) -> Reference:
-    """Return the reference solution of a case at its steps, with translational velocity; cached."""
+    """Return the reference solution of a case at the end of each step, with translational velocity.
+
+    The solution is computed once and cached.
+    """
     scene = case_scene(case)
     return reference(scene, scene.times(), velocity=True)
 
@@ -94,9 +104,11 @@ def case_truth(case: int) -> Reference:
 def effects_of(name: str) -> Iterator[CaseEffects]:
     """Yield the effect of the apparatus entry `name` in each of its programs, case by case.
 
-    The entry must be a switch of the programs. For a reading or a conjecture, `original` is the
-    original listing with it, and `corrected_alone` the original listing without it. No listing has
-    a reading by default.
+    The entry must have a switch in the programs. A reading is an interpretation of a doubtful card,
+    and a conjecture an assumption where no card exists. For both, the listings of a `CaseEffects`
+    have another meaning. `original` and `corrected_alone` are the original listing with and without
+    the entry, and `kept_alone` and `corrected` are the corrected listing with and without it. No
+    listing has a reading by default.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -122,11 +134,12 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
 def lattice(
     scene: Scene, program: str, readings: tuple[str, ...] = (), effort: float = 1.0
 ) -> list[Effect]:
-    """Return the outcome of a program with every subset of its defects, largest error first.
+    """Return the outcomes of a program with every subset of its defects, largest error first.
 
-    The errors are of omega against the reference solution. The subsets also include or omit each
-    reading named in `readings` and, if the torque varies, the conjectures of the original program.
-    A reading changes no corrected statement. `effort` is a factor on the work limit.
+    The errors are of omega against the reference solution, and an overflow counts as infinite. The
+    subsets also include or omit each reading named in `readings` and, if the torque varies, the
+    conjectures of the original program. A reading has no effect on a corrected statement. `effort`
+    is a factor on the work limit.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
@@ -136,9 +149,9 @@ def lattice(
 
 
 def switched(scene: Scene, program: str) -> tuple[str, ...]:
-    """Return the names of the program's defects and conjectures that can affect a scene.
+    """Return the names of the program's defects and conjectures that can affect a run on a scene.
 
-    Under a constant torque only defects can affect the scene, because the conjectures are about
+    Under a constant torque only defects can affect the run, because the conjectures are about
     varying torques.
     """
     return switches(program) if scene.torque.varies else names_of("defect", program)
@@ -147,5 +160,5 @@ def switched(scene: Scene, program: str) -> tuple[str, ...]:
 def _size(found: Effect) -> tuple[float, float]:
     # An overflow counts as worse than any finite error.
     worst = math.inf if found.ended == "overflow" else found.omega
-    # Three digits make a tie of errors that differ by rounding alone.
+    # With three digits, errors that differ by rounding alone are equal in the sort order.
     return float(f"{worst:.2e}"), float(f"{found.velocity:.2e}")

@@ -1,4 +1,4 @@
-"""The reports of `defects` and of `compare --ablate`."""
+"""The reports of `defects` and `compare --ablate`: entries of the apparatus and their effects."""
 
 import string
 import textwrap
@@ -35,11 +35,11 @@ _SUBSETS = (
     *words("active"), Column("error of w", short, unit="rad/s"),
     Column("error of V", short, unit="m/s"), Column("steps"), Column("stop"),
 )  # fmt: skip
-_HALF = 48  # width of each of two texts printed side by side
+_HALF = 48  # width, in characters, of each of two texts printed side by side
 
 
 def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
-    """Return the report of the apparatus, with a line for each entry.
+    """Return the report of the critical apparatus, with a line for each entry.
 
     A line has the name, kind, certainty, flag (number of the switch in the programs) and summary.
     """
@@ -60,8 +60,8 @@ def entry_report(
 ) -> Report:
     """Return the report of one entry of the apparatus, and of its effect by program and case.
 
-    `names` are the fields of the entry that are shown. `effects` is empty if the entry has no
-    effect to be shown.
+    `names` are the fields of the entry that are shown. `effects` has the effect for each program
+    and case, and is empty if no effect is to be shown.
     """
     cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
     what = {each["siglum"]: each["what"] for each in facts("cards/scan")["ground"]}
@@ -85,7 +85,10 @@ def entry_report(
 
 
 def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
-    """Return lines with two of the `texts` side by side; `heads` are their names and headings."""
+    """Return lines with two of the `texts` side by side.
+
+    `heads` are the keys of the two texts, and also the headings above them.
+    """
     columns = [[head, "-" * _HALF, *textwrap.wrap(texts[head], _HALF)] for head in heads]
     pairs = zip_longest(*columns, fillvalue="")
     return [Line(f"{a.ljust(_HALF)}   {b}".rstrip()) for a, b in pairs]
@@ -94,7 +97,8 @@ def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
 def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
     """Return a table for each program with the errors and stops of four listings, by case.
 
-    `is_reading` is true for a reading and a conjecture, whose four listings have other names.
+    `is_reading` is true if the entry is a reading or a conjecture. The legend then describes the
+    listings as original and corrected, each with and without the entry.
     """
     columns = ("original", "this alone corrected", "this alone kept", "all corrected")
     if is_reading:
@@ -120,8 +124,8 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
 def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
     """Return the report of every subset of each program's defects, with the errors it causes.
 
-    `found` has, by program, the outcomes in the order of the report. A subset is written as
-    letters, one for each active defect, conjecture or reading.
+    `found` has, by program, the outcomes in the order in which the report shows them. The report
+    writes a subset as letters, one for each active defect, conjecture or reading.
     """
     text: list[Section] = []
     rows = []

@@ -1,4 +1,4 @@
-"""The reports of `cards`: each card with its lines in scan, Fortran port and Python twin."""
+"""The reports of `cards`: each card with its lines in the scan, Fortran port and Python twin."""
 
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -18,14 +18,15 @@ _CLASSES = (
     Column("runge-kutta"), Column("places"),
 )  # fmt: skip
 _CLASSES_NAMES = [each.head for each in _CLASSES]
-_HALF = 48  # width of each of two texts printed side by side
+_HALF = 48  # width, in characters, of each of two texts printed side by side
 
 
 def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
     """Return the report of `cards`, with one block of lines for each card.
 
-    A block shows the card beside the line of the scan, the corresponding lines of the Fortran port
-    and of the Python twin, and the apparatus entries. `title` is the verb that shows the report.
+    A block shows the card, its line in the scan, and the corresponding lines of the Fortran port
+    and of the Python twin. The apparatus entries that name the card follow. `title` is the verb
+    that shows the report.
     """
     rows = [
         [each.program, each.number, each.statement, each.scan, " ".join(each.entries)]
@@ -42,7 +43,8 @@ def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
 def card_record(card: Card) -> dict[str, Any]:
     """Return a card as a JSON record, with its lines in the Fortran port and in the Python twin.
 
-    The key `scan` is null if the scan agrees with the card, and empty if the scan lacks the card.
+    The value of the key `scan` is the card's line in the scan if it differs from the card. It is
+    null if the scan agrees with the card, and empty if the scan lacks the card.
     """
     found = deck(card.program)
     scan = (card.scan or "") if card.deviates else None
@@ -66,8 +68,8 @@ def scan_report(
     """Return the report on whether the tables of the edition explain every line of a scan.
 
     `faults` has a sentence for each line in which the scan and the tables disagree. `undeclared`
-    has one for each disagreement between the cards and the apparatus entries. `lines` is the number
-    of lines that the tables expect, and `digest` the SHA-256 of the scan.
+    has a sentence for each disagreement between the cards and the apparatus entries. `lines` is the
+    number of lines that the tables expect, and `digest` the SHA-256 of the scan.
     """
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)
@@ -99,9 +101,10 @@ def scan_report(
 def classes_report() -> Report:
     """Return a report that counts the entries of the apparatus, and the cards they name, by kind.
 
-    The columns count the entries of a kind, the entries with a flag (a switch in the programs), the
-    cards that they name in each program, and the passages that the scan shows otherwise because of
-    such an entry.
+    There is a row for each kind of entry, such as `defect`. The first columns count the entries,
+    and the entries with a flag (a switch in the programs). The next columns count, for each
+    program, the cards that the entries name. The last column counts the passages in which the scan
+    differs from our text because of such an entry.
     """
     entries = facts("apparatus")["entry"]
     rows = []

@@ -1,4 +1,7 @@
-"""The report of `cards --collate`: the decks compared with each other and with the thesis."""
+"""The report of `cards --collate`: the three decks compared with each other and with the thesis.
+
+A deck is the cards of one program.
+"""
 
 from collections.abc import Sequence
 
@@ -14,7 +17,7 @@ _COLUMNS = (
 
 
 def collation_report(found: Sequence[Row]) -> Report:
-    """Return the report of the collation: how decks and thesis agree on each operation.
+    """Return the report on whether the decks and the text of the thesis agree on each operation.
 
     Each row of `found` is one operation of the programs, with the reason for any disagreement.
     """

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 SETS = {"original": original, "corrected": corrected}
 ENDINGS = ("svg", "png", "csv")
 _NUMBERS = "curve listing time recorded_time omega1 omega2 omega3"
-# Curves are distinct without colour: by dash, width, marker, and position of the markers.
+# Curves differ also without colour: in dash, width, marker, and position of the markers.
 _REFERENCE: dict[str, Any] = {"color": "#bdbdbd", "linestyle": "-", "linewidth": 5.0}
 _LIMIT: dict[str, Any] = {"color": "#107040", "linestyle": (0, (3, 1.5)), "linewidth": 1.0}
 _STYLES = {
@@ -46,11 +46,11 @@ _END: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class FigurePlan:
-    """A figure to be drawn: which programs on which case, before anything is computed.
+    """A figure to be drawn: which programs it shows on which case, before anything is computed.
 
-    `number` and `part` are those of the thesis; `part` is `A`, `B` or empty. `set` is one of
-    `SETS`: whether the programs are original or corrected. `caption` is our own text. `source` is
-    the place in the thesis on which the choice of programs rests.
+    `number` and `part` are those of the figure in the thesis; `part` is `A`, `B` or empty. `set` is
+    ``original`` or ``corrected``, for the programs as printed or as corrected. `caption` is our own
+    text. `source` is the place in the thesis that supports the choice of programs.
     """
 
     number: int
@@ -63,7 +63,7 @@ class FigurePlan:
 
     @property
     def stem(self) -> str:
-        """Return the name of the figure's files without their endings."""
+        """Return the name of the figure's files without their endings, as in `figure-10a`."""
         of_set = "-corrected" if self.set == "corrected" else ""
         return f"figure-{self.number:02d}{self.part.lower()}{of_set}"
 
@@ -106,8 +106,8 @@ class Curve:
 class FigureFinding:
     """A planned figure with its scene, the reference solution and the computed curves.
 
-    Each curve ends where its program ended. `limit` is the function to which one of the programs
-    converges as its step size goes to zero, or None.
+    Each curve ends where its program ended. `limit` is None or has a label and the values of a
+    function: the function to which one of the programs converges as its step size goes to zero.
     """
 
     plan: FigurePlan
@@ -161,7 +161,7 @@ def _limit(
 
 
 def figures_report(findings: Sequence[FigureFinding]) -> Report:
-    """Return the report of the files that were drawn, with a line for each figure."""
+    """Return the report on the files that were drawn, with a line for each figure."""
     rows = []
     for each in findings:
         curves = ", ".join(curve.label for curve in each.curves)
@@ -211,12 +211,15 @@ def curve_numbers(finding: FigureFinding) -> Table:
 
 
 def _from_zero(values: Array, start: Array | float = 0.0) -> Array:
-    """Return the values of a curve, preceded by `start`, the value at time 0."""
+    """Return the values of a curve, preceded by `start`, the curve's value at time 0."""
     return np.concatenate([np.array(start, ndmin=values.ndim), values])
 
 
 def figure_picture(finding: FigureFinding) -> Picture:
-    """Draw a figure: the three components of omega over time, its curves over the reference."""
+    """Draw a figure: omega of each program over time, in front of the reference solution.
+
+    There is a plot for each of the three components of omega.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 8.6), dpi=110, layout="constrained")
@@ -249,11 +252,12 @@ def figure_picture(finding: FigureFinding) -> Picture:
 
 
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
-    """Draw omega1 of the original figure `first` and the corrected figure `second` in one picture.
+    """Draw omega1 of a figure of the original programs and of a corrected figure in one picture.
 
-    The figure `first` must have the limit of a program. Beyond the end of an original run, the
-    limit shows where the run would have gone. Only the last of the corrected programs is drawn,
-    because the others would draw the same line again.
+    The figure of the original programs, `first`, must have the limit of a program. After the early
+    end of a run, this limit shows approximately how omega1 would have continued. Of the corrected
+    figure, `second`, only the last curve is drawn, because its other curves would cover the same
+    line.
     """
     from matplotlib.figure import Figure
 
@@ -307,11 +311,12 @@ def _draw(
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
     """Return the bottom and top (rad/s) of the vertical axis for the omega component `row`.
 
-    The axis contains all curves that stay near the reference.
+    `row` is 0, 1 or 2. The axis contains all curves that stay near the reference; a curve that
+    diverges may leave the frame.
     """
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())
-    # A curve that is further off than the largest omega diverges, and may leave the frame.
+    # A curve that is farther from the reference than the largest omega counts as diverging.
     far = float(np.abs(truth).max())
     near = max(0.6 * (largest - least), 0.01 * far)
     low, high = least, largest

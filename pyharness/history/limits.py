@@ -24,7 +24,7 @@ from pyharness.original.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
 _TOLERANCE = 1e-11
-_MOST_EVALUATIONS = 1_000_000  # about ten seconds
+_MOST_EVALUATIONS = 1_000_000  # right-hand sides; they take about ten seconds
 
 TENDS_TO = {
     "two-term": "the solution of w' = F(w) - (2/9) t^2 Q(F(w)), Q the quadratic part of F",
@@ -59,12 +59,12 @@ class Halving:
 
 @dataclass(frozen=True)
 class Limit:
-    """The limit of an original program, and its order of convergence to this limit.
+    """The limit of an original program as the step size goes to zero, and the order of convergence.
 
     `tends_to` describes the limit. `halvings` has a run for each step size, the largest first.
-    `order` comes from the last two runs. It is None if their distance from the limit is rounding
-    error alone, if one of them overflows, or if there is no limit. It is also None if the limit is
-    unbounded at the time `blow_up` (s).
+    `order` is the measured order of convergence to the limit, computed from the last two runs. It
+    is None if their distance from the limit is rounding error alone, if one of them overflows, or
+    if there is no limit. It is also None if the limit is unbounded at the time `blow_up` (s).
     """
 
     program: str
@@ -85,12 +85,13 @@ class Limit:
 
 
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
-    """Measure the distance of an original program, without its stop test, from its limit.
+    """Measure how an original program, without its stop test, converges to its limit.
 
-    The step size of the scene is halved `halvings` times, with one run for each step size. If the
-    torque varies with time, the collocation programs have no limit, and the limit of the
-    Runge-Kutta program is computed from its limit equations. Raise InputError if a run exceeds the
-    work limit, on which `effort` is a factor.
+    The limit is the omega to which the program tends as its step size goes to zero. The step size
+    of the scene is halved `halvings` times, with one run for each step size. If the torque varies
+    with time, the collocation programs have no limit, and the limit of the Runge-Kutta program is
+    computed from its limit equations. Raise InputError if a run exceeds the work limit, on which
+    `effort` is a factor.
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
@@ -130,9 +131,10 @@ def limit_solution(
 def _limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float
 ) -> tuple[Array, str, float | None]:
-    """Return the limit of `limit_solution`, its description, and its blow-up time (s) or None.
+    """Return the limit of an original program, its description, and its blow-up time (s) or None.
 
-    The limit becomes unbounded at the blow-up time.
+    The limit is the omega that `limit_solution` returns; it becomes unbounded at the blow-up time.
+    The arguments are those of `limit_solution`.
     """
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)
@@ -153,11 +155,17 @@ def _limit_solution(
 def _extrapolated(scene: Scene) -> Rate:
     """Return the right-hand side of the two-term program's limit equation.
 
-    In step n of size h the collocation points are t/3 and 2t/3 after the beginning of the step,
-    with t = n h, because the program lets DT grow. At the time s after the beginning, the slope
-    along the first estimate is g(s) = F(w + s F) = F + s F' F + s^2 Q(F). Here w is omega, F the
-    right-hand side of Euler's equations, and Q its quadratic part. The line through g(t/3) and
-    g(2t/3), extrapolated to s = 0, is 2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
+    The original program adds the step size h to its interval length DT in every step. In step n the
+    collocation points are therefore t/3 and 2t/3 after the beginning of the step, with t = n h. Let
+    w be omega, F the right-hand side of Euler's equations at w, F' its Jacobian, and Q its
+    quadratic part. At the time s after the beginning of the step, the slope along the first
+    estimate is
+
+    g(s) = F(w + s F) = F + s F' F + s^2 Q(F).
+
+    The right-hand side is the line through g(t/3) and g(2t/3), extrapolated to s = 0:
+
+    2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
     """
     right_hand_side = scene.right_hand_side()
     a, b, c = scene.euler_coefficients
@@ -173,10 +181,10 @@ def _extrapolated(scene: Scene) -> Rate:
 def _slow_slopes(scene: Scene) -> Rate:
     """Return the right-hand side of the Runge-Kutta program's limit equations, for varying torque.
 
-    Let p be the program's U(1), the omega at which it evaluates the first slopes of a step, and F
-    the right-hand side of Euler's equations. In every step of size h, p grows by h/2 F(p), and the
-    resulting omega by h F(p). The slopes are therefore taken at an omega that moves at half speed.
-    The state of the limit equations is p, then the resulting omega.
+    Let p be the program's U(1), the omega at which it evaluates the first slopes of a step. Let F
+    be the right-hand side of Euler's equations. In every step of size h, p grows by h/2 F(p), and
+    the resulting omega by h F(p). The slopes are therefore taken at an omega that changes at half
+    speed. The state of the limit equations is p, then the resulting omega.
     """
     right_hand_side = scene.right_hand_side()
 
@@ -190,11 +198,12 @@ def _slow_slopes(scene: Scene) -> Rate:
 def _solved(
     rate: Rate, start: list[float], times: Sequence[float], scale: float, effort: float
 ) -> tuple[Array, float | None]:
-    """Integrate a limit equation numerically from `start` at time 0.
+    """Integrate a limit equation, whose right-hand side is `rate`, from `start` at time 0.
 
-    Return the solution at `times`, shape (times, components), which is NaN from a blow-up on; and
-    the time of the blow-up (s), or None. A blow-up is a component of a million times `scale`, the
-    largest omega of scene and reference (rad/s). `effort` is a factor on the work limit.
+    Return two values: the solution at `times`, shape (times, components), which is NaN after a
+    blow-up, and the time of the blow-up (s), or None. A blow-up is the growth of a component to a
+    million times `scale`, the largest omega of scene and reference (rad/s). `effort` is a factor on
+    the work limit.
     """
     from scipy.integrate import solve_ivp
 
@@ -223,7 +232,7 @@ def _solved(
             rtol=_TOLERANCE, atol=_TOLERANCE * scale,
         )  # fmt: skip
     rows = np.full((len(times), len(start)), math.nan)
-    if len(result.t):  # else y is an empty list
+    if len(result.t):  # without any time, y is an empty list
         rows[: len(result.t)] = result.y.T
     # The solver ends at the bound, or just before it if no step is small enough.
     return rows, latest if result.status else None
@@ -232,8 +241,8 @@ def _solved(
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
     """Return, by program, the names of the defects that change no omega of a scene beyond rounding.
 
-    A defect is invisible if its correction alone, with all other defects kept, changes omega by
-    rounding error at most, and changes neither the number of steps nor how the run ended.
+    Such a defect is called invisible: its correction alone, with all other defects kept, changes
+    omega by rounding error at most, and changes neither the number of steps nor how the run ended.
     """
     found = {}
     for program in PROGRAMS:

@@ -1,7 +1,7 @@
 """A page printed by any machine, compared with the pages that our programs print.
 
-Our programs print their pages in every arithmetic. The digits that a machine printed, real or
-emulated, therefore show in which arithmetic its program ran.
+Our programs print their pages in each of several arithmetics. The digits that a machine printed,
+real or emulated, therefore show in which arithmetic its program ran.
 """
 
 import re
@@ -21,15 +21,15 @@ from pyharness.original.programs import WORD_NAMES, run_program
 # A number as FORMAT writes it: asterisks if it does not fit, R or I (CDC) if it is not finite.
 _FIELD = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)|\*+|[-+]?[RI]")
 _SHOWN = 5
-_LARGEST = 1 << 24  # bytes
+_LARGEST = 1 << 24  # largest size of a page's file, in bytes
 
 
 @dataclass(frozen=True)
 class Difference:
     """A number of a page from another machine that differs from the number on our page.
 
-    `row`, and `place` within the row, count from 1. `theirs` and `ours` are the numbers as printed
-    by the other machine and by our program.
+    `row` is the row of the number, and `place` its position within the row; both count from 1.
+    `theirs` and `ours` are the numbers as printed by the other machine and by our program.
     """
 
     row: int
@@ -45,11 +45,12 @@ class Fit:
     Attributes
     ----------
     program, listing, word : str
-        The program of our page, the label of its listing, and the arithmetic in which it ran.
+        The program of our page, the label of its listing (``original`` or ``corrected``), and the
+        name of the arithmetic in which it ran.
     case : int
-        The case of our page.
+        The number of the case of our page in Table 1.
     fields : int
-        How many numbers the rows of the page have; of the two pages, the one that has more counts.
+        How many numbers the rows of the page have, on the one of the two pages that has more.
     differences : tuple of Difference
         The numbers that the two pages do not print alike.
     """
@@ -90,10 +91,11 @@ def fits(
 ) -> list[Fit]:
     """Compare a page with each of our pages that has the same moments, torques and columns.
 
-    `lines` are the lines of numbers of the page, from `read_page`. Our pages are those of the
-    `programs` in the `cases`, original and corrected, in every arithmetic. Return the comparisons,
-    those with the fewest differences first. Raise InputError if none of our pages has these
-    moments, torques and columns. `progress` is called before each comparison.
+    `lines` are the lines of numbers of the page, from `read_page`. Our pages are printed by the
+    `programs` in the `cases`, original and corrected, in every arithmetic. The heading of a page
+    shows the moments and torques. Return the comparisons, sorted by the number of differences, the
+    smallest first. Raise InputError if none of our pages has the same moments, torques and number
+    of columns. `progress` is called before each comparison.
     """
     found: list[Fit] = []
     every = len(programs) * len(cases) * 2 * len(WORD_NAMES)
@@ -118,7 +120,10 @@ def fits(
 
 
 def _form(program: str, case: int) -> tuple[list[list[str]], int]:
-    """Return the lines of numbers at the head of our page, and how many numbers each row has."""
+    """Return the lines of numbers in the heading of our page, and how many numbers each row has.
+
+    The page is that of the program `program` in the case `case`.
+    """
     scene = replace(case_scene(case), steps=1)
     *head, row = _numbers(page(scene, program, run_program(scene, original(program), "python")))
     return head, len(row)
@@ -147,8 +152,8 @@ def _numbers(text: str) -> list[list[str]]:
 def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
     """Return the report on which program, listing and arithmetic print the page in file `path`.
 
-    If no comparison in `found` is without differences, the report shows the first differences of
-    the nearest page.
+    `found` has the comparisons of this page with our pages, the nearest page first. If no
+    comparison is without differences, the report shows the first differences from the nearest page.
     """
     best = found[0]
     whole = [each for each in found if each.is_whole]

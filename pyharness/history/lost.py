@@ -1,9 +1,9 @@
-"""The lost experiments of IV.2: mistakes with which three weightings could have failed.
+"""The lost experiments of section IV.2 of the thesis: mistakes that may explain their failure.
 
-The thesis does not print the programs for subdomain, Galerkin and least squares. IV.2 says that
-they gave no meaningful results where the solution is known, in Cases 1 and 2. Each mistake in
-`data/lost.toml` is a conjecture about a mistake that such a program could have had. The method is
-programmed as IV.2 describes it: a trial function of two terms, the products written out as
+The thesis does not print its programs for the weightings subdomain, Galerkin and least squares.
+IV.2 says that they gave no meaningful results where the solution is known, in Cases 1 and 2. Each
+entry of `data/lost.toml` is a conjecture: a mistake that such a program could have had. The method
+is programmed as IV.2 describes it: a trial function of two terms, the products written out as
 polynomials, one solution for a constant right-hand side, and one correction.
 """
 
@@ -33,11 +33,11 @@ TERMS = 2
 
 @dataclass(frozen=True)
 class Attempt:
-    """The result of one weighting with one mistake, on the cases with a known solution.
+    """The result of one weighting with one mistake, on Cases 1 and 2, whose solutions are known.
 
-    `mistake` is the identifier of the mistake in `data/lost.toml`. `shares` is, by case, the
-    largest error divided by the largest omega, infinite after an overflow. `failed` has the cases
-    in which this ratio exceeds the limit in `data/lost.toml`.
+    `mistake` is the identifier of the mistake in `data/lost.toml`. `shares` has, by case, the
+    largest error of omega divided by the largest omega; it is infinite after an overflow. `failed`
+    has the cases in which this ratio exceeds the limit in `data/lost.toml`.
     """
 
     mistake: str
@@ -48,7 +48,7 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A conjectured mistake with its result for each weighting.
+    """A conjectured mistake with its results, one `Attempt` for each weighting.
 
     `mistake` is its identifier, and `summary` its description, in `data/lost.toml`.
     """
@@ -59,20 +59,21 @@ class Ranked:
 
     @property
     def in_both(self) -> int:
-        """Return how many weightings fail, with this mistake, in both cases with known solution."""
+        """Return how many weightings fail, with this mistake, in both Case 1 and Case 2."""
         return sum(len(each.failed) == len(CASES) for each in self.attempts)
 
     @property
     def in_either(self) -> int:
-        """Return how many weightings fail in at least one of the cases with a known solution."""
+        """Return how many weightings fail, with this mistake, in Case 1, in Case 2 or in both."""
         return sum(bool(each.failed) for each in self.attempts)
 
 
 def ranked(word: str = BINARY64) -> list[Ranked]:
     """Run every weighting with every conjectured mistake, in the arithmetic named `word`.
 
-    Return the mistakes in order. The first makes the most weightings fail in both cases and, among
-    equals, the most in at least one case.
+    Return the mistakes, sorted by the number of weightings that fail with them in both cases, the
+    largest number first. Mistakes with equal numbers are sorted by the number of weightings that
+    fail in at least one case.
     """
     limit = facts("lost")["limit"]
     found = []
@@ -89,10 +90,10 @@ def ranked(word: str = BINARY64) -> list[Ranked]:
 
 
 def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> float:
-    """Return a weighting's largest error against the reference, divided by the largest omega.
+    """Return a weighting's largest error against the reference, relative to the largest omega.
 
-    `mistake` is the identifier of a mistake in `data/lost.toml`, or ``none``. The result is
-    infinite after an overflow.
+    `mistake` is the identifier of a mistake in `data/lost.toml`, or ``none``. `word` is the name of
+    the arithmetic. The result is infinite after an overflow.
     """
     given = scene if word == BINARY64 else scene_in(scene, WORDS[word])
     omega = march(given, weighting, mistake)
@@ -103,21 +104,21 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
 
 
 def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
-    """Integrate a scene of constant torque by a weighting with one mistake.
+    """Integrate a scene of constant torque by one of the `WEIGHTINGS`, programmed with one mistake.
 
-    `mistake` is the identifier of a mistake in `data/lost.toml`. Return omega (rad/s), shape
-    (steps, 3); NaN from an overflow on. The scene's numbers, floats or numbers of another word
-    (`WORDS`), determine the arithmetic.
+    `mistake` is the identifier of a mistake in `data/lost.toml`, or ``none``. Return omega (rad/s),
+    shape (steps, 3); NaN from an overflow on. The scene's numbers are floats, or numbers of an
+    arithmetic in `WORDS`; they determine the arithmetic of the integration.
     """
     h = scene.step_size
     coefficients = scene.euler_coefficients
     torque = np.array(scene.normalized_torque(0.0))
     state = np.array(scene.omega)
     rows = np.full((scene.steps, 3), np.nan)
-    weighted_over: float | None = None  # the interval length for which the matrix was computed
+    weighted_over: float | None = None  # interval length (s) for which the matrix was computed
     with np.errstate(all="ignore"):
         for step in range(scene.steps):
-            # The residual is weighted over (0, length); the result is evaluated at h in any case.
+            # The residual is weighted over (0, length); omega is evaluated at h with any mistake.
             length = {"dt-accumulates": h * (step + 1), "unit-interval": 1.0}.get(mistake, h)
             if weighted_over is None or length != weighted_over:
                 matrix = _matrix(weighting, length)
@@ -139,10 +140,11 @@ def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
 
 
 def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
-    """Return the products A omega2 omega3, ... as polynomials of time t, one column per component.
+    """Return A omega2 omega3, B omega1 omega3 and C omega1 omega2 as polynomials of the time t (s).
 
-    `estimate` has the coefficients of omega as a polynomial of t, in the same form. `coefficients`
-    are A, B and C of Euler's equations.
+    The result has a column for each product, with its coefficients of 1, t, t**2, ... `estimate`
+    has the components of omega in the same form. `coefficients` are A, B and C of Euler's
+    equations.
     """
     columns = [
         polynomial.polymul(estimate[:, j], estimate[:, k]) * a
@@ -153,9 +155,10 @@ def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
 
 
 def _matrix(weighting: str, length: float) -> Array:
-    """Return the weighted integrals of the derivatives of t and t**2 over (0, length).
+    """Return the weighted integrals over (0, length) of the derivatives of t and t**2.
 
-    The row is the weight, and the column the power of t. `length` is in s.
+    The shape is (2, 2). A row belongs to one of the two weights of the weighting named `weighting`,
+    and a column to a power of t. `length` is in s.
     """
     columns = [_weighted(weighting, length, (i + 1) * _power(i)) for i in range(TERMS)]
     return np.array(columns).T
@@ -164,18 +167,20 @@ def _matrix(weighting: str, length: float) -> Array:
 def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
     """Return c1 and c2 of all components, for which the weighted residuals vanish; shape (2, 3).
 
-    They solve the linear equations with `matrix` and, a row for each component, `right`. `second`
-    is true for the correction, and false for the first estimate.
+    c1 and c2 solve the linear equations with the matrix `matrix`. `right` has the right-hand sides,
+    one row for each component. `mistake` is the identifier of a mistake in `data/lost.toml`.
+    `second` is true for the correction, and false for the first estimate.
     """
     if mistake == "transposed":
         matrix = matrix.T
     if mistake == "matrix-used-up" and second:
-        # LEQT1F overwrites A with its factors; the second call takes them for the matrix.
+        # LEQT1F overwrites its matrix with the factors; the second call takes these as the matrix.
         matrix = _factors(matrix)
     if mistake == "unscaled-solver":
         (a, b), (c, d) = matrix
         x, y = right.T
-        # The array is the left operand, so that NumPy applies a word's arithmetic to each element.
+        # The array is the left operand, so that NumPy applies the number's own arithmetic to each
+        # element.
         second = (y - x * (c / a)) / (d - c / a * b)
         return np.array([(x - second * b) / a, second])
     solutions, _ = leqt1f(matrix.tolist(), right.tolist())
@@ -188,9 +193,10 @@ def _power(exponent: int) -> Array:
 
 
 def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
-    """Return the weighted integrals of a polynomial over (0, length), one for each weight.
+    """Return the integrals over (0, length) of a polynomial times each of the two weights.
 
-    `residual` has the coefficients of the polynomial; `length` is in s.
+    The weights are those of the weighting named `weighting`. `residual` has the coefficients of the
+    polynomial, from the constant on; `length` is in s.
     """
     found = []
     for k in range(TERMS):
@@ -211,9 +217,10 @@ def _factors(matrix: Array) -> Array:
 
 
 def halved(scene: Scene, weighting: str) -> float:
-    """Return the factor by which halving the step reduces the error of a weighting.
+    """Return the factor by which halving the step size reduces the error of a weighting.
 
-    The weighting has no mistake, and the end time is the same with both step sizes.
+    The error is the largest one of omega over the run. The weighting has no mistake, and the end
+    time is the same with both step sizes.
     """
     finer = replace(scene, step_size=scene.step_size / 2.0, steps=2 * scene.steps)
     return _share(scene, weighting, "none") / _share(finer, weighting, "none")
@@ -228,7 +235,7 @@ _TABLE = (
 
 
 def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
-    """Return the report of every mistake: its errors, and how many weightings it makes fail.
+    """Return the report of every mistake: its errors, and how many weightings fail with it.
 
     `word` is the name of the arithmetic in which `found` was computed.
     """

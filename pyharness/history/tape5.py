@@ -1,8 +1,9 @@
-"""TAPE5, the programs' file of unformatted sequential records, written from a trajectory.
+"""TAPE5, the file of unformatted sequential records that each program writes.
 
-Each WRITE(5)TIME,U1,U2,U3,V1,V2,V3 is one record: its length in bytes, seven binary64 numbers, and
-the length again, all little-endian. Today's Fortran compilers and `scipy.io.FortranFile` read it.
-The author's tape had other record marks and, as we infer, words of 60 bits.
+The file is written here from a trajectory. Each WRITE(5)TIME,U1,U2,U3,V1,V2,V3 is one record: its
+length in bytes, seven binary64 numbers, and the length again, all little-endian. Today's Fortran
+compilers and `scipy.io.FortranFile` read it. The author's tape had other record marks and, as we
+infer, words of 60 bits.
 """
 
 import numpy as np
@@ -13,9 +14,10 @@ _RECORD = np.dtype([("head", "<i4"), ("items", "<f8", (7,)), ("tail", "<i4")])
 
 
 def records(trajectory: Trajectory) -> bytes:
-    """Return the bytes of the file TAPE5 of a program, one record for each row of its trajectory.
+    """Return the bytes of a program's file TAPE5, with one record for each row of its trajectory.
 
-    The trajectory must have translational velocities.
+    The trajectory must have translational velocities. A record has the recorded time (s), omega
+    (rad/s) and the translational velocity (m/s).
     """
     assert trajectory.velocity is not None
     result = np.empty(len(trajectory.time), dtype=_RECORD)

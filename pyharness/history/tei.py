@@ -2,10 +2,10 @@
 
 Each deck is in the order of its cards. A `pb` element marks the beginning of a page of the scan;
 its `n` is the position of the page in the scan. An `app` element marks each place where the scan
-differs from our text: `lem` is our reading, and `rdg` the scan's. To restore the scan, take the
-pages in the order of `n` and each `rdg` instead of its `lem`. The lines of the scan are then the
-cards, the `fw` elements (headings added by an editor) and the `surplus` elements (text that belongs
-to no card there).
+differs from our text: `lem` is our reading, and `rdg` is the reading of the scan. To restore the
+scan, take the pages in the order of `n` and each `rdg` instead of its `lem`. The lines of the scan
+are then the cards, the `fw` elements and the `surplus` elements. An `fw` element is a heading added
+by an editor, and a `surplus` element is text that belongs to no card at its place in the scan.
 """
 
 from collections.abc import Iterable, Iterator
@@ -54,8 +54,9 @@ _TOLD = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why
 class _Page(NamedTuple):
     """A page of the scan with its lines.
 
-    `number` is its position in the scan, from 1. `moved` is the apparatus entry that explains why
-    the page is not in its proper place, or None.
+    `number` is the position of the page in the scan, from 1. `moved` is the identifier of the
+    apparatus entry that explains why the page is not in its proper place; None for a page in its
+    proper place.
     """
 
     number: int
@@ -78,7 +79,7 @@ def tei_document() -> bytes:
     back = xml.SubElement(text, "back")
     _apparatus(_named(back, "div", type="apparatus"))
     _places(_named(back, "div", type="places"))
-    # Blanks in a card are significant, so the cards are filled in after the indentation.
+    # Indentation adds blanks, which are significant in a card: the cards are filled in after it.
     xml.indent(root)
     for block, card in blocks:
         _fill(block, card)
@@ -137,7 +138,7 @@ def _header(root: xml.Element) -> None:
 def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]:
     """Append the deck of a program to `body`, and yield the XML element of each card with the card.
 
-    The elements are still empty, and in the order of the cards.
+    The elements are yielded in the order of the cards. They do not yet contain the card's text.
     """
     div = _named(body, "div", program, type="deck")
     _said(div, "head", f"The {program} program")
@@ -150,7 +151,7 @@ def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]
         for item in page.lines:
             if isinstance(item, str):
                 for number in numbers(item):
-                    # A lost card is on no page; it goes before the next card that is on one.
+                    # A lost card is on no page; it precedes the next card that is on a page.
                     while lost and lost[0] < number:
                         card = cards[lost.pop(0)]
                         yield _block(div, card), card
@@ -278,7 +279,10 @@ def _said(
 
 
 def _id(card: Card) -> str:
-    """Return a card's XML identifier, as in ``two-term.1660``; it may not contain a colon."""
+    """Return a card's XML identifier, as in ``two-term.1660``.
+
+    Unlike the name of a card, the identifier may not contain a colon.
+    """
     return f"{card.program}.{card.number}"
 
 

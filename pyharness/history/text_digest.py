@@ -1,4 +1,4 @@
-"""The digest of the edition's cards and apparatus, which identifies the text in a citation."""
+"""A digest of the edition's cards and apparatus, by which a citation can identify their text."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -9,14 +9,18 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 
 TABLES = (*(f"cards/{program}" for program in PROGRAMS), "apparatus")
-"""The tables in `data` that make up the text: the cards with the scan's variants, the apparatus."""
+"""The tables in `data` that make up the edition's text, without their ending `.toml`.
+
+They are the cards of each program with the scan's variants, and the apparatus.
+"""
 
 
 def text_digest(table: Callable[[str], Mapping[str, Any]] = facts) -> str:
     """Return the first 12 hexadecimal digits of the SHA-256 of the edition's text.
 
-    The text is the content of `TABLES`. The Fortran port, the Python twins, the project's version
-    and comments in the tables do not change the digest.
+    The text is the content of `TABLES`: the cards, the scan's variants and the critical apparatus.
+    The Fortran port, the Python twins, the project's version and comments in the tables do not
+    change the digest.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
-"""The effect of word length: runs with p bits of significand, compared with binary64.
+"""The effect of the word length: runs in emulated arithmetics of p bits, compared with binary64.
 
-The errors of the runs are against the reference solution.
+Every program runs on a case of Table 1 with p bits of significand and a rounding rule. Its printed
+page is compared with the page of the run in binary64, and its omega with the reference solution.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -20,7 +21,7 @@ from pyharness.original.word import RULES, Word
 from pyharness.truth.reference import reference
 
 LENGTHS = (16, 20, 24, 28, 32, 36, 40, 44, 48, 53, 56, 60, 64, 80, 96, 113)
-# In the widest word a program's error is the truncation error of its method alone.
+# With 113 bits, rounding is negligible: the error is the truncation error of the method alone.
 DOUBLE, WIDEST = Word(53), Word(113)
 
 
@@ -31,23 +32,26 @@ class WordRun:
     Attributes
     ----------
     case : int
-        The case of Table 1.
+        The number of the case in Table 1 of the thesis.
     program, listing : str
-        The name of the program, and the label of its listing.
+        The name of the program, and the label of its listing: ``original`` or ``corrected``.
     p : int
         Bits of the significand.
     rule : str
-        The rounding rule, one of `RULES`.
+        The rounding rule: ``nearest-even``, ``chop`` (towards zero), or ``FX`` and ``RX``, the
+        unrounded and the rounded operations of the CDC.
     stop : str
-        The reason for an early end and its step, as in ``V2 at 25`` or ``overflow at 50``; empty if
-        the run is complete.
-    fields, different : int
-        How many numbers the rows of the printed page have, in binary64 or in this arithmetic,
-        whichever has more; and how many of them binary64 and this arithmetic do not print alike.
+        Why and at which step the run ended early: ``V2 at 25`` if the stop test of the Runge-Kutta
+        program failed for the variable V2, or ``overflow at 50``. Empty if the run is complete.
+    fields : int
+        How many numbers the rows of the printed page have, in this arithmetic or in binary64,
+        whichever prints more.
+    different : int
+        How many of these numbers are printed differently in this arithmetic and in binary64.
     error : float
-        Largest error of any omega component against the reference (rad/s).
+        Largest error of any omega component against the reference solution (rad/s).
     singular : int
-        Number of rows for which LEQT1F reports IER = 129.
+        Number of rows in which the linear solver LEQT1F reports a singular matrix (IER = 129).
     """
 
     case: int
@@ -66,8 +70,9 @@ class WordRun:
 class WordCell:
     """The runs of one listing on one case, in several arithmetics.
 
-    `double` is the run in binary64, `widest` the run with 113 bits, and `runs` has a run for each
-    chosen number of bits and rounding rule.
+    A listing is a program, original or corrected. `double` is the run in binary64, and `widest` the
+    run with 113 bits. `runs` has one run for each pair of a chosen number of bits and a rounding
+    rule.
     """
 
     double: WordRun
@@ -81,7 +86,8 @@ class WordCell:
     def settled(self, rule: str, same: Callable[[WordRun], bool]) -> int | None:
         """Return the least p (bits) such that `same` holds for all runs with at least p bits.
 
-        Only runs with the rounding rule `rule` count. Return None if there is no such p.
+        `same` is a predicate of one run. Only runs with the rounding rule `rule` count. Return None
+        if there is no such p.
         """
         least = None
         for run in sorted((r for r in self.runs if r.rule == rule), key=lambda run: -run.p):
@@ -99,9 +105,9 @@ def cells(
 ) -> Iterator[WordCell]:
     """Run the programs, original and corrected, on the cases in every arithmetic.
 
-    The arithmetics have each number of bits in `lengths` with each rounding rule. Yield a
-    `WordCell` for each listing and case. `progress` is called with the number of finished runs and
-    the number of all runs.
+    An arithmetic is a pair of a number of bits in `lengths` and a rounding rule in `RULES`;
+    binary64 and 113 bits are always added. Yield a `WordCell` for each listing and case. `progress`
+    is called with the number of finished runs and the number of all runs.
     """
     words = [Word(p, rule) for rule in RULES for p in lengths]
     chosen = [
@@ -122,9 +128,10 @@ def cells(
 
 
 class _Judge:
-    """A listing on a scene, with the page in binary64 and the reference solution.
+    """The comparison of a listing's runs on a scene with its run in binary64 and the reference.
 
-    Runs of the listing in other arithmetics are compared with this page and this solution.
+    The constructor computes the page that the listing prints in binary64, and the reference
+    solution. `run` compares a run in another arithmetic with both.
     """
 
     def __init__(self, scene: Scene, listing: Listing) -> None:

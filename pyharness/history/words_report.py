@@ -1,4 +1,4 @@
-"""The report of `words`: the effect of the machine's arithmetic, and of word length."""
+"""The report of the verb `words`: the effect of word length and of the CDC's arithmetic on runs."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
@@ -12,7 +12,7 @@ from pyharness.original.word import RULES
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# An error larger than this multiple of the widest word's error is due to rounding.
+# An error above this multiple of the error with 113 bits counts as due to rounding.
 ROUNDS = 2.0
 _FIELDS = " ".join(field.name for field in fields(WordRun))
 _MACHINE = (("cdc48", 48, "FX"), ("rounded", 48, "RX"))
@@ -28,7 +28,8 @@ _STYLES: dict[str, dict[str, Any]] = {
 def words_report(cells: Sequence[WordCell]) -> Report:
     """Return the report of `words`: how the arithmetic changes printed pages and errors.
 
-    Each cell has the runs of one listing on one case; all cells must have the same word lengths.
+    Each of the `cells` has the runs of one listing on one case, in several arithmetics. All cells
+    must have the same word lengths.
     """
     runs = [run for cell in cells for run in cell.runs]
     data = numbers(_FIELDS, [list(asdict(run).values()) for run in runs])
@@ -96,7 +97,8 @@ def _machine(cells: Sequence[WordCell]) -> Table:
 def _changes(cells: Sequence[WordCell]) -> list[str]:
     """Return, for each arithmetic of the CDC, a sentence on how its runs differ from binary64.
 
-    The arithmetics have 48 bits, with unrounded or rounded operations.
+    The two arithmetics have 48 bits. One has unrounded operations, and the other rounded
+    operations.
     """
     told = []
     for name, p, rule in _MACHINE:
@@ -146,9 +148,10 @@ def _errors(cells: Sequence[WordCell]) -> Table:
 
 
 def _picture(cells: Sequence[WordCell]) -> Picture:
-    """Draw the error of omega against p (bits), a plot for each program and listing.
+    """Draw the largest error of omega (rad/s) against the word length p (bits).
 
-    A dashed line shows the truncation error of the method.
+    There is a plot for each program and listing. A dashed line shows the truncation error of the
+    method, which is the error with 113 bits.
     """
     from matplotlib.figure import Figure
 

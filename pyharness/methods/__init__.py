@@ -1,1 +1,1 @@
-"""Methods that solve a scene: the plan, the registry, and one module for each family."""
+"""Methods that solve a scene: choice of a method, list of all methods, and their solvers."""

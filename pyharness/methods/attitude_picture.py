@@ -1,4 +1,7 @@
-"""Pictures of an attitude: the body's axes and omega in space, and an animated brick."""
+"""Pictures of an attitude: paths of the body's axes and of omega in space, and an animation.
+
+The animation shows a rotating brick that has the moments of the scene.
+"""
 
 import io
 from pathlib import Path
@@ -28,9 +31,9 @@ _EDGES = [
 def draw_sphere(axes: Any, found: Trajectory) -> None:
     """Draw the paths of the body's axes and of the direction of omega on the unit sphere in space.
 
-    `axes` is the three-dimensional Matplotlib axes that receives the drawing, and `found` is the
-    trajectory, which must contain the attitude. Dots mark the ends of the paths of the body's axes,
-    and a cross marks the end of the path of omega.
+    `axes` is the three-dimensional Matplotlib diagram into which the paths are drawn. `found` is
+    the trajectory, which must contain the attitude. Dots mark the ends of the paths of the body's
+    axes, and a cross marks the end of the path of omega.
     """
     assert found.attitude is not None
     _frame(axes)
@@ -60,10 +63,11 @@ def _frame(axes: Any) -> None:
 
 
 def check_animation(path: str, scene: Scene) -> None:
-    """Raise InputError if no animation can be made of the scene, or none with the ending of `path`.
+    """Raise InputError if no animation of the scene can be written to the file `path`.
 
-    The scene needs principal moments that a brick can have. The check needs no solution, so that it
-    can be made before the scene is solved.
+    The name of the file must end in .gif or .html. The scene must have principal moments that a
+    brick can have, so that none exceeds the sum of the other two. These conditions do not depend on
+    the solution and can be checked before the scene is solved.
     """
     if _form(path) not in ANIMATIONS:
         raise InputError(f"--animate '{path}': unknown format; allowed: .gif, .html")
@@ -82,10 +86,11 @@ def check_animation(path: str, scene: Scene) -> None:
 def animation(scene: Scene, method: str, tolerance: float | None, end: float, path: str) -> bytes:
     """Return the bytes of an animation of a brick with the scene's moments, from 0 to `end` (s).
 
-    They are a GIF file or an HTML page, depending on the ending of `path`; no file is written. The
-    scene is solved by `method` with `tolerance`, as by `solve`. A motion of 2 to 10 s is shown in
-    true time. A shorter motion is stretched to 2 s, a longer one is compressed to 10 s, and the
-    title states how much slower or faster it runs.
+    The bytes are a GIF file or an HTML page, depending on the ending of the file name `path`. No
+    file is written. The scene is solved by `method` with `tolerance`, which have the same meaning
+    as in `solve`. A motion of 2 to 10 s is shown in true time. A shorter motion is stretched to
+    2 s, and a longer one is compressed to 10 s. The title then states how much slower or faster it
+    is shown.
     """
     from matplotlib import rc_context
     from matplotlib.animation import FuncAnimation
@@ -123,10 +128,11 @@ def animation(scene: Scene, method: str, tolerance: float | None, end: float, pa
 
 
 def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: float) -> Any:
-    """Draw the static parts of the animation and return the function that draws a frame.
+    """Draw the static parts of an animated brick, and return the function that draws a frame.
 
-    That function takes the number of a frame, from 0, which is also the row of the trajectory
-    `found`. `rate` is the time of the motion (s) that passes in one second of the animation.
+    The returned function takes the number of a frame, counted from 0. The frame shows the row of
+    the trajectory `found` with the same number. `rate` is the number of seconds of the motion that
+    pass in one second of the animation.
     """
     axes: Any = figure.add_axes((0.02, 0.02, 0.96, 0.86), projection="3d")
     _frame(axes)
@@ -158,7 +164,8 @@ def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: flo
 def _brick(scene: Scene) -> Array:
     """Return the corners of a brick with the scene's moments, shape (8, 3), within the unit sphere.
 
-    Only the ratios of the moments matter. A side is drawn at least 1 % as long as the longest one.
+    The size of the brick is fixed, so that only the ratios of the moments matter. Each side has at
+    least 1 % of the length of the longest side, so that it remains visible.
     """
     moments = np.array(scene.moments)
     sides = np.sqrt(np.maximum(0.0, moments.sum() - 2.0 * moments))

@@ -1,4 +1,4 @@
-"""Batches of scenes: one scene, and arrays of the quantities that differ between the scenes."""
+"""Batches of scenes: one common scene, and arrays of the quantities that differ between scenes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -30,13 +30,16 @@ _EFFORT = 1e9  # in effect no work limit: the caller has requested the whole bat
 
 @dataclass(frozen=True)
 class Solver:
-    """The method or program that solves the scenes of a batch, with its settings.
+    """The method or the program of the thesis that solves the scenes of a batch, with settings.
 
-    Exactly one of `method` and `program` is not None. `t_end` is the final time (s); if it is None,
-    the final time is the product of the scene's step size and its number of steps. The other fields
-    are for programs. `listing` and `reading` are the texts by which a sweep selects the defects and
-    the interpretations that are active. `lipschitz` is the constant of the Lipschitz test (1/s),
-    and `may_stop` states whether that test may end a run.
+    Exactly one of `method` and `program` is not None; it is a name. `tolerance` is the relative
+    tolerance of the method. `t_end` is the final time (s). If it is None, the final time is the
+    product of the scene's step size and its number of steps.
+
+    The other fields apply only to programs. `listing` and `reading` are texts as in a sweep:
+    `listing` selects the mistakes of the printed program that are corrected, and `reading` the
+    interpretations of its doubtful statements. `lipschitz` is the limit of the Lipschitz test
+    (1/s), and `may_stop` states whether this test may end a run.
     """
 
     method: str | None = "auto"
@@ -51,10 +54,11 @@ class Solver:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Scenes that share the method or program that solves them, and their results.
+    """Many scenes that one method or program solves, and their results.
 
-    A result is computed when it is first read. The functions that check claims may read `omega0`,
-    `omega`, `status`, `n_rows` and `stop_variable`, and call `rows` and `by_method`.
+    A result is computed when it is first read. Functions that check a statement of the thesis on
+    many scenes receive a batch. They may read `omega0`, `omega`, `status`, `n_rows` and
+    `stop_variable`, and call `rows` and `by_method`.
 
     Attributes
     ----------
@@ -67,9 +71,9 @@ class Batch:
     t_end : ndarray, shape (n,)
         The final time of each scene, s.
     arrays : mapping
-        The quantities that differ between the scenes, one row for each scene. The keys are names of
-        arguments of `solve_many` and `run_many`: always `omega0`; for programs `step_size` and
-        `lipschitz` too.
+        The quantities that differ between the scenes, as arrays with one row for each scene. The
+        keys are names of arguments of `solve_many` and `run_many`. `omega0` is always among them;
+        for programs `step_size` and `lipschitz` may be.
     """
 
     scene: Scene
@@ -90,7 +94,10 @@ class Batch:
 
     @property
     def bodies(self) -> Array:
-        """Return the moments (kg m2), shape (n, 3), or (1, 3) if all scenes have the same body."""
+        """Return the principal moments (kg m2) of each scene's body, shape (n, 3).
+
+        If all scenes have the same body, the shape is (1, 3).
+        """
         return self.arrays.get("moments", np.array([self.scene.moments]))
 
     @property
@@ -100,35 +107,45 @@ class Batch:
 
     @cached_property
     def omega(self) -> Array:
-        """Return omega (rad/s) at `t_end`, shape (n, 3); NaN for a scene that did not reach it."""
+        """Return the omega of each scene at `t_end`, shape (n, 3), rad/s.
+
+        It is NaN for a scene whose integration ended before `t_end`.
+        """
         return self._program.omega[:, -1] if self.is_program else self._ends.omega
 
     @property
     def status(self) -> NDArray[np.int8]:
         """Return how the solution of each scene ended, as integers, shape (n,).
 
-        `pyharness.model.codes.Statuses` defines them, for example COMPLETE, OVERFLOW and REFUSED.
+        `pyharness.model.codes.Statuses` defines the integers, for example COMPLETE = 0 and
+        OVERFLOW = 2.
         """
         return (self._program if self.is_program else self._ends).status
 
     @property
     def n_rows(self) -> NDArray[np.int32]:
-        """Return for each scene the number of steps with a result of the program, shape (n,)."""
+        """Return the number of steps that the program completed in each scene, shape (n,).
+
+        It is smaller than the requested number if the run overflowed or was stopped. The batch must
+        be solved by a program.
+        """
         return self._program.n_rows
 
     @property
     def stop_variable(self) -> NDArray[np.int8]:
-        """Return the variable that stopped each run of a program, shape (n,).
+        """Return the variable for which the Lipschitz test stopped each run, as integers, (n,).
 
-        A number counts the names in `pyharness.model.trajectory.STOP_VARIABLES` from 1. It is 0 for
-        a run that the Lipschitz test did not stop.
+        An integer is the position, from 1, of the variable's name in
+        `pyharness.model.trajectory.STOP_VARIABLES`, such as U1. It is 0 for a run that the test did
+        not stop. The batch must be solved by a program.
         """
         return self._program.stop_variable
 
     def sample_steps(self, samples: int) -> list[int]:
-        """Return the numbers of the program's steps at the ends of `samples` nearly equal parts.
+        """Return the step numbers that divide a run into `samples` nearly equal parts.
 
-        The parts divide the run of `scene.steps` steps. The numbers are from 1 and in order.
+        A number is that of the last step of a part, and steps are counted from 1. The last number
+        is `scene.steps`, the number of steps of the whole run.
         """
         steps = self.scene.steps
         return [max(1, round(steps * (i + 1) / samples)) for i in range(samples)]
@@ -137,8 +154,8 @@ class Batch:
         """Return omega at `samples` times of each scene, shape (n, samples, 3), rad/s.
 
         The times are the ends of `samples` equal parts of the time from 0 to `t_end`. A method
-        solves each scene from time 0 for each of these times, so that the errors of the parts do
-        not add up. A program supplies its results at the steps that `sample_steps` returns.
+        integrates anew from time 0 to each of these times, so that errors of earlier parts do not
+        add up. For a program the times are those of the steps that `sample_steps` returns.
         """
         if samples not in self._rows:
             if self.is_program:
@@ -153,8 +170,9 @@ class Batch:
     def attitudes(self, samples: int) -> Array:
         """Return the attitudes at `samples` times of each scene, shape (n, samples, 4).
 
-        The times are the same as in `rows`. Attitudes are quaternions from body to space, scalar
-        first; the attitude at time 0 is (1, 0, 0, 0). The batch must be solved by a method.
+        The times are the ends of `samples` equal parts of the time from 0 to `t_end`. Attitudes are
+        quaternions from body to space, scalar first. The attitude at time 0 is (1, 0, 0, 0). The
+        batch must be solved by a method, not by a program.
         """
         ends = []
         for i in range(samples):
@@ -165,9 +183,11 @@ class Batch:
         return np.stack(ends, axis=1)
 
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
-        """Return omega (rad/s) at `part` times `t_end` as another method computes it, shape (n, 3).
+        """Return omega (rad/s) of each scene at the time `part` * `t_end`, shape (n, 3).
 
-        `tolerance` is relative; it is raised to the smallest tolerance that the method accepts.
+        It is computed by `method`, in place of the method or program of the batch, for example for
+        a comparison. `tolerance` is relative to the largest |omega|. If it is below the smallest
+        tolerance of the method, the smallest tolerance is used.
         """
         return self._solve(method, tolerance, self.t_end * part).omega
 
@@ -181,10 +201,11 @@ class Batch:
     def run(self, at: list[int]) -> ProgramEnsemble:
         """Run the program for all scenes and return its results at the steps `at`.
 
-        `at` contains numbers of steps, from 1, in ascending order. All scenes are run in one call
-        if possible. They are run one by one if their torque rates differ, or if the program can't
-        take one of them. Only the scene that it can't take then has the status REFUSED, and the
-        results do not include the program's error code IER.
+        `at` contains step numbers, from 1, in ascending order. If possible, all scenes are run in
+        one call. They are run one by one if the linear terms of their torques (`torque_rate`)
+        differ, or if the program can't run one of them. Only a scene that it can't run then has the
+        status REFUSED. Results of scenes that are run one by one do not include the program's error
+        code IER.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:
@@ -194,9 +215,10 @@ class Batch:
         return self._run_each(at)
 
     def scene_of(self, i: int) -> Scene:
-        """Return the scene of row `i` of the arrays, without attitude.
+        """Return scene `i` of the batch (from 0), without attitude.
 
-        Raise InputError if its numbers are not allowed.
+        Row `i` of each array replaces a quantity of the common scene. Raise InputError if the
+        numbers of scene `i` are not allowed.
         """
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
         return scene_of_row(replace(self.scene, attitude=None), own, i)
@@ -220,10 +242,11 @@ class Batch:
         return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
-        """Return the final states of all scenes, solved by a method until `t_end` (s).
+        """Return the states of all scenes at `t_end` (s, shape (n,)), computed by `method`.
 
-        A method in `PREPARED` solves all scenes in one call, any other one by one. `more` contains
-        additional arguments of `solve_many`.
+        A method in `PREPARED` solves all scenes in one call of `solve_many`. Any other method
+        solves the scenes one by one. `tolerance` is relative to the largest |omega|, and `more`
+        contains additional arguments of `solve_many`, such as `attitude0`.
         """
         if method not in PREPARED:
             return self._solve_each(method, tolerance, t_end)

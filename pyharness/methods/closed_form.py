@@ -1,4 +1,7 @@
-"""Solutions in closed form: of a sphere, and by elliptic functions of any body without torque."""
+"""Solutions in closed form: a sphere under any torque, and other bodies without torque.
+
+The solution of a body without torque consists of Jacobi's elliptic functions.
+"""
 
 from collections.abc import Sequence
 
@@ -16,10 +19,11 @@ from pyharness.model.trajectory import Trajectory
 def known_solution(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the solution of a scene at `times` (s) in closed form.
+    """Return the trajectory of a scene at `times` (s) from its closed form.
 
-    `tolerance` is relative and decides only whether the result counts as sensitive. `effort` is a
-    factor on the work limit. Raise InputError if the scene has no closed form.
+    `tolerance` is relative to the largest |omega|. It does not change the rows. The trajectory ends
+    as `sensitive` if its amplified rounding errors exceed the tolerance. `effort` is a factor on
+    the work limit. Raise InputError if the scene has no closed form.
     """
     work = np.array([effort, 0.0])
     attitudes = None

@@ -1,4 +1,4 @@
-"""The results of many bodies, and the arrays into which they are written."""
+"""The result of `solve_many`: final states of many bodies, in new or given arrays."""
 
 from dataclasses import dataclass
 
@@ -19,9 +19,9 @@ class Ensemble(BatchResult):
     omega : ndarray, shape (n, 3)
         Angular velocities about the body axes at the end, rad/s; NaN for a body without a result.
     status : ndarray of int8, shape (n,)
-        How each body ended: 0 `complete`, 2 `overflow`, 3 `refused`, 4 `gave up` (work limit
-        exceeded, or no digit of the phase left), 6 `sensitive`. A sensitive body has a result, but
-        the rounding errors that its motion amplifies exceed the tolerance.
+        How the computation of each body ended: 0 `complete`, 2 `overflow`, 3 `refused`, 4 `gave up`
+        (work limit exceeded, or no correct digit of the phase left), 6 `sensitive`. A sensitive
+        body has a result, but the rounding errors that its motion amplifies exceed the tolerance.
     attitude : ndarray, shape (n, 4), or None
         Unit quaternions from body to space at the end, scalar first; None if they were not
         requested.
@@ -41,11 +41,12 @@ class Ensemble(BatchResult):
 
 
 def place_for(out: "Ensemble | Array | None", n: int, with_attitude: bool) -> Ensemble:
-    """Return an Ensemble into which the results of n bodies are written.
+    """Return an Ensemble into whose arrays the results of n bodies can be written.
 
-    Its arrays are new if `out` is None. Otherwise `out` supplies them: an Ensemble of an earlier
-    call, or an array of shape (n, 3) for omega alone. `with_attitude` states whether the results
-    include attitudes. Raise InputError if `out` has another shape or type.
+    If `out` is None, the arrays are new. If `out` is the Ensemble of an earlier call, it is
+    returned. If `out` is an array of shape (n, 3), it becomes the array of omega, and the other
+    arrays are new. `with_attitude` states whether the results include attitudes. Raise InputError
+    if an array of `out` has the wrong shape or type.
     """
     shape = (n, 3)
     if out is None or isinstance(out, np.ndarray):

@@ -1,4 +1,7 @@
-"""The single-step methods of section III.2 of the thesis, with the scene's fixed step size."""
+"""The single-step methods of section III.2 of the thesis, with the scene's step size.
+
+They are the improved Euler method, the Taylor series of three terms, and classical Runge-Kutta.
+"""
 
 from collections.abc import Sequence
 
@@ -14,11 +17,11 @@ from pyharness.model.trajectory import Trajectory
 
 
 def fixed_step(name: str) -> Integrator:
-    """Return the function that solves a scene by the method `name`, in steps of the scene's size.
+    """Return the function that solves a scene by the method `name`, with the scene's step size.
 
-    `name` is `improved-euler`, `taylor-3` or `rk4`. There is no error control, so that the function
-    ignores its argument `tolerance`. A step that would pass a requested time is shortened to end at
-    that time.
+    `name` is ``improved-euler``, ``taylor-3`` or ``rk4``. The methods have no error control, so
+    that the function ignores its argument `tolerance`. A step that would pass a requested time is
+    shortened, so that it ends at the requested time.
     """
     number = getattr(Methods, name.upper().replace("-", "_"))
 

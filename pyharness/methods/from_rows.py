@@ -8,8 +8,8 @@ from pyharness.model.attitude import IDENTITY, Quaternion, product
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
-# The Gauss points of a step are _EARLY and 1 - _EARLY. In each exponential omega at these
-# two points has the weights _MORE and _LESS.
+# The Gauss points are at the fractions _EARLY and 1 - _EARLY of a step. Each exponential has
+# a weighted sum of the omegas at these two points, with the weights _MORE and _LESS.
 _EARLY = 0.5 - math.sqrt(3.0) / 6.0
 _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 
@@ -19,11 +19,14 @@ def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
     """Return the attitudes at the times of a table of omega, as quaternions, shape (n, 4).
 
     `omega` has shape (n, 3), rad/s, and `time` has shape (n,), s, in order. `scene` supplies omega
-    and the attitude at time 0. From each row to the next the integration takes one commutator-free
-    step of order 4 (Celledoni, Marthinsen and Owren 2003). A step multiplies the attitude by two
-    exponentials of combinations of omega at the two Gauss points of the step. Omega at the Gauss
-    points comes from a cubic through the rows and their derivatives, which Euler's equations give.
-    From the first rotation that overflows the attitudes are NaN.
+    and the attitude at time 0. Quaternions are from body to space, scalar first.
+
+    From each row to the next the attitude is integrated by one commutator-free step of order 4
+    (Celledoni, Marthinsen and Owren 2003). The step multiplies the attitude by two exponentials.
+    The exponent of each is the step size times a weighted sum of omega at the two Gauss points of
+    the step. Omega at a Gauss point is interpolated by a cubic polynomial through the two rows and
+    their derivatives, which Euler's equations supply. After a rotation that overflows, all
+    attitudes are NaN.
     """
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])
@@ -49,8 +52,9 @@ def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
 def _between(rows: Array, slopes: Array, span: Array, part: float) -> Array:
     """Return omega at the fraction `part` of each step, by cubic Hermite interpolation.
 
-    `rows` is omega at the ends of the steps (rad/s), `slopes` its derivatives there (rad/s2), and
-    `span` the lengths of the steps (s), as a column.
+    `rows` is omega (rad/s) at the n + 1 ends of n steps, shape (n + 1, 3). `slopes` contains the
+    derivatives of these omegas (rad/s2), and `span` the lengths of the steps (s), shape (n, 1). The
+    result has shape (n, 3), rad/s.
     """
     rest = 1.0 - part
     ends = (
@@ -61,7 +65,11 @@ def _between(rows: Array, slopes: Array, span: Array, part: float) -> Array:
 
 
 def _turn(angle: Array) -> list[Quaternion]:
-    """Return the quaternions of the rotation vectors `angle` (rad), shape (n, 3)."""
+    """Return the quaternions, scalar first, of n rotation vectors.
+
+    `angle` contains the vectors, shape (n, 3). The length of a vector is the angle of rotation
+    (rad), and its direction is the axis.
+    """
     half = 0.5 * np.linalg.norm(angle, axis=1)
     parts = np.column_stack([np.cos(half), 0.5 * np.sinc(half / np.pi)[:, None] * angle])
     return [(w, x, y, z) for w, x, y, z in parts.tolist()]

@@ -1,4 +1,4 @@
-"""Gauss collocation with equal steps, which are halved until two solutions agree."""
+"""Gauss collocation with equal steps, which are halved until two successive solutions agree."""
 
 import math
 from collections.abc import Sequence
@@ -15,24 +15,26 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import ROUNDING, Array, Trajectory
 from pyharness.scenes.rescaled import omega_by_torque
 
-# Work limit in right-hand sides of all trial integrations together, some ten seconds. A wave of
+# Work limit: right-hand sides of all trial integrations together, some ten seconds. A wave of
 # the torque costs half as much as a right-hand side.
 _MOST_EVALUATIONS = 200_000_000
 _ORDER_THAT_SHOWS = 8  # highest order that the error estimate relies on
-# Two solutions with a relative difference below this do not come closer with shorter steps.
+# If the relative difference of two solutions is below this limit, shorter steps do not reduce it.
 _ROUNDING = 16 * 2.0**-53
-# rad/s, near the end of the range of binary64: two solutions that both reach it overflow.
+# rad/s, near the largest number of binary64. If two solutions reach it, the motion overflows.
 _NEAR_THE_END = 1e300
 
 
 def gauss(stages: int) -> Integrator:
     """Return a solver by Gauss collocation that halves its steps until two solutions agree.
 
-    `stages` is the number of stages, 1 to 8; the order is twice that number. The step sizes of two
-    successive solutions have the quotient `ratio`, at most 2. The estimated error of the solution
-    with the shorter steps is the difference of the two over ratio**order - 1, doubled for safety.
-    The estimate uses at most order 8, because methods of higher order take longer steps. In the
-    coarser of the two solutions these are too long for the error to fall with the full order.
+    `stages` is the number of stages, 1 to 8. The order of the method is twice this number.
+
+    Let d be the largest difference in omega between two successive solutions, and r the quotient of
+    their step sizes, at most 2. The estimated error of the solution with the shorter steps is
+    2 d / (r**p - 1), where the factor 2 is for safety. The exponent p is the order, but at most 8.
+    Methods of higher order take longer steps, with which the error does not yet fall at the full
+    order.
     """
 
     def solve(
@@ -47,7 +49,7 @@ def gauss(stages: int) -> Integrator:
         lengths = lengths[lengths > 0.0]
         step, spent, reached = _first_step(scene, float(lengths.min())), 0, 0.0
         most = effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
-        more = 1.0  # estimate: steps that will be needed over the steps of the next solution
+        more = 1.0  # estimated steps of the final solution over the steps of the next solution
         pace = 2.0 * stages  # right-hand sides per step
         before: _Solution | None = None
         last = math.inf  # the previous difference of two solutions (rad/s)
@@ -95,7 +97,7 @@ def gauss(stages: int) -> Integrator:
                     excess = difference / (allowed * (known + 1.0))
                     more = max(1.0, excess ** (1.0 / min(2 * stages, _ORDER_THAT_SHOWS)))
                 if close and found.status == COMPLETE:
-                    # The motion amplifies rounding errors whatever the method.
+                    # The motion amplifies rounding errors of every method.
                     growth = motion_growth(scene, times[-1])
                     is_blurred = is_sensitive(growth, tolerance, noise)
                     status = SENSITIVE if is_blurred else COMPLETE
@@ -125,15 +127,17 @@ class _Solution:
     def blows_up(self, coarser: "_Solution", start: float) -> bool:
         """Return whether this solution and a coarser one end because omega grows without bound.
 
-        The coarser solution has longer steps. Both must end early, at nearly the same time. The
-        largest omega at their ends must grow as the steps shrink, or be near the end of the range
-        of binary64. `start` is the largest initial omega (rad/s), or the omega that torque alone
-        would give if that is larger. It counts beside omega at the requested times, because the
-        solution may have reached none of them.
+        `coarser` is the solution with longer steps. Both solutions must end before the last
+        requested time, at nearly the same time. One of two conditions must also be satisfied.
+        Either the largest |omega| at the end is above 1e300 rad/s in both solutions. Or it exceeds
+        1.5 times its value in the coarser solution, and this product exceeds 1000 times `start`
+        and 1000 times every |omega| at a requested time. `start` is the largest initial |omega|
+        (rad/s), or the omega that torque alone would cause if that is larger. It is needed because
+        the solution may have reached no requested time.
         """
         if COMPLETE in (self.status, coarser.status):
             return False
-        # An omega that grows slowly is larger in the finer solution only because that ends later.
+        # If omega grows slowly, it is larger in the finer solution only because this ends later.
         if abs(self.reached[0] - coarser.reached[0]) > 0.01 * abs(self.reached[0]):
             return False
         largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
@@ -144,18 +148,19 @@ class _Solution:
 def _counts(lengths: Array, step: float) -> Array:
     """Return the number of equal steps that the kernel takes in each interval between times.
 
-    `lengths` are the lengths of the intervals (s). No step is longer than `step` (s).
+    `lengths` are the lengths of the intervals (s). Except for a relative excess of 1e-6, no step is
+    longer than `step` (s).
     """
     with np.errstate(over="ignore", divide="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 
 
 def _first_step(scene: Scene, shortest: float) -> float:
-    """Return a first step (s) in which each phase grows by at most about half a radian.
+    """Return the first step size (s), with which phases grow by at most half a radian in a step.
 
-    The phases are those of the motion and of each wave of the torque. `shortest` is the shortest
-    interval between requested times (s), which the step divides into equal parts. Intervals of
-    equal length therefore have exactly twice as many steps when the step is halved.
+    The phases are the phase of the motion and the phase of each torque wave. `shortest` is the
+    shortest interval between requested times (s). It is a multiple of the step size, so that the
+    number of steps in this interval exactly doubles when the step size is halved.
     """
     rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
     for amplitude, frequency in scene.torque.sines + scene.torque.cosines:

@@ -1,4 +1,4 @@
-"""The status of a prepared solver's last call, and the error estimates of its result."""
+"""The status of the last call of a prepared solver, and the error estimates of its result."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -18,9 +18,9 @@ from pyharness.model.values import Triple
 
 
 class LastCall:
-    """A prepared solver that can report how the last call in this thread ended.
+    """The base class of all prepared solvers, which reports how the last call in a thread ended.
 
-    It is the base class of all prepared solvers.
+    The reports are status, error estimate, error amplification and number of steps.
     """
 
     plan: Plan
@@ -41,15 +41,15 @@ class LastCall:
 
     @property
     def status(self) -> str:
-        """Return how this thread's last call ended.
+        """Return how this thread's last call ended, as text.
 
-        The values are ``complete``, ``sensitive``, ``overflow``, ``refused`` and ``gave up``, which
-        means that the work limit was exceeded or that no digit of the phase was left. A
-        ``sensitive`` call has a result, but rounding errors amplified by the motion exceed the
-        tolerance; `digits` is the number of digits left. After a closed form or Gauss collocation
-        the sensitivity is computed when the status is read, which takes microseconds and
-        milliseconds respectively. Before the first call the status is ``complete`` and `steps` is
-        0. A call that raised an InputError or was interrupted does not count.
+        The texts are ``complete``, ``sensitive``, ``overflow``, ``refused`` and ``gave up``. The
+        last one means that the work limit was exceeded or that no correct digit of the phase was
+        left. A ``sensitive`` call has a result, but rounding errors amplified by the motion exceed
+        the tolerance; `digits` is the number of correct digits. Whether a call was sensitive is
+        computed when the status is read, if the method is a closed form or Gauss collocation. This
+        takes microseconds and milliseconds respectively. Before the first call the status is
+        ``complete``. A call that raised an InputError or was interrupted does not count.
         """
         return self._found()[0]
 
@@ -58,9 +58,9 @@ class LastCall:
         """Return the estimated error of this thread's last result.
 
         The error of omega is relative to the largest component of omega from 0 to the end. If the
-        solver computes the attitude too, the estimate is the larger of the error of omega and the
-        error of the attitude's angle (rad). The estimate is None if the method makes none, or if
-        the call had no result.
+        solver computes the attitude too, the estimate is the larger of two errors: that of omega
+        and that of the attitude's angle (rad). It is None if the method does not estimate its
+        error, or if the call had no result.
         """
         return self._found()[1]
 
@@ -69,34 +69,42 @@ class LastCall:
         """Return the error amplification of the motion of this thread's last call, at least 1.
 
         It is the largest norm of the state-transition matrices, the derivatives of omega at the end
-        with respect to omega at any earlier time. It is None if the method does not determine it.
+        with respect to omega at any earlier time. It is None if the method does not determine it,
+        or if the call had no result.
         """
         return self._found()[2]
 
     @property
     def digits(self) -> float | None:
-        """Return the number of correct decimal digits of the last result; None if unknown."""
+        """Return the number of correct decimal digits of this thread's last result.
+
+        It follows from the estimated error, and is None if the error is unknown.
+        """
         return digits_left(self.error)
 
     @property
     def steps(self) -> int:
         """Return the number of steps of this thread's last call.
 
-        For Gauss collocation it is the number of right-hand sides, for a closed form 0.
+        For Gauss collocation it is instead the number of evaluations of the right-hand side. For a
+        closed form and before the first call it is 0.
         """
         return abs(self._counted())
 
     def _counted(self) -> int:
         """Return the number of steps of the last call, negative if the kernel chose `quick`.
 
-        `quick` is a Runge-Kutta method. The kernel chooses only if the plan's method is
-        `quick or taylor`.
+        `quick` is a Runge-Kutta method. Only if the plan's method is `quick or taylor`, the kernel
+        chooses between `quick` and the Taylor series.
         """
         ending = self._ending
         return 0 if ending is None else ending[1]
 
     def _found(self) -> tuple[str, float | None, float | None]:
-        """Return status, error and growth (error amplification) of this thread's last call."""
+        """Return the status of this thread's last call, its estimated error and its `growth`.
+
+        `growth` is the error amplification. Each of the two numbers is None if it is unknown.
+        """
         ending = self._ending
         if ending is None:
             return "complete", None, None

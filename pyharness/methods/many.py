@@ -1,7 +1,7 @@
-"""Solution of many bodies in one call, side by side in the kernel and in several threads.
+"""Solution of many bodies in one call, in parallel in the kernel and in several threads.
 
-The result of a body depends on that body alone. It is bit-for-bit identical whatever the other
-bodies, their order and the number of threads.
+The result of a body does not depend on the other bodies, on their order or on the number of
+threads. It is bit-for-bit identical in all these cases.
 """
 
 from collections.abc import Sequence
@@ -76,48 +76,50 @@ def solve_many(
     Parameters
     ----------
     scene : Scene, or sequence of Scene
-        The scene that supplies every quantity for which no array is given; or a sequence of all
-        scenes, without arrays.
+        Either one scene, which supplies every quantity for which no array is given; or a sequence
+        of all scenes to solve, together with no arrays.
     t_end : float, or array of shape (n,)
-        Time of each result, s; positive, negative or 0.
+        Final time of each scene, s; positive, negative or 0.
     omega0 : array, shape (n, 3) or (3,)
         Initial angular velocities, rad/s. An array of one row is shared by all bodies.
     attitude0 : array, shape (n, 4) or (4,)
-        Quaternions at time 0, from body to space, scalar first; by default the scene's. Attitudes
-        are returned if there are initial ones.
+        Quaternions at time 0, from body to space, scalar first. The default is the scene's
+        attitude. If there is no initial attitude, no attitudes are returned.
     moments, coefficients : array, shape (n, 3) or (3,)
         Principal moments (kg m2), or Euler's coefficients A, B, C; not both.
     inertia : array, shape (n, 3, 3) or (3, 3)
         Full inertia matrices (kg m2), in place of moments. Vectors and attitudes are then about the
-        axes of the matrix. The principal axes take some tenths of a millisecond per body.
+        axes of the matrix. Computing the principal axes takes some tenths of a millisecond per
+        body.
     torque_constant, torque_rate : array, shape (n, 3) or (3,)
-        Constant torques (N m) and their rates (N m/s). For bodies given by coefficients the torques
-        are divided by the moments (1/s2, 1/s3).
+        Constant torques (N m), and rates of torques that are linear in time (N m/s). For bodies
+        given by coefficients both must be divided by the moments (1/s2, 1/s3).
     sines, cosines : array, shape (n, k, 4) or (k, 4)
-        Waves of torque: three components of the amplitude (units as in `torque_constant`), and the
-        frequency (rad/s).
+        The k sine and cosine terms of the torques. A term is three components of the amplitude
+        (units as in `torque_constant`), and the frequency (rad/s).
     method : str
-        A name in `pyharness.methods.solver.PREPARED`. `auto` takes the closed form for each body
+        A name in `pyharness.methods.solver.PREPARED`. `auto` uses the closed form for each body
         without torque and for each sphere, and the Taylor series for any other body.
     tolerance : float
-        The largest error of any component at the end, relative to the largest omega from 0 to the
-        end, as in `prepare`; by default the method's own.
+        The largest allowed error of any component of omega at the end, relative to the largest
+        |omega| from 0 to the end, as in `prepare`. The default depends on the method.
     step : float, optional
-        Step size of the methods with a fixed step, s; by default the scene's.
+        Step size of Gauss collocation and of the methods with a fixed step, s. The default is the
+        scene's step size.
     effort : float
         Factor on the work limit of a body. A body that exceeds the limit has the status `gave up`.
     threads : int
         Number of threads. The kernel releases the interpreter's lock (GIL).
     out : Ensemble, or array of shape (n, 3), optional
-        Where the results are written: the result of an earlier call with as many bodies, or an
-        array for omega.
+        The object into which the results are written: either the Ensemble of an earlier call with
+        as many bodies, or an array for omega.
 
     Returns
     -------
     Ensemble
-        The final states. A body that can't be solved has NaN and a status that gives the reason,
-        and does not affect any other body. Examples are a number that is not finite, and a moment
-        that is not above 0.
+        The final states. A body that can't be solved has NaN and a status that states the reason,
+        for example if a number is not finite or a moment is not above 0. It does not affect any
+        other body.
 
     Raises
     ------
@@ -205,13 +207,13 @@ def _solve_groups(
     scenes: list[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
     **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Solve scenes that differ in the kind of body or of torque axes, and return all final states.
+    """Solve scenes that one kernel call can't solve together, and return all final states.
 
-    There is one call for the bodies about principal axes, and one for those with a full inertia
-    matrix. Each scene with a torque about the axes of space is solved alone. `t_end` (s) is one
-    time or one for each scene, `step` the step size (s) of methods with a fixed step. `settings`
-    are further arguments of `solve_many`. The final states are in the order of `scenes`. They are
-    written into `out` if it is not None.
+    Scenes with moments or coefficients are solved in one call, and scenes with a full inertia
+    matrix in another one. Each scene with a torque about the axes of space is solved alone. `t_end`
+    (s) is one time, or one time for each scene. `step` is the step size (s) of Gauss collocation
+    and of the methods with a fixed step. `settings` are further arguments of `solve_many`. The
+    final states are in the order of `scenes`. They are written into `out` if it is not None.
     """
     check_alike(scenes)
     if scenes[0].attitude is None and any(each.torque.in_space for each in scenes):
@@ -222,7 +224,7 @@ def _solve_groups(
     found = place_for(out, n, scenes[0].attitude is not None)
     groups: dict[int, list[int]] = {}
     for row, each in enumerate(scenes):
-        # A scene with a torque about the axes of space is solved alone, whatever its body's axes.
+        # A scene with a torque about the axes of space is solved alone, for any kind of body.
         kind = row if each.torque.in_space else -1 if each.inertia is not None else -2
         groups.setdefault(kind, []).append(row)
     for kind, rows in groups.items():
@@ -235,11 +237,12 @@ def _solve_groups(
 
 
 class _Bodies:
-    """The checked arguments of the kernel for n bodies that are solved side by side.
+    """The checked arguments of the kernel that solves n bodies in one call.
 
-    An array of one row is shared by all bodies. The constructor takes the arrays as a dict
-    (`given`), the final times `t_end` (s), and the integer that the kernel uses for the method
-    (`code`). `tolerance` is relative, and `effort` is a factor on the work limit of a body.
+    The constructor takes the arrays by name (`given`), the final times `t_end` (s), and the integer
+    that selects the method in the kernel (`code`). An array of one row is shared by all bodies.
+    `tolerance` is relative to the largest |omega|, and `effort` is a factor on the work limit of a
+    body.
     """
 
     def __init__(
@@ -280,7 +283,8 @@ class _Bodies:
     def solve(self, threads: int, out: "Ensemble | Array | None") -> Ensemble:
         """Return the final states of all bodies, computed in at most `threads` threads.
 
-        They are written into `out` if it is not None.
+        The states are omega, status and, if requested, attitude. They are written into `out` if it
+        is not None.
         """
         found = place_for(out, self.n, self.attitude is not None)
         for_each_piece(partial(self._enter, found), self.n, threads)
@@ -303,10 +307,10 @@ class _Bodies:
 
 
 def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:
-    """Return the integer that the kernel uses for a method, and the tolerance as a float.
+    """Return the integer that selects a method in the kernel, and the tolerance as a float.
 
-    A tolerance of None becomes the method's default. Raise InputError for an unknown method, or for
-    a tolerance out of range.
+    `method` is a name in `pyharness.methods.solver.PREPARED`. A tolerance of None becomes the
+    method's default. Raise InputError if the method is unknown or the tolerance is out of range.
     """
     if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)

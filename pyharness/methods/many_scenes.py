@@ -16,23 +16,24 @@ from pyharness.model.trajectory import Array
 
 
 class Axes:
-    """The principal axes of n bodies with full inertia matrices.
+    """The principal axes of n bodies with full inertia matrices, and conversions to and from them.
 
-    If there is only one row of axes, all bodies share it.
+    If the axes of only one body are given, all bodies share these axes.
     """
 
     def __init__(self, axes: Array, turns: Array) -> None:
-        """Store the principal axes of each body, as columns of `axes`, shape (n, 3, 3).
+        """Store the principal axes of each body, which are the columns of `axes`, shape (n, 3, 3).
 
-        `turns` contains the same rotations as quaternions, scalar first, shape (n, 4).
+        `turns` contains the same rotations, from principal axes to the axes of the inertia matrix,
+        as quaternions, scalar first, shape (n, 4).
         """
         self.axes, self.turns = axes, turns
 
     def about_principal(self, given: dict[str, Any], names: Iterable[str]) -> None:
-        """Convert initial omegas and attitudes from the bodies' axes to principal axes.
+        """Convert initial omegas and attitudes from the inertia matrices' axes to principal axes.
 
-        `given` contains the arrays of `solve_many` and is changed in place. Only the arrays whose
-        names are in `names` are converted: `omega0` and `attitude0`.
+        `given` contains the arrays of `solve_many` by name and is changed in place. The arrays
+        `omega0` and `attitude0` are converted if `names` contains their names.
         """
         if "omega0" in names:
             rows = rows_of("omega0", given["omega0"], 3)
@@ -45,7 +46,11 @@ class Axes:
             given["attitude0"] = turned_back(attitudes, conjugate)
 
     def give_back(self, omega: Array, attitude: Array | None) -> None:
-        """Convert final omegas and attitudes from principal axes to the bodies' axes, in place."""
+        """Convert final omegas and attitudes from principal axes to the inertia matrices' axes.
+
+        `omega` (rad/s) has shape (n, 3). `attitude` contains quaternions, shape (n, 4), or is None.
+        Both are changed in place.
+        """
         omega[:] = rotated(omega, self.axes)
         if attitude is not None:
             attitude[:] = turned_back(attitude, self.turns)
@@ -56,12 +61,12 @@ class Axes:
 
 
 def from_rows(rows: Sequence[Scene | None]) -> dict[str, Any]:
-    """Return scenes with a full inertia matrix as arrays about principal axes, a row per scene.
+    """Return scenes with a full inertia matrix as arrays about principal axes.
 
-    The result is a dict of the arrays of `solve_many` and the `Axes`. None in place of a scene
-    gives a row of NaN, which the kernel refuses. The arrays contain the coefficients A, B, C
-    instead of moments, because `principal` computes them to more digits than rounded moments would
-    give.
+    The result is a dict of the arrays of `solve_many`, with one row for each scene, and the `Axes`.
+    If `rows` contains None in place of a scene, the row is NaN, and the kernel refuses it. The
+    arrays contain the coefficients A, B, C instead of moments, because `principal` computes the
+    coefficients more accurately than they can be computed from rounded moments.
     """
     each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
     axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))
@@ -92,16 +97,21 @@ def _full_row(scene: Scene) -> dict[str, Any]:
 
 
 def _filled(laws: list[Any]) -> list[Any]:
-    """Return the waves of several torque laws as lists of equal length.
+    """Return the sine or cosine terms of several torque laws as lists of equal length.
 
-    `laws` has a list of waves for each law. Waves of amplitude 0 are appended to shorter lists.
+    `laws` has a list of such terms for each law. Terms of amplitude 0 are appended to shorter
+    lists.
     """
     most = max(map(len, laws))
     return [waves + [[0.0] * 4] * (most - len(waves)) for waves in laws]
 
 
 def from_scene(scene: Scene) -> dict[str, Any]:
-    """Return the quantities of a scene as a dict of the arrays of `solve_many`, of one row each."""
+    """Return the quantities of a scene as a dict of arguments of `solve_many`.
+
+    The keys are names such as `omega0` and `torque_constant`. `body` contains the moments (kg m2)
+    if `by_moments` is true, else the coefficients A, B, C.
+    """
     law = checked_scene(scene).body_torque
     return {
         "by_moments": scene.moments is not None,
@@ -118,7 +128,10 @@ def from_scene(scene: Scene) -> dict[str, Any]:
 
 
 def check_alike(scenes: Sequence[Scene]) -> None:
-    """Raise InputError if only some scenes have an attitude, or if the step sizes differ."""
+    """Raise InputError if only some of the scenes have an attitude, or if their step sizes differ.
+
+    One call of `solve_many` can't solve such scenes.
+    """
     if len({each.step_size for each in scenes}) > 1:
         raise InputError("the scenes have different step sizes; allowed: one step size for all")
     if len({each.attitude is None for each in scenes}) > 1:
@@ -128,9 +141,10 @@ def check_alike(scenes: Sequence[Scene]) -> None:
 
 
 def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
-    """Return scenes as a dict of the arrays of `solve_many`, with one row for each scene.
+    """Return the quantities of scenes as a dict of the arrays of `solve_many`, a row per scene.
 
-    Raise InputError if there is no scene, or if one call of the kernel can't solve all scenes.
+    Raise InputError if `scenes` is empty, or if one call of the kernel can't solve all scenes. The
+    latter is the case if step sizes differ, or if only some scenes have an attitude or moments.
     """
     if not scenes:
         raise InputError("the sequence of scenes is empty; give at least one scene")
@@ -145,9 +159,10 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 
 def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return a dict of arrays with one row for each body, from the dicts `rows` of single bodies.
+    """Return a dict of arrays with one row for each body, from one dict for each body.
 
-    Quantities that are not arrays of bodies, such as the step size, are taken from the first dict.
+    `rows` contains the dicts of the bodies. A quantity that must be the same for all bodies, such
+    as the step size, is taken from the first dict.
     """
     found = {**rows[0]}
     for name in ("body", "omega0", "torque_constant", "torque_rate"):
@@ -162,7 +177,7 @@ def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 def units_of(values: Any) -> Array:
     """Return the quaternions `values` divided by their norms, shape (n, 4).
 
-    A row that can't be normalised, such as a row of zeros, becomes NaN.
+    A quaternion that can't be normalised, such as four zeros, becomes NaN.
     """
     found = rows_of("attitude0", values, 4)
     with np.errstate(all="ignore"):

@@ -1,6 +1,8 @@
-"""Many bodies as single scenes, for torques about the axes of space and full inertia matrices.
+"""Conversion of many bodies, given by arrays, to one scene each, for `solve_many`.
 
-Bodies under a torque about the axes of space are solved one after the other, by prepared solvers.
+This is needed for torques about the axes of space and for full inertia matrices. Bodies under a
+torque about the axes of space are also solved in this module, one after the other, by prepared
+solvers.
 """
 
 from collections.abc import Iterable, Mapping
@@ -33,7 +35,8 @@ def acts_in_space(scene: Scene, arrays: Iterable[object]) -> bool:
     """Return whether a torque about the axes of space acts, from the scene or from torque arrays.
 
     `arrays` contains the torque arrays of `solve_many`, and None for an array that was not given.
-    They are about the same axes, of the body or of space, as the scene's torque.
+    The components in the arrays are about the axes, of the body or of space, that the `frame` of
+    the scene's torque names.
     """
     named = any(each is not None for each in arrays)
     return scene.torque.in_space or (scene.torque.frame == "space" and named)
@@ -45,9 +48,10 @@ def solve_in_space(
 ) -> Ensemble:  # fmt: skip
     """Return the final states of many bodies under a torque about the axes of space.
 
-    The arguments are those of `solve_many`. `arrays` contains its arrays by name, and None for an
-    array that was not given; the scene then supplies the quantity. A body whose numbers are not
-    allowed gets the status REFUSED, and all other bodies are solved.
+    The arguments are the same as in `solve_many`. `arrays` contains its arrays by name. If an array
+    was not given, its value is None, and the scene supplies the quantity. A body whose numbers are
+    not allowed has NaN and the status REFUSED, and all other bodies are solved. Raise InputError if
+    no initial attitude is given, or if bodies are given by coefficients.
     """
     check_torque(scene, method, attitude=True)
     if arrays["coefficients"] is not None or scene.coefficients is not None:
@@ -89,10 +93,10 @@ def solve_in_space(
 
 
 def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
-    """Return a scene for each body, or None for a body whose numbers are not allowed.
+    """Return a scene for each of many bodies, or None for a body whose numbers are not allowed.
 
-    `arrays` contains the arrays of bodies and torques of `solve_many` by name, and None for an
-    array that was not given. The scene supplies all other quantities.
+    `arrays` maps names of arguments of `solve_many` to arrays of bodies and torques, or to None for
+    an array that was not given. The given scene supplies every quantity without an array.
     """
     rows = _rows(arrays)
     found: list[Scene | None] = []
@@ -105,7 +109,10 @@ def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
 
 
 def _rows(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return the checked arrays of bodies and torques, without the arrays that are None."""
+    """Return the arrays of bodies and torques, with checked shapes; omit all other arrays.
+
+    `arrays` maps names of arguments of `solve_many` to their values. Values of None are omitted.
+    """
     shapes = {"moments": (3,), "inertia": (3, 3), "torque_constant": (3,), "torque_rate": (3,)}
     rows = {}
     for name, values in arrays.items():
@@ -117,10 +124,11 @@ def _rows(arrays: dict[str, Any]) -> dict[str, Array]:
 
 
 def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
-    """Return the scene of body `i`: `scene` with row `i` of each array in place of its own numbers.
+    """Return the scene of body `i`, in which row `i` of each array replaces a quantity of `scene`.
 
-    `rows` contains the arrays by the names of the arguments of `solve_many`. Raise InputError if
-    the numbers of the body are not allowed.
+    `rows` maps names of arguments of `solve_many`, such as `moments` and `omega0`, to arrays. An
+    array of one row is shared by all bodies. Raise InputError if the numbers of the body are not
+    allowed.
     """
     own = {name: row_of(each, i) for name, each in rows.items()}
     torque: dict[str, Any] = {

@@ -14,12 +14,12 @@ from pyharness.model.trajectory import Array
 def many_starts(
     packed: Array, omega0: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
 ) -> tuple[Array, NDArray[np.int8]]:
-    """Return the final omega and the status for each of many initial omegas of a packed scene.
+    """Solve one scene from n initial omegas, and return the n final omegas and statuses.
 
-    `packed` is the array of `packed_scene`. The other arguments are those of `Solver.many`. Final
-    omegas have shape (n, 3), rad/s. The statuses are integers of `pyharness.model.codes.Statuses`,
-    shape (n,). Raise InputError if `omega0` has not the shape (n, 3), or if `t_end` is neither one
-    time nor one time for each row.
+    `packed` is the scene as `packed_scene` returns it. `omega0` contains the initial omegas
+    (rad/s), shape (n, 3), and `t_end` the final time (s) or n final times. The final omegas have
+    shape (n, 3), rad/s, and are written into `out` if it is not None. The statuses are integers of
+    `pyharness.model.codes.Statuses`, shape (n,). Raise InputError if an array has another shape.
     """
     starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
     n = len(starts)

@@ -1,4 +1,4 @@
-"""Packing of a scene into one array for the kernels of prepared solvers."""
+"""Packing of all numbers of a scene into one array for the kernels of prepared solvers."""
 
 import numpy as np
 
@@ -9,10 +9,11 @@ from pyharness.model.trajectory import Array
 
 
 def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
-    """Return the array that the kernel of a prepared solver gets in every call.
+    """Return a scene and the settings of its method as one array, for a prepared solver's kernel.
 
-    `Places` defines the elements of the array. `code` is the integer that the kernel uses for the
-    method (`Methods`), `tolerance` is relative, and `effort` is a factor on the work limit.
+    `pyharness.model.codes.Places` defines the order of the elements. `code` is the integer of
+    `pyharness.model.codes.Methods` that selects the method. `tolerance` is relative to the largest
+    |omega|, and `effort` is a factor on the work limit.
     """
     coefficients, constant, rate, sines, cosines = _torque_of(scene)
     packed = np.zeros(Places.WAVES)

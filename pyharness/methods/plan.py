@@ -1,4 +1,4 @@
-"""The plan for a scene: which method solves it and what is computed, decided beforehand."""
+"""The plan for a scene: the choice of the method, and of the quantities that are computed."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,20 +10,21 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 
 FINEST = REGISTRY["auto"].finest
-# For few digits Runge-Kutta may use fewer operations than a Taylor series. The kernel chooses.
+# For large tolerances Runge-Kutta may take fewer operations than a Taylor series. The kernel
+# chooses between the two.
 RK4_OR_TAYLOR = "quick or taylor"
-# Smallest tolerances at which Runge-Kutta may be faster than the Taylor series: with a constant
-# torque, and with a torque that varies with time.
+# Smallest tolerances at which Runge-Kutta may be faster than the Taylor series. The first applies
+# to a constant torque, and the second to a torque that varies with time.
 FEW_DIGITS = 1e-7
 _WAVES_DIGITS = 1e-9
 
 
 @dataclass(frozen=True)
 class Decision:
-    """A decision whether one part of a computation is carried out, with the reason.
+    """The decision whether one part of a computation is carried out, with the reason.
 
-    `part` names the part, for example `torque` or `attitude`, `kept` states whether it is computed,
-    and `why` is the reason.
+    `part` is the name of the part, for example ``torque`` or ``attitude``. `kept` states whether
+    the part is computed, and `why` is the reason as text.
     """
 
     part: str
@@ -33,7 +34,13 @@ class Decision:
 
 @dataclass(frozen=True)
 class Plan:
-    """The method, and the parts of the computation, that are chosen before a scene is solved."""
+    """The choices that are made before a scene is solved: the method and the computed quantities.
+
+    `method` is the name of the method that solves `scene`. `closed_form` is the kind of closed form
+    if one is used, else None. `fallback` is the name of the method that is used if `method` refuses
+    the scene. `velocity` and `rows` state whether the translational velocity and output at
+    intermediate times are requested.
+    """
 
     scene: Scene
     method: str  # name of the method that was chosen or requested
@@ -44,12 +51,15 @@ class Plan:
 
     @cached_property
     def decisions(self) -> tuple[Decision, ...]:
-        """Return a decision for each part of the computation."""
+        """Return a decision for each part of the computation, such as each term of the equations.
+
+        A decision states whether the part is computed, and why.
+        """
         return tuple(_decisions(self))
 
     @property
     def skipped(self) -> frozenset[str]:
-        """Return the names of the parts that are not computed."""
+        """Return the names of the parts of the computation that are not carried out."""
         return frozenset(each.part for each in self.decisions if not each.kept)
 
 
@@ -62,9 +72,10 @@ def plan(
 ) -> Plan:
     """Return the plan for a scene: the method that solves it and the parts that are computed.
 
-    `velocity` requests the translational velocity, and `rows` requests intermediate output. A
-    tolerance of None means the method's default. Raise InputError if the method can't take the
-    scene, or if the tolerance is out of range.
+    `method` is a name in the registry, where `auto` requests a choice of the method. `tolerance` is
+    relative to the largest |omega|; None means the method's default. `velocity` requests the
+    translational velocity, and `rows` requests output at intermediate times. Raise InputError if
+    the method can't solve the scene, or if the tolerance is out of range.
     """
     tolerance = requested_tolerance(method, tolerance)
     finest = REGISTRY["quick"].finest if method == "quick" else FINEST
@@ -81,8 +92,8 @@ def plan(
         )
         # Runge-Kutta has no intermediate output.
         method = "closed-form" if form else RK4_OR_TAYLOR if few_digits and not rows else "taylor"
-        # A perturbation from the middle axis may be too small for the closed form, which squares
-        # it, but not for the series.
+        # A perturbation of a rotation about the middle axis may be so small that its square, which
+        # the closed form needs, underflows. The Taylor series can propagate it.
         fallback = "taylor" if form else None
     elif method == "closed-form" and form is None:
         raise InputError(f"closed-form can't take this scene: {_why_no_form(scene)}")
@@ -126,7 +137,7 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
     if wanted and closed:
         wanted, why = False, "closed form"
     yield Decision("dense output", wanted, why)
-    # No prepared solver uses the reference or SciPy.
+    # No prepared solver uses the reference solution or SciPy.
     yield Decision("reference", False, "not requested")
     yield Decision("SciPy", False, "our own kernels solve it")
 

@@ -1,8 +1,8 @@
-"""Solvers that are prepared once; each call then costs little more than the kernel itself.
+"""Preparation of a solver for many calls with one scene.
 
-`prepare` validates the scene, chooses the method and the parts of the computation (`plan`), and
-packs the scene into an array. A call then only checks its two or three arguments and enters the
-kernel.
+`prepare` validates the scene, chooses the method, and packs the scene into an array for the
+compiled kernel. A call of the prepared solver then only checks its two or three arguments and calls
+the kernel. Therefore it takes little longer than the kernel itself.
 """
 
 from dataclasses import replace
@@ -52,26 +52,29 @@ def prepare(
     Parameters
     ----------
     scene : Scene
-        The scene, whose step size is used by the methods with a fixed step. A scene with a full
-        inertia matrix is solved about principal axes; each call then takes some microseconds more.
+        The scene. Its step size is used by Gauss collocation and by the methods with a fixed step.
+        A scene with a full inertia matrix is solved about principal axes; each call then takes some
+        microseconds more.
     method : str
         A name in `pyharness.methods.solver.PREPARED`; `auto` takes the fastest method that meets
         the tolerance.
     tolerance : float
-        Largest error of any component at the end, relative to the largest |omega| from 0 to the
-        end. The default depends on the method, as in `solve`. Methods with a fixed step ignore it.
-        If the motion amplifies perturbations K times, no method has an error below some 1e-15 K.
+        Largest allowed error of any component of omega at the end, relative to the largest |omega|
+        from 0 to the end. The default depends on the method, as in `solve`. Methods with a fixed
+        step ignore it, and Gauss collocation does not choose its step by it. If the motion
+        amplifies perturbations by a factor K, no method has a relative error below some 1e-15 K.
     effort : float
-        Factor on the work limit of a call; 1 is some ten seconds. A call that exceeds the limit has
-        the status `gave up`.
+        Factor on the work limit of a call; 1 means some ten seconds. A call that exceeds the limit
+        has the status `gave up`.
     attitude : bool
-        Whether calls return the attitude too. A torque about the axes of space needs it.
+        Whether calls return the attitude too. A torque about the axes of space requires it.
 
     Returns
     -------
     Solver or AttitudeSolver
-        A callable: ``solver(omega0, t_end)`` returns omega (rad/s, shape (3,)) at `t_end` (s), with
-        `attitude` omega and a quaternion from body to space, scalar first, shape (4,).
+        A callable. ``solver(omega0, t_end)`` returns omega (rad/s, shape (3,)) at `t_end` (s). If
+        `attitude` is true, it returns two arrays: omega, and a quaternion from body to space,
+        scalar first, shape (4,).
 
     Raises
     ------

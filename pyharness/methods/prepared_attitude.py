@@ -24,29 +24,31 @@ else:
 
 
 class AttitudeSolver(LastCall, BoundAttitudeKernel):
-    """A solver of a scene with attitude, prepared for one method.
+    """A solver of omega and attitude of a scene, prepared for one method.
 
-    Call it as ``solver(omega0, t_end)`` or ``solver(omega0, t_end, attitude0)``. `omega0` is three
-    numbers (rad/s), `t_end` a time in seconds, positive, negative or 0. `attitude0` is a quaternion
-    from body to space, scalar first. By default it is the scene's attitude. For a scene without
-    attitude it is (1, 0, 0, 0), so that the body's axes are those of space at time 0. A call
-    returns two new arrays: omega, shape (3,), and the attitude, shape (4,), at `t_end`. Both are
-    NaN if the kernel could not finish, and `status` gives the reason. Any other argument is refused
-    with an InputError. Calls are fastest with arrays of floats and a unit quaternion.
+    Call it as ``solver(omega0, t_end)`` or ``solver(omega0, t_end, attitude0)``. `omega0` is the
+    initial angular velocity, three numbers (rad/s). `t_end` is the final time in seconds, positive,
+    negative or 0. `attitude0` is the attitude at time 0, a quaternion from body to space, scalar
+    first. By default it is the scene's attitude. If the scene has none, it is (1, 0, 0, 0), so that
+    the body's axes are parallel to the axes of space at time 0.
 
-    As with `Solver`, threads may share a solver, and a solver can be copied and pickled.
+    A call returns two new arrays: omega (rad/s), shape (3,), and the attitude, shape (4,), at
+    `t_end`. If the kernel could not finish, both are NaN and `status` states the reason. An
+    argument of another type or shape raises an InputError. Calls are fastest with arrays of floats
+    and a unit quaternion. Threads may share a solver, and a solver can be copied and pickled.
 
     Attributes
     ----------
     plan : Plan
-        The method and the parts that are computed, with the reasons.
+        The chosen method, and the parts of the computation that are carried out, with reasons.
     """
 
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
-        """Pack the data that all calls share; users call `prepare` instead.
+        """Create a solver and pack the data that all calls share; users call `prepare` instead.
 
-        `chosen` is the plan, which contains the scene. `tolerance` is relative, `asked` is the name
-        of the requested method, and `effort` is a factor on the work limit of a call.
+        `chosen` is the plan, which contains the scene. `tolerance` is relative to the largest
+        |omega|. `asked` is the name of the requested method, such as `auto`. `effort` is a factor
+        on the work limit of a call.
         """
         scene, code = chosen.scene, Methods.TAYLOR
         attitude = scene.attitude or IDENTITY
@@ -56,7 +58,7 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
             code = Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else Methods.CLOSED_FORM
         kernel = extension().solve_packed_attitude
         packed, packed_with_gil = packed_scene(scene, code, tolerance, effort), None
-        if chosen.closed_form:  # then there is no torque, and no wave to make a call slow
+        if chosen.closed_form:  # then there is no torque, and no wave can make a call slow
             packed_with_gil = packed.copy()
             packed_with_gil[Places.METHOD] = Methods.CLOSED_FORM
         solver = super().__new__(
@@ -68,19 +70,21 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
 
 
 def prepared_attitude(scene: Scene, method: str, tolerance: float, effort: float) -> AttitudeSolver:
-    """Return a prepared solver of omega and attitude, by the method with a name in `PREPARED`.
+    """Return a prepared solver whose calls return omega and attitude of a scene.
 
-    `tolerance` is relative, and `effort` is a factor on the work limit of a call. Raise InputError
-    if the method can't propagate attitudes.
+    `method` is a name in `pyharness.methods.solver.PREPARED`. `tolerance` is relative to the
+    largest |omega|, and it also limits the error of the attitude's angle (rad). `effort` is a
+    factor on the work limit of a call. Raise InputError if the method can't propagate attitudes.
     """
     return AttitudeSolver(attitude_plan(scene, method, tolerance), tolerance, method, effort)
 
 
 def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
-    """Return the plan for solving a scene together with its attitude.
+    """Return the plan for computing omega and attitude of a scene.
 
-    A scene without attitude gets the attitude (1, 0, 0, 0) at time 0. Raise InputError if the
-    method can't propagate attitudes.
+    `method` is the name of the requested method, and `tolerance` is relative to the largest
+    |omega|. If the scene has no attitude, its attitude at time 0 is (1, 0, 0, 0). Raise InputError
+    if the method can't propagate attitudes.
     """
     check_attitude(method)
     return plan(replace(scene, attitude=scene.attitude or IDENTITY), method, tolerance, rows=True)
@@ -89,11 +93,11 @@ def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
 def _check(
     usual: Quaternion, omega0: object, t_end: object, attitude0: object
 ) -> tuple[tuple[float, ...], float]:
-    """Convert arguments of a call that the C function can't read directly.
+    """Convert arguments of a solver call that are of types which the C function can't read.
 
-    Return the three numbers of `omega0` (rad/s) and the four of the attitude in one tuple, and the
-    time (s). `usual` is the attitude if `attitude0` is None. Raise InputError for an argument that
-    is not allowed.
+    Return two values. The first is a tuple of the three numbers of `omega0` (rad/s) and the four
+    numbers of the initial quaternion. The second is `t_end` (s) as a float. `usual` is the initial
+    quaternion if `attitude0` is None. Raise InputError for a wrong type or number of values.
     """
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     attitude = usual if attitude0 is None else unit_quaternion("attitude0", attitude0)[0]

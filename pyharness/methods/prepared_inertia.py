@@ -1,7 +1,8 @@
-"""Prepared solvers of scenes with a full inertia matrix, which rotate to principal axes and back.
+"""Prepared solvers of scenes with a full inertia matrix.
 
-The solvers of a scene about principal axes enter the kernel directly from C. The solvers of this
-module rotate their arguments and results in Python.
+A call transforms its arguments to principal axes, solves the scene about these axes, and transforms
+the result back. The transformations are in Python, whereas a solver of a scene with principal
+moments calls the kernel directly from C.
 """
 
 from dataclasses import replace
@@ -27,20 +28,20 @@ from pyharness.model.waves import with_merged_waves
 class InertiaSolver(Solver):
     """A prepared solver of a scene with a full inertia matrix, used in the same way as a `Solver`.
 
-    Angular velocities are about the axes of the inertia matrix. `plan` is the plan for the scene
-    about principal axes, and `growth` is the largest norm of the state-transition matrices of omega
-    about principal axes.
+    The omegas that a call takes and returns are about the axes of the inertia matrix. The attribute
+    `plan` is the plan for the scene about principal axes. The attribute `growth` is the error
+    amplification: the largest norm of the state-transition matrices of omega about principal axes.
     """
 
     def __new__(
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
         scene: Scene | None = None,
     ) -> Self:  # fmt: skip
-        """Prepare a solver of the scene about principal axes; users call `prepare` instead.
+        """Create a solver of the scene about principal axes; users call `prepare` instead.
 
         `chosen` is the plan for the scene about principal axes, and `scene` is the scene with the
-        inertia matrix. `tolerance` is relative, `asked` is the name
-        of the requested method, and `effort` is a factor on the work limit of a call.
+        inertia matrix. `tolerance` is relative to the largest |omega|. `asked` is the name of the
+        requested method, such as `auto`. `effort` is a factor on the work limit of a call.
         """
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
@@ -56,9 +57,10 @@ class InertiaSolver(Solver):
         return type(self), (self.plan, *self._given, self._scene)
 
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array:
-        """Return omega (rad/s) at `t_end` (s), about the axes of the inertia matrix, shape (3,).
+        """Return omega (rad/s) at `t_end` (s), shape (3,), about the axes of the inertia matrix.
 
-        `omega0` is the initial omega (rad/s). The result is written into `out` if it is not None.
+        `omega0` is the initial omega (rad/s), about the same axes. If `out`, an array of three
+        floats, is not None, the result is written into it and `out` is returned.
         """
         start = np.array(three_floats("omega0", omega0))
         if out is not None and (found := no_buffer(out)):
@@ -73,7 +75,7 @@ class InertiaSolver(Solver):
 
     @property
     def many(self) -> Any:
-        """Return the function that solves many initial omegas in one call: see `Solver.many`."""
+        """Return the function that solves the scene from many initial omegas: see `Solver.many`."""
         return self._many
 
     def _many(
@@ -87,26 +89,29 @@ class InertiaSolver(Solver):
         return ends, status
 
     def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
-        """Return the trajectory from `omega0` (rad/s) at `times` (s): see `Solver.trajectory`."""
+        """Return the trajectory from the initial `omega0` (rad/s) at `times` (s).
+
+        Both are about the axes of the inertia matrix. For the arguments see `Solver.trajectory`.
+        """
         return self._rows(replace(self._scene, omega=three("omega0", omega0)), times)
 
 
 class InertiaAttitudeSolver(AttitudeSolver):
-    """A prepared solver with attitude of a scene with a full inertia matrix.
+    """A prepared solver of omega and attitude of a scene with a full inertia matrix.
 
-    It is used in the same way as an `AttitudeSolver`. Angular velocities are about the axes of the
-    inertia matrix, and an attitude is the attitude of these axes.
+    It is used in the same way as an `AttitudeSolver`. The omegas that a call takes and returns are
+    about the axes of the inertia matrix. The quaternions rotate from these axes to space.
     """
 
     def __new__(
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
         scene: Scene | None = None,
     ) -> Self:  # fmt: skip
-        """Prepare a solver of the scene about principal axes; users call `prepare` instead.
+        """Create a solver of the scene about principal axes; users call `prepare` instead.
 
         `chosen` is the plan for the scene about principal axes, and `scene` is the scene with the
-        inertia matrix. `tolerance` is relative, `asked` is the name
-        of the requested method, and `effort` is a factor on the work limit of a call.
+        inertia matrix. `tolerance` is relative to the largest |omega|. `asked` is the name of the
+        requested method, such as `auto`. `effort` is a factor on the work limit of a call.
         """
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
@@ -116,7 +121,7 @@ class InertiaAttitudeSolver(AttitudeSolver):
 
     _scene: Scene
     _axes: Array  # the principal axes, in columns
-    _turn: Quaternion  # from principal axes to the axes of the matrix
+    _turn: Quaternion  # from principal axes to the axes of the inertia matrix
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return the class and the arguments from which `copy` and `pickle` prepare a copy."""
@@ -125,10 +130,11 @@ class InertiaAttitudeSolver(AttitudeSolver):
     def __call__(
         self, omega0: Numbers, t_end: Number, attitude0: Numbers | None = None
     ) -> tuple[Array, Array]:
-        """Return omega (rad/s) and the attitude at `t_end` (s), for the axes of the inertia matrix.
+        """Return omega (rad/s), shape (3,), and the attitude, shape (4,), at `t_end` (s).
 
-        `omega0` is the initial omega (rad/s). `attitude0` is the initial quaternion, by default the
-        scene's or (1, 0, 0, 0).
+        Omega is about the axes of the inertia matrix, and the attitude is a quaternion from these
+        axes to space, scalar first. `omega0` is the initial omega (rad/s), and `attitude0` the
+        initial quaternion. By default it is the scene's, or (1, 0, 0, 0) if the scene has none.
         """
         start = np.array(three_floats("omega0", omega0))
         attitude = self._scene.attitude or IDENTITY
@@ -144,17 +150,19 @@ def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:
     """Return the principal axes of a scene's inertia matrix, as a matrix and as a quaternion.
 
     The columns of the matrix, shape (3, 3), are the axes. The quaternion, scalar first, is the same
-    rotation, from principal axes to the axes of the inertia matrix.
+    rotation. It transforms components about principal axes to components about the axes of the
+    inertia matrix.
     """
     about_principal, axes = principal(replace(scene, attitude=IDENTITY))
     return axes, about_principal.attitude or IDENTITY
 
 
 def rotated(vectors: Array, matrix: Array) -> Array:
-    """Return the product of a matrix and each vector, in the shape of `vectors`, (3,) or (n, 3).
+    """Return the product of a matrix and each of n vectors, shape (n, 3), or of a single vector.
 
-    `matrix` has shape (3, 3), or shape (n, 3, 3) with one matrix for each vector. The sums have a
-    fixed order, so that each row is bit-for-bit identical for any number of rows.
+    `vectors` has shape (n, 3), or (3,) for a single vector; the result has the same shape. `matrix`
+    has shape (3, 3), or shape (n, 3, 3) with one matrix for each vector. The products are summed in
+    a fixed order, so that the result of a vector is bit-for-bit identical for any n.
     """
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack(
@@ -164,10 +172,12 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Convert attitudes of principal axes, shape (4,) or (n, 4), to attitudes of the matrix's axes.
+    """Convert attitudes of the principal axes to attitudes of the axes of the inertia matrix.
 
-    `turn` is the quaternion, scalar first, of the rotation from principal axes to the axes of the
-    inertia matrix. It has shape (4,), or (n, 4) with one quaternion for each attitude.
+    `attitudes` has shape (n, 4), or (4,) for a single attitude; the result has the same shape.
+    `turn` is the quaternion of the rotation from principal axes to the axes of the inertia matrix.
+    It has shape (4,), or (n, 4) with one quaternion for each attitude. Quaternions are scalar
+    first.
     """
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
@@ -178,7 +188,8 @@ def turned_back(attitudes: Array, turn: Any) -> Array:
 def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float) -> InertiaSolver:
     """Return a prepared solver of a scene with a full inertia matrix, without attitude.
 
-    `tolerance` is relative, and `effort` is a factor on the work limit of a call.
+    `method` is a name in `pyharness.methods.solver.PREPARED`. `tolerance` is relative to the
+    largest |omega|, and `effort` is a factor on the work limit of a call.
     """
     from pyharness.methods.plan import plan
 
@@ -189,9 +200,10 @@ def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float)
 def prepared_inertia_attitude(
     scene: Scene, method: str, tolerance: float, effort: float
 ) -> InertiaAttitudeSolver:
-    """Return a prepared solver with attitude of a scene with a full inertia matrix.
+    """Return a prepared solver of omega and attitude of a scene with a full inertia matrix.
 
-    `tolerance` is relative, and `effort` is a factor on the work limit of a call.
+    `method` is a name in `pyharness.methods.solver.PREPARED`. `tolerance` is relative to the
+    largest |omega|, and `effort` is a factor on the work limit of a call.
     """
     from pyharness.methods.prepared_attitude import attitude_plan
 

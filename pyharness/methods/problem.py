@@ -1,6 +1,7 @@
 """Conversion of a scene to arguments of the modern kernels, and of their results to a trajectory.
 
-The modern kernels are the Fortran procedures of the methods that are not programs of the thesis.
+The modern kernels are Fortran procedures that implement this project's own methods, in contrast to
+the programs of the thesis.
 """
 
 import math
@@ -21,21 +22,23 @@ _NOT_FINITE = (
 
 
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
-    """Return a scene's coefficients and torques over moments, the arguments of the modern kernels.
+    """Return the coefficients and torques of a scene as five arrays, for the modern kernels.
 
-    The five arrays are the coefficients A, B, C of Euler's equations, the constant torque over
-    moment (1/s2), its rate (1/s3), the sines and the cosines of the torque. Sines and cosines have
-    shape (4, n), with columns of amplitude (1/s2) and frequency (rad/s). Raise InputError if a
-    value is not finite.
+    The first array contains the coefficients A, B, C of Euler's equations. The second is the
+    constant torque (1/s2), and the third the rate of the linear torque (1/s3). The last two contain
+    the sine and the cosine terms, shape (4, n). Each column is a term: three components of its
+    amplitude (1/s2), and its frequency (rad/s). Torques are divided by the moments. Raise
+    InputError if a value is not finite.
     """
     return _over(scene, scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0)))
 
 
 def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
-    """Return a scene's arguments of the kernel for a torque about the axes of space.
+    """Return six arrays of a scene, for the kernel that solves torques about the axes of space.
 
-    The six arrays are the coefficients A, B, C, the largest moment over each moment, and the four
-    arrays of torques as in `normalized`, but divided by the largest moment. The scene must have
+    The first array contains the coefficients A, B, C of Euler's equations, and the second the
+    largest moment over each moment. The last four are the constant, linear, sine and cosine terms
+    of the torque, as in `normalized`, but divided by the largest moment. The scene must have
     moments. Raise InputError if a value is not finite.
     """
     moments = np.array(scene.moments)
@@ -49,14 +52,18 @@ def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
 
 
 def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:
-    """Return the name of the kernel that solves a scene by Taylor series, and its arguments."""
+    """Return the name of the kernel that solves a scene by Taylor series, and its first arguments.
+
+    The arguments are arrays of the body's coefficients and of the torque. The kernel depends on
+    whether the torque is about the axes of the body or of space.
+    """
     if scene.torque.in_space:
         return "space_torque_rows", normalized_in_space(scene)
     return "taylor_rows", normalized(scene)
 
 
 def _over(scene: Scene, law: TorqueLaw, moments: Array) -> tuple[Array, Array, Array, Array, Array]:
-    # A wave without amplitude has no effect, but its sine and cosine would take time.
+    # A wave of amplitude 0 has no effect, but computing its sine or cosine would take time.
     sines, cosines = (
         columns(tuple(wave for wave in waves if any(wave[0]))) for waves in (law.sines, law.cosines)
     )
@@ -73,9 +80,9 @@ def _over(scene: Scene, law: TorqueLaw, moments: Array) -> tuple[Array, Array, A
 def remainders(scene: Scene) -> Triple:
     """Return the exact coefficients A, B, C of a scene minus their values in binary64.
 
-    Without these remainders a phase of 1e6 radians has an error of 1e-10. The remainders are 0 if
-    the body is given by coefficients. They are also 0 under torque, because no kernel uses them
-    there.
+    The closed form adds these rounding errors to the coefficients. Otherwise a phase of 1e6 radians
+    would have an error of 1e-10 rad. The remainders are 0 if the body is given by coefficients.
+    They are also 0 if a torque acts, because no kernel uses them in this case.
     """
     found, moments = scene.euler_coefficients, scene.exact_moments
     if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
@@ -88,7 +95,10 @@ def remainders(scene: Scene) -> Triple:
 
 
 def known(estimate: float) -> float | None:
-    """Return a kernel's estimate, or None if it is negative, because this means unknown."""
+    """Return an estimate that a kernel reported, or None if it is negative.
+
+    A kernel reports an unknown error or error amplification as a negative number.
+    """
     return float(estimate) if estimate >= 0.0 else None
 
 
@@ -103,12 +113,13 @@ def trajectory_of(
     growth: float | None = None,
     attitudes: Array | None = None,
 ) -> Trajectory:
-    """Return a trajectory that is built from the results of a kernel at `times` (s).
+    """Return a trajectory that contains the results of a kernel at `times` (s).
 
     `rows` is omega (rad/s), shape (3, n), with one column for each time. `attitudes` are
-    quaternions, shape (4, n). Only the first `n_rows` columns are results. `status` is an integer
-    of `Statuses`. `error` and `growth` (error amplification) apply to the last time. They are
-    dropped if the kernel did not reach it.
+    quaternions, shape (4, n), or None. Only the first `n_rows` columns are results. `status` is an
+    integer of `pyharness.model.codes.Statuses`. `steps` and `evaluations` are the numbers of steps
+    and of right-hand sides. `error` is the estimated relative error, and `growth` the error
+    amplification. Both are omitted if the kernel did not reach the last time.
     """
     ended = ENDS[status] if ENDS[status] in WITH_ALL_ROWS else "overflow"
     found = rows_trajectory(times[:n_rows], rows.T[:n_rows], evaluations, steps, ended)
@@ -122,17 +133,19 @@ def rows_trajectory(
 ) -> Trajectory:
     """Return a trajectory from omega (rad/s, shape (n, 3)) at `times` (s), without velocity.
 
-    Its recorded times are the true times. `evaluations` is the number of right-hand sides, and
-    `ended` is the text that states how the integration ended.
+    Its `recorded_time` is equal to its `time`. `evaluations` and `steps` are the numbers of
+    right-hand sides and of steps. `ended` states how the integration ended, for example
+    ``complete``.
     """
     time = np.array(times, dtype=float)
     return Trajectory(time, time, omega, None, steps, evaluations, ended)
 
 
 def closed_form(scene: Scene) -> str | None:
-    """Return the name of the closed form that solves a scene, or None if there is none.
+    """Return the kind of closed form that solves a scene, or None if the scene has none.
 
-    The names are `sphere`, `symmetric` and `elliptic`.
+    The kinds are ``sphere`` (A = B = C = 0), ``symmetric`` (a body with two equal moments) and
+    ``elliptic`` (elliptic functions, for three unequal moments).
     """
     if scene.torque.in_space:
         return None
@@ -146,8 +159,8 @@ def closed_form(scene: Scene) -> str | None:
     if not scene.torque.is_zero:
         return None
     if 0.0 in (a, b, c):
-        # With two coefficients of opposite sign omega oscillates. With two of one sign, or with one
-        # alone, it may grow without bound.
+        # If one coefficient is 0 and the other two have opposite signs, omega oscillates. If these
+        # have the same sign, or if two coefficients are 0, omega may grow without bound.
         rest = [x for x in (a, b, c) if x != 0.0]
         return "symmetric" if len(rest) == 2 and rest[0] * rest[1] < 0.0 else None
     return None if min(a, b, c) > 0.0 or max(a, b, c) < 0.0 else "elliptic"

@@ -1,4 +1,4 @@
-"""The registry of all methods that turn a scene into a trajectory, with their properties."""
+"""The registry: all methods that solve a scene, with their names and properties."""
 
 import importlib
 from collections.abc import Sequence
@@ -13,20 +13,22 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, tolerance_of
 
-# For 1 to 8 stages. Low orders would need too many steps for finer tolerances.
+# Smallest and default tolerances of Gauss collocation with 1 to 8 stages. For smaller tolerances
+# the low orders would need too many steps.
 _GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
 _GAUSS_DEFAULT = (1e-6, 1e-10, *6 * (1e-12,))
-# For SciPy's methods. With attitude, over a hundred radians or where perturbations grow a
-# thousandfold, no method of SciPy meets a finer tolerance, and Radau takes too long.
+# For SciPy's methods. Over a hundred radians with attitude, or if perturbations grow a
+# thousandfold, no method of SciPy meets a smaller tolerance, and Radau takes too long.
 _SCIPY_DEFAULT = 1e-8
 _DEFAULT = 1e-12
 
 
 @dataclass(frozen=True)
 class Method:
-    """The properties of one method, which turns a scene into a trajectory.
+    """The properties of one method, which solves a scene and returns its trajectory.
 
-    Methods are distinct from the programs of the appendix of the thesis.
+    A method is a solver of this project or of SciPy. The three programs in the appendix of the
+    thesis are not methods.
     """
 
     name: str
@@ -49,7 +51,7 @@ class Method:
 
     @property
     def is_fixed_step(self) -> bool:
-        """Return whether the method advances with the scene's step size, without error control."""
+        """Return whether the method uses the scene's step size, without error control."""
         return self.finest == 1.0
 
 
@@ -71,10 +73,11 @@ def _no_rows(*given: object) -> Trajectory:
 
 
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
-    """Return a solver of scenes from a module of `pyharness.methods`, imported at its first call.
+    """Return a function that solves scenes, and imports its module when it is first called.
 
-    `room` is the name of the module, and `name` is the name of a function in it. The function is
-    the solver itself, or returns the solver if it is called with `arguments`.
+    `room` is the name of a module of `pyharness.methods`, and `name` is the name of a function in
+    this module. If there are no `arguments`, this function solves scenes itself. Otherwise it
+    returns the function that solves scenes when it is called with `arguments`.
     """
 
     def solve(*given: Any) -> Trajectory:
@@ -180,7 +183,7 @@ REGISTRY = {
         ),
     )
 }
-# The methods that give rows at requested times.
+# The methods that return rows at requested times.
 METHODS = {name: method for name, method in REGISTRY.items() if method.gives_rows}
 FIXED_STEP = tuple(name for name, method in REGISTRY.items() if method.is_fixed_step)
 GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
@@ -191,7 +194,8 @@ SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if meth
 def requested_tolerance(method: str, tolerance: Number | None) -> float:
     """Return the requested tolerance as a float, or the method's default if it is None.
 
-    Raise InputError if the tolerance is no number. Its range is not checked.
+    `method` is a name in the registry. Raise InputError if the tolerance is not a number. Whether
+    the tolerance is in the method's range is not checked.
     """
     chosen = REGISTRY[method]
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
@@ -205,10 +209,11 @@ def check_attitude(method: str) -> None:
 
 
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
-    """Raise InputError if the scene has a torque about the axes of space that can't be taken.
+    """Raise InputError if a torque about the axes of space acts and the method can't solve it.
 
-    The reason is that the method can't take such a torque, or that `attitude` is false: the
-    attitude is then not computed, although the torque depends on it.
+    `method` is a name in the registry. The error is also raised if `attitude` is false, which means
+    that the attitude is not computed, because such a torque depends on the attitude. A scene
+    without such a torque raises no error.
     """
     if not scene.torque.in_space:
         return

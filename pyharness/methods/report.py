@@ -1,4 +1,4 @@
-"""The reports of `run` and `plan`, and the picture of one trajectory."""
+"""The reports of the subcommands `run` and `plan`, and the picture of one trajectory."""
 
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -48,9 +48,9 @@ def trajectory_report(
     """Return the report of one trajectory of a scene, with a table of its rows and a picture.
 
     `method` is the name of the method or program, and `title` is the line under the scene's
-    heading. `listing` is the program's listing, or None for a method. `word` is the arithmetic of a
-    program that did not run in binary64. An attitude is shown as `form`, a name in
-    `model.attitude.FORMS`.
+    heading. `listing` is the listing of the program, or None for a method. `word` is the name of
+    the arithmetic of a program that did not run in binary64, else None. `form` is the form in which
+    an attitude is shown: ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``.
     """
     columns = [*_TIMES, *_OMEGA]
     parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]
@@ -65,7 +65,7 @@ def trajectory_report(
     rows = np.column_stack(parts)
     numbers = Table(columns, rows)
     steps = np.arange(1, len(rows) + 1)
-    # The nine elements of a matrix leave no space for other columns in a terminal.
+    # The nine elements of a matrix fill the width of a terminal, so that most columns are omitted.
     kept = [0, *range(5, len(columns))] if form == "matrix" else list(range(len(columns)))
     counted = Table(
         [Column("step", digits(".0f")), *(columns[k] for k in kept)],
@@ -111,10 +111,10 @@ def _shown(attitude: Array, form: str) -> Array:
 
 
 def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
-    """Draw the components of omega over time, and the attitude if the trajectory has one.
+    """Return a picture of the components of omega over time, and of the attitude if there is one.
 
-    `numbers` is the table that is saved with the picture. If the trajectory ends before the last
-    requested time, a note in the title gives the reason.
+    `title` is the title of the picture, and `numbers` is the table that is saved with it. If the
+    trajectory ends before the last requested time, a note in the title states the reason.
     """
     from matplotlib.figure import Figure
 
@@ -142,9 +142,10 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
 
 
 def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
-    """Mark the last value of component `row` (0 to 2) of omega in the diagram `axes`.
+    """Mark the last value of component `row` (0 to 2) of omega by a cross in the diagram `axes`.
 
-    A value outside the limits of the diagram is marked at its edge.
+    `axes` is a matplotlib object. If the value is outside the limits of the diagram, the cross is
+    at the edge of the diagram. The limits do not change.
     """
     bottom, top = axes.get_ylim()
     axes.plot(trajectory.time[-1:], np.clip(trajectory.omega[-1:, row], bottom, top), **_END)
@@ -152,7 +153,10 @@ def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
 
 
 def plan_report(scene: Scene, plan: "Plan") -> Report:
-    """Return the report of the plan for a scene, with a table of its decisions."""
+    """Return the report of a plan, with a table of the parts of the computation.
+
+    The table states for each part whether it is computed, and why. `plan` is the plan for `scene`.
+    """
     table = Table(
         words("part computed why"),
         [[each.part, "yes" if each.kept else "no", each.why] for each in plan.decisions],

@@ -1,10 +1,10 @@
-"""The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is used.
+"""The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is first used.
 
-SciPy controls the local error of each step, whereas a tolerance here limits the error at the
-requested times. A preliminary integration with few digits supplies three quantities that connect
-the local error with the error at the requested times. They are the largest omega, to which both
-errors are relative; the phase of the motion, over which local errors add up; and the error
-amplification.
+SciPy controls the local error of each step, whereas a tolerance of this project limits the error at
+the requested times. A preliminary integration with few digits supplies three quantities from which
+the local tolerance is chosen. The first is the largest |omega|, to which both errors are relative.
+The second is the phase of the motion, because local errors add up in proportion to it. The third is
+the error amplification.
 """
 
 import math
@@ -26,65 +26,70 @@ from pyharness.scenes.rescaled import omega_by_torque
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
-# Largest error at the end over the local error. The first table applies to a motion of a few
-# radians. The second table is added for each radian, multiplied by the error amplification. Both
-# were measured on random scenes other than those of the checks, and increased by half.
+# Largest ratio of the error at the end to the local error. The first table applies to a motion of a
+# few radians. The second table is added for each radian, multiplied by the error amplification.
+# Both were measured on random scenes that the checks do not use, and were increased by half.
 _SUM = {"DOP853": 30.0, "RK45": 90.0, "Radau": 30.0, "LSODA": 90.0}
 _SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 1.2}
-# Likewise for each radian by which the body rotates, if its attitude is requested: an error of
-# omega rotates the attitude until the end.
+# The ratio that is added for each radian by which the body rotates, if its attitude is requested.
+# The reason is that an error of omega changes the attitude until the end.
 _SUM_A_TURN = {"DOP853": 5.5, "RK45": 2.5, "Radau": 0.5, "LSODA": 55.0}
-# The local tolerance makes up for an error amplification up to this value. A larger amplification
-# multiplies the tolerance, as it does with every method.
+# The local tolerance compensates for an error amplification up to this value. Beyond it, the error
+# grows in proportion to the amplification, as with every method.
 _SENSITIVE = 1e3
-# Factor on the bound of the error if there is intermediate output: it comes from a polynomial in
-# each step, whose error is not controlled.
+# Factor on the bound of the error if there is intermediate output. Such output is interpolated by a
+# polynomial in each step, whose error is not controlled.
 _ROWS = 4.0
-# Longest step in radians of a wave. A method that samples a fast wave always at the same phase
-# takes it for a constant torque, however small its error estimates are.
+# Longest step, in radians of a torque wave. A method that samples a fast wave always at the same
+# phase treats it as a constant torque, although the error estimates are small.
 _WAVE_STEP = 2.0
-# solve_ivp accepts no relative tolerance below 100 times the machine epsilon. The tolerances that
-# the methods claim to meet with it (FINEST) are for motions of a few radians.
+# solve_ivp accepts no relative tolerance below 100 times the machine epsilon. FINEST has the
+# tolerances that the methods claim to meet with this value in motions of a few radians.
 _FINEST_STEP = 2.222e-14
 _A_FEW = 1.05
 FINEST = {name: _A_FEW * _FINEST_STEP * total for name, total in _SUM.items()}
 
 _COARSE = 1e-3
-# The preliminary integration is repeated if its scale was larger than the solution by this factor.
+# The preliminary integration is repeated if the expected omega exceeds the largest omega of the
+# solution by this factor.
 _FAR = 4.0
 _MOST_GUESSES = 200
 _NODES_PER_RADIAN = 4.0
 _FEWEST_NODES, _MOST_NODES = 30, 20_000
 
-# A phase of so many radians has hardly a digit left in binary64. An omega that still grows there
-# becomes infinite in finite time, and LSODA would not return.
+# A phase of so many radians has hardly a correct digit left in binary64. An omega that still grows
+# at this phase becomes infinite in finite time, and LSODA would not return.
 _LARGEST_PHASE = 1e13
 # Work limit, five to ten seconds of Python. Each wave of a torque adds an eighth to the cost of a
 # right-hand side; Radau also solves linear systems.
 _MOST_EVALUATIONS = 500_000
 _RADAU_SHARE = 2
-# LSODA squares the time span for its first step. Below 1e-150 s the square is 0, and LSODA makes no
-# progress.
+# LSODA squares the time span to choose its first step. Below 1e-150 s the square underflows to 0,
+# and LSODA does not advance.
 _SHORTEST_SPAN = 2.0**-300
 
 
 class _Ahead(NamedTuple):
-    """The results of a preliminary integration with few digits, which set the local tolerance."""
+    """The results of a preliminary integration with few digits, which set the local tolerance.
+
+    They are the largest |omega|, the phase of the motion and of the torque waves, the error
+    amplification, and the angle by which the body rotates.
+    """
 
     largest: float  # largest abs(omega) of any component from 0 to the end, rad/s
-    # Integral over time of the largest coefficient times omega, plus the radians of the torque's
-    # waves; a wave counts only as far as it can change omega.
+    # Integral over time of the largest coefficient times |omega|, plus the phases of the torque
+    # waves (rad). The phase of a wave is limited in proportion to the omega that it can add.
     radians: float
     growth: float  # error amplification until the end, at least 1
     turned: float = 0.0  # radians by which the body rotates, if its attitude is requested
 
 
 def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
-    """Return the bound of a SciPy method's error at the end over its local error in each step.
+    """Return a bound of the ratio of a SciPy method's error at the end to its error per step.
 
-    `name` is SciPy's name of the method. `radians` is the phase of the motion and of its waves,
-    `growth` is the error amplification until the end, and `turned` is the angle (rad) by which the
-    body rotates if its attitude is requested.
+    `name` is SciPy's name of the method, such as DOP853. `radians` is the phase of the motion and
+    of its torque waves (rad). `growth` is the error amplification until the end. `turned` is the
+    angle (rad) by which the body rotates, or 0 if its attitude is not requested.
     """
     found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
     return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)
@@ -93,14 +98,19 @@ def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> 
 def finest_tolerance(name: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method of SciPy can meet from 0 to `time` (s).
 
-    `name` is SciPy's name of the method.
+    `name` is SciPy's name of the method, such as DOP853. The tolerance is relative to the largest
+    |omega|.
     """
     ahead = _Run(scene, time, name).ahead()
     return _FINEST_STEP * steps_sum(name, *ahead[1:])
 
 
 def scipy_method(name: str) -> Integrator:
-    """Return the function that solves a scene by the method `name` of SciPy's `solve_ivp`."""
+    """Return a function that solves a scene by the method `name` of SciPy's `solve_ivp`.
+
+    The returned function chooses the local tolerance of `solve_ivp` so that the error at the
+    requested times meets the requested tolerance.
+    """
 
     def solve(
         scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
@@ -134,8 +144,8 @@ def scipy_method(name: str) -> Integrator:
                 # would search long for one.
                 step = max(step, ROUNDING * noise)
             allowed = step * ahead.largest
-            # Limit the step by the fastest wave that can change omega noticeably over the whole
-            # time.
+            # The step is limited by the fastest wave that can change omega by more than the local
+            # tolerance over the whole time.
             waves_that_count = (f for push, f in _pushes(scene) if push * abs(times[-1]) > allowed)
             fastest = max(waves_that_count, default=0.0)
             longest = _WAVE_STEP / fastest if fastest > 0.0 else math.inf
@@ -143,7 +153,7 @@ def scipy_method(name: str) -> Integrator:
             result = run.solved(name, step, sizes, times, longest)
             low, high = min(scene.euler_coefficients), max(scene.euler_coefficients)
             if result.status == 1 and low <= 0.0 <= high:
-                # Omega is bounded, but its phase can't be computed any further.
+                # Omega is bounded, but its phase can't be computed beyond this time.
                 raise TimedError(
                     f"{run.label} stopped at t = {{time}} s: beyond {_LARGEST_PHASE:.0e} radians "
                     "the phase has hardly a digit left; use a shorter time",
@@ -173,8 +183,9 @@ def state_of(scene: Scene) -> tuple[float, ...]:
 def turning(slopes: RightHandSide) -> RightHandSide:
     """Return the right-hand side of the equations of omega and attitude together.
 
-    `slopes` is the right-hand side of omega alone. The attitude is a quaternion q, scalar first,
-    with q' = q (0, omega)/2, where the product is Hamilton's product.
+    The unknowns are the three components of omega and the four of the attitude. `slopes` is the
+    right-hand side of the equations of omega alone. The attitude is a quaternion q, scalar first.
+    Its derivative is q' = q (0, omega)/2 with Hamilton's product.
     """
 
     def both(time: float, state: Sequence[float]) -> list[float]:
@@ -195,8 +206,9 @@ def _rows_of(
 ) -> Trajectory:
     """Return a trajectory from rows of omega, shape (n, 3), or of omega and attitude, (n, 7).
 
-    `evaluations` is the number of right-hand sides, and `ended` states how the integration ended.
-    The attitudes are normalised.
+    `times` (s) are the times of the rows. `evaluations` and `steps` are the numbers of right-hand
+    sides and of steps. `ended` states how the integration ended, for example ``complete``. The
+    attitudes are normalised to unit quaternions.
     """
     found = rows_trajectory(times, rows[:, :3], evaluations, steps, ended)
     if rows.shape[1] == 3:
@@ -206,14 +218,15 @@ def _rows_of(
 
 
 class _NoNumberError(Exception):
-    """An exception which reports that SciPy's linear algebra met a number that is not finite."""
+    """The exception for a number that is not finite in the linear algebra of SciPy's Radau."""
 
 
 class _Run:
     """The integrations of one scene from 0 to `end` (s) by `solve_ivp`, with one work limit.
 
-    `name` is SciPy's name of the method, and `effort` is a factor on the work limit. An instance
-    counts the right-hand sides of all its integrations.
+    They are the preliminary integrations and the main one. The work limit applies to the number of
+    right-hand sides of all of them. `name` is SciPy's name of the main method, and `effort` is a
+    factor on the work limit.
     """
 
     def __init__(self, scene: Scene, end: float, name: str, effort: float = 1.0) -> None:
@@ -230,7 +243,7 @@ class _Run:
             self.most //= _RADAU_SHARE
 
     def carry_attitude(self) -> None:
-        """Add the scene's attitude, if there is one, to the unknowns of the main integration."""
+        """Add the attitude to the unknowns of later integrations, if the scene has an attitude."""
         if self.scene.attitude is not None:
             self.start = state_of(self.scene)
             self.slopes = turning(self.slopes)
@@ -243,11 +256,11 @@ class _Run:
         times: Sequence[float] | None = None,
         longest: float = math.inf,
     ) -> Any:
-        """Return SciPy's result object for one integration by the method `name`.
+        """Integrate the scene by SciPy's method `name` and return SciPy's result object.
 
-        `relative` and `absolute` are the tolerances `rtol` and `atol`, and `longest` is the longest
-        step allowed (s). The result contains the solution at `times` (s), or dense output if
-        `times` is None. Its times are in units of `self.unit`.
+        `relative` and `absolute` are the tolerances `rtol` and `atol` of `solve_ivp`, and `longest`
+        is the longest allowed step (s). The result contains the solution at `times` (s), or dense
+        output if `times` is None. Times in the result are in the unit `self.unit` (s).
         """
         from scipy.integrate import solve_ivp
 
@@ -255,7 +268,7 @@ class _Run:
             return _LARGEST_PHASE - self.rate * abs(time * self.unit) * max(map(abs, omega[:3]))
 
         phase_left.terminal = True  # type: ignore[attr-defined]
-        # A warning of LSODA only repeats what missing rows show.
+        # A warning of LSODA only repeats that rows are missing.
         with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
             try:
                 return solve_ivp(
@@ -282,7 +295,10 @@ class _Run:
                 ) from None
 
     def _scale_by_torque(self) -> float:
-        """Return a bound of the omega that torque alone can give, rad/s; 1 if it is not finite."""
+        """Return a bound of the omega (rad/s) that the torque alone can cause until the end.
+
+        The result is 1 if the bound is not finite.
+        """
         bound = omega_by_torque(self.scene, self.end)
         return bound if math.isfinite(bound) else 1.0
 
@@ -307,10 +323,12 @@ class _Run:
     def ahead(self) -> _Ahead:
         """Integrate with few digits, and return the quantities that set the local tolerance.
 
-        The integration is repeated until its absolute tolerance, a fraction of the largest omega
-        that was expected, fits the solution. If omega grows without bound, the largest omega is
-        replaced by the larger of the expected one and the omega that torque alone would give. The
-        phase and the error amplification are then unknown and get their least values.
+        The absolute tolerance is a fraction of the largest |omega| that is expected. The
+        integration is repeated with a smaller expected value until the solution's |omega| is not
+        much smaller than expected. If omega grows without bound, there is no largest |omega|. The
+        result then contains the larger of the expected value and the omega that torque alone would
+        cause. In this case the phase and the error amplification are unknown and have their least
+        values, 0 and 1.
         """
         scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()
         if scale == 0.0:
@@ -323,8 +341,8 @@ class _Run:
                 break
             scale = largest
         if coarse.status != 0:
-            # Omega grows without bound, or its phase has no digit left: no tolerance can be met
-            # until the end.
+            # No tolerance can be met until the end, because omega grows without bound or its phase
+            # has no correct digit left.
             return _Ahead(max(scale, self._scale_by_torque()), 0.0, 1.0)
         length = abs(float(coarse.t[-1]) * self.unit)
         count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))
@@ -342,9 +360,10 @@ class _Run:
 
 
 def _pushes(scene: Scene) -> list[tuple[float, float]]:
-    """Return for each wave of the torque its largest amplitude over moment and its frequency.
+    """Return two numbers for each torque wave: its largest amplitude over moment, and frequency.
 
-    The first number of a pair is in 1/s2, the second in rad/s.
+    The first number is the largest of the three components of the amplitude over the moments
+    (1/s2). The second is the absolute value of the frequency (rad/s).
     """
     moments = scene.moments or (1.0, 1.0, 1.0)
     return [
@@ -354,10 +373,10 @@ def _pushes(scene: Scene) -> list[tuple[float, float]]:
 
 
 def _turned(scene: Scene, span: float, largest: float) -> float:
-    """Return the sum of the phases (rad) of all waves of the torque over the time `span` (s).
+    """Return the sum of the phases (rad) of all torque waves over the time `span` (s).
 
-    A wave counts at most with the ratio of the omega that it can add to `largest`, the largest
-    omega (rad/s). A wave that hardly changes omega therefore hardly counts.
+    The phase of a wave is limited to the ratio of the omega that the wave can add to `largest`, the
+    largest |omega| (rad/s). Therefore a wave that hardly changes omega hardly contributes.
     """
     found = 0.0
     for push, frequency in _pushes(scene):

@@ -1,4 +1,4 @@
-"""Sensitivity of a motion to rounding: the error amplification, and the error that it implies."""
+"""Sensitivity of a motion to rounding errors: error amplification, and the resulting error."""
 
 import math
 from dataclasses import replace
@@ -13,14 +13,14 @@ from pyharness.model.trajectory import ROUNDING
 from pyharness.scenes.rescaled import rescaling_factor, scaled
 
 # A result is sensitive if the unit roundoff times the error amplification exceeds this fraction of
-# the tolerance. The fraction leaves a factor of three for the norm and for the number of
-# perturbations that were propagated.
+# the tolerance. The fraction allows for a factor of three, by which the computed amplification may
+# be too small because of the norm and of the number of perturbations.
 _SHARE = 0.3
 # Relative error of a closed form in addition to an amplified rounding error: the bound that
 # `tests/methods/test_closed_form.py` checks.
 _CLOSED_FORM_ERROR = 16.0 * ROUNDING
-# The Taylor series supplies only the error amplification. Therefore it needs few digits, and a
-# twentieth of a second at most.
+# Settings of a Taylor series that supplies only the error amplification: a large tolerance, and a
+# work limit of a twentieth of a second.
 _COARSE = 1e-3
 _LITTLE_WORK = 5e-3
 
@@ -28,9 +28,10 @@ _LITTLE_WORK = 5e-3
 def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
     """Return whether amplified rounding errors are too large for the relative tolerance.
 
-    This is the case if the unit roundoff times `growth`, the error amplification, exceeds a
-    fraction of the tolerance. `noise` increases the product: it is the rounding error of the torque
-    over the rounding error of omega. If `growth` is None, the result is False.
+    The amplified rounding error is the unit roundoff times `growth` times (1 + `noise`). It is too
+    large if it exceeds 0.3 times the tolerance. `growth` is the error amplification of the motion,
+    and `noise` is the rounding error of the torque over the rounding error of omega. If `growth` is
+    None, which means unknown, the result is False.
     """
     return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
 
@@ -42,12 +43,13 @@ def torque_noise(
     steps: float = math.inf,
     scale: float | None = None,
 ) -> float:
-    """Return the rounding error of torques that nearly cancel, over the rounding error of omega.
+    """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
 
-    It is estimated by the sum of the omegas that the terms of the torque law would give one by one
-    until `t_end` (s), over the largest omega, `scale` (rad/s). It is 0 if the terms do not cancel.
-    The terms are rounded in each of `steps` steps. If `scale` is None, the largest omega is taken
-    to be the larger of the initial one, `omega0` (rad/s), and the one that the whole torque gives.
+    The result is an estimate without unit. Its numerator is the sum of the omegas that the terms of
+    the torque law would cause one by one until `t_end` (s). It includes the rounding of the terms
+    in each of `steps` steps. The denominator is `scale`, the largest |omega| (rad/s). If `scale` is
+    None, it is the larger of the initial |omega|, from `omega0` (rad/s), and the omega that the
+    whole torque causes. If the terms do not nearly cancel, the result is 0.
     """
     if not (scene.torque.sines or scene.torque.cosines):
         return 0.0
@@ -61,12 +63,13 @@ def torque_noise(
 def closed_form_estimate(
     scene: Scene, omega0: Triple, t_end: float, noise: float = 0.0
 ) -> tuple[float | None, float | None]:
-    """Return the estimated error of a closed form at `t_end` (s), and its error amplification.
+    """Return the estimated error of a closed form at `t_end` (s), and the error amplification.
 
-    The motion begins with `omega0` (rad/s). The error of omega is relative to the largest omega
+    `omega0` is the initial omega (rad/s). The error of omega is relative to the largest |omega|
     from 0 to `t_end`. For a scene with an attitude the estimate includes the error of the
-    attitude's angle (rad). Both results are None if there is no closed form. `noise` is the
-    rounding error of the torque over the rounding error of omega, as `torque_noise` returns it.
+    attitude's angle (rad). `noise` is the rounding error of the torque over the rounding error of
+    omega, as `torque_noise` returns it. If the error amplification is unknown, for example because
+    the scene has no closed form, both results are None.
     """
     growth: float | None = 1.0
     # A sphere does not amplify perturbations.
@@ -76,8 +79,8 @@ def closed_form_estimate(
         return None, None
     error = ROUNDING * growth * (1.0 + noise) + _CLOSED_FORM_ERROR
     if isinstance(scene, PrincipalScene) and scene.attitude is not None:
-        # The initial omega was rounded about principal axes. The error of the speed makes the error
-        # of the angle grow with time.
+        # The initial omega was rounded after the rotation to principal axes. This error of omega
+        # causes an error of the angle that grows with time.
         error += ROUNDING * max(map(abs, omega0)) * abs(t_end)
     return error, growth
 
@@ -85,11 +88,10 @@ def closed_form_estimate(
 def motion_growth(scene: Scene, t_end: float) -> float | None:
     """Return the error amplification of a scene's motion from time 0 to `t_end` (s).
 
-    It is a property of the motion and does not depend on the method that solves the scene.
-
-    It is the largest norm of the state-transition matrices, the derivatives of omega at the end
-    with respect to omega at any earlier time. It comes from a closed form if there is one, else
-    from the Taylor series. The result is None if neither of the two can determine it.
+    It is a property of the motion and does not depend on the method that solves the scene. It is
+    the largest norm of the state-transition matrices, the derivatives of omega at the end with
+    respect to omega at any earlier time. It is computed from the closed form if the scene has one,
+    else by a Taylor series with few digits. The result is None if neither can determine it.
     """
     if closed_form(scene):
         _, growth = closed_form_estimate(scene, scene.omega, t_end)

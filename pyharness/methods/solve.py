@@ -1,7 +1,7 @@
-"""The function `solve`, the common entry point of all methods that give rows.
+"""The function `solve`, which computes the trajectory of a scene at given times by any method.
 
-It orders the times and rescales the scene, so that a method integrates from 0 to one side, in units
-in which it can form its products.
+It sorts the times, so that a method integrates from time 0 in one direction only. It also rescales
+time, so that products of two components of omega neither overflow nor underflow.
 """
 
 import itertools
@@ -50,30 +50,32 @@ def solve(
     Parameters
     ----------
     scene : Scene
-        The scene. Only methods with a fixed step use its step size.
+        The scene to solve. Only methods with a fixed step use its step size.
     times : float or iterable of float, shape (n,)
         Times of the results (s), strictly monotonic. If there are times on both sides of 0, the
         scene is solved twice, from 0 backward and from 0 forward.
     method : str
         A name in `pyharness.methods.registry.METHODS`.
     tolerance : float
-        Largest error of any component at `times`, relative to the largest component from 0 to the
-        last time. By default it is the method's own (`Method.default` in the registry), 1e-12 for
-        `auto`; the trajectory's `tolerance` reports it. A method with a fixed step takes none.
+        Largest allowed error of any component of omega at `times`, relative to the largest
+        component from 0 to the last time. The default depends on the method (`Method.default` in
+        the registry); it is 1e-12 for `auto`. The trajectory's `tolerance` reports the value. A
+        method with a fixed step takes no tolerance.
     effort : float
-        Factor on the work limit; 1 is some ten seconds.
+        Factor on the work limit; 1 means some ten seconds.
     attitude : bool
-        Whether the attitude is computed too. It starts from the attitude of the scene, or from the
-        axes of space if the scene has none. The tolerance then also applies to its angle (rad). A
-        torque about the axes of space needs the attitude.
+        Whether the attitude is computed too. At time 0 it is the attitude of the scene. If the
+        scene has none, the body's axes are parallel to the axes of space at time 0. The tolerance
+        then also applies to the attitude's angle (rad). A torque about the axes of space requires
+        the attitude.
 
     Returns
     -------
     Trajectory
-        One row per time, in the order of `times`. If the solution overflows, there are only the
-        rows between 0 and the overflow, on either side. `steps` and `evaluations` are totals of
-        both sides. Under a torque about the axes of space `error` comes from the difference of two
-        integrations, and `growth` is None.
+        One row per time, in the order of `times`. If omega overflows at a positive or negative
+        time, there are no rows beyond the overflow in that direction. `steps` and `evaluations`
+        are totals of the integrations in both directions. Under a torque about the axes of space,
+        `error` is estimated from the difference of two integrations, and `growth` is None.
 
     Raises
     ------
@@ -135,10 +137,10 @@ def solve(
 def finest(method: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method of the registry can meet from 0 to `time` (s).
 
-    For most methods it is the tolerance that the method claims to meet (`Method.finest`). The
-    methods of SciPy's `solve_ivp` accept no local tolerance below some 2e-14. Their smallest
-    tolerance is larger than the claimed one if many local errors add up or if the motion amplifies
-    them. Raise InputError if too many steps would be needed to determine the smallest tolerance.
+    For most methods it does not depend on the scene: it is the tolerance that the method claims to
+    meet (`Method.finest`). Methods of SciPy's `solve_ivp` accept no local tolerance below some
+    2e-14. Their smallest tolerance exceeds the claimed one if many local errors add up or if the
+    motion amplifies them. Raise InputError if too many steps would be needed to determine it.
     """
     claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:
@@ -151,16 +153,17 @@ def finest(method: str, scene: Scene, time: float) -> float:
 def by_plan(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the trajectory at `times` (s) by the method that the plan chooses for the scene.
+    """Return the trajectory at `times` (s) by the method that `plan` chooses for the scene.
 
-    If this method refuses the scene, the plan's `fallback` solves it. `tolerance` is relative,
-    and `effort` is a factor on the work limit.
+    This function is the method `auto`. If the chosen method refuses the scene, the second method
+    that `plan` names (`fallback`) solves it. `tolerance` is relative to the largest |omega|, and
+    `effort` is a factor on the work limit.
     """
     chosen = plan(scene, "auto", tolerance, rows=True)
     method = METHODS[chosen.method]
     try:
-        # A closed form has only rounding errors, so that it is used for tolerances finer than it
-        # claims to meet as well.
+        # A closed form has only rounding errors. Therefore it is also used for tolerances below
+        # the smallest one that it claims to meet.
         return method.solve(scene, times, tolerance, effort)
     except InputError as refusal:
         if chosen.fallback is None:
@@ -174,14 +177,14 @@ def by_plan(
 def _march(
     chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float
 ) -> Trajectory:
-    """Return the trajectory by the method `chosen` at times on one side of 0.
+    """Return the trajectory by the method `chosen` at `times` (s), all on one side of 0.
 
-    The scene is solved in units of time in which products of two components of omega neither
-    overflow nor underflow. The trajectory is in the scene's own units. `effort` is a factor on the
-    work limit.
+    If necessary, the scene is solved in another unit of time, in which products of two components
+    of omega neither overflow nor underflow. The trajectory is converted back to seconds.
+    `tolerance` is relative to the largest |omega|, and `effort` is a factor on the work limit.
     """
     if not chosen.is_fixed_step and not is_ordinary(scene):
-        # The step is not used, but in other units it might not be finite.
+        # The method does not use the step size, but in the new unit it might not be finite.
         scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
     factor = 1.0 if chosen.any_scale else rescaling_factor(scene, times[-1])
     if factor == 1.0:
@@ -203,10 +206,11 @@ def _rows(found: Trajectory) -> tuple[str, ...]:
 
 
 def _joined(before: Trajectory, after: Trajectory) -> Trajectory:
-    """Return the rows of two integrations from time 0 as one trajectory.
+    """Return the results of a backward and a forward integration from time 0 as one trajectory.
 
-    `before` is the integration backward, with its rows in ascending order of time, and `after` is
-    the integration forward.
+    `before` is the trajectory at negative times, with its rows in ascending order of time, and
+    `after` is the trajectory from time 0. Steps and evaluations are added. The error and the error
+    amplification are the larger of the two values, and the ending is the worse of the two.
     """
     both = before, after
     rows: dict[str, Any] = {
@@ -228,7 +232,11 @@ def _larger(first: float | None, second: float | None) -> float | None:
 
 
 def _ascending(times: object) -> tuple[list[float], bool]:
-    """Return the times in ascending order, and whether they had to be reversed."""
+    """Return a user's times (s) in ascending order, and whether they had to be reversed.
+
+    `times` is a number or an iterable of numbers. Raise InputError unless it is strictly monotonic,
+    finite and not empty.
+    """
     if not isinstance(times, Iterable) or getattr(times, "shape", None) == ():
         times = (times,)
     if isinstance(times, np.ndarray) and times.dtype.kind in "iuf":

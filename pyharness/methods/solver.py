@@ -1,4 +1,4 @@
-"""Solvers of a scene, prepared for one method and called through C, for use in a loop."""
+"""The class `Solver`: a scene prepared for one method, for many fast calls through C."""
 
 import reprlib
 from dataclasses import replace
@@ -53,28 +53,31 @@ _FEW_WAVES = 16  # fewer waves than this take less time than releasing the GIL
 class Solver(LastCall, BoundKernel):
     """A solver of a scene, prepared for one method by `prepare`.
 
-    Call it as ``solver(omega0, t_end)``. `omega0` is three real numbers (rad/s), `t_end` a time in
-    seconds, positive, negative or 0. A call returns the angular velocity at `t_end` (rad/s) as a
-    new array of shape (3,). ``solver(omega0, t_end, out=array)`` writes it into a contiguous array
-    of three floats, which may be `omega0` itself, and returns that array. Any other argument is
-    refused with an InputError, and `out` is not changed. Calls are fastest if `omega0` is an array
-    of floats.
+    Call it as ``solver(omega0, t_end)``. `omega0` is the initial angular velocity, three real
+    numbers (rad/s). `t_end` is the final time in seconds, positive, negative or 0. A call returns
+    the angular velocity at `t_end` (rad/s) as a new array of shape (3,).
+    ``solver(omega0, t_end, out=array)`` writes the result into a contiguous array of three floats,
+    which may be `omega0` itself, and returns this array. An argument of another type or shape
+    raises an InputError, and `out` is not changed. Calls are fastest if `omega0` is an array of
+    floats.
 
-    If the kernel could not finish, the result is NaN and `status` gives the reason. The same holds
-    if `omega0` or `t_end` is not finite. `error`, `growth` and `digits` report the accuracy.
+    If the kernel could not finish, the result is NaN and `status` states the reason. The same
+    applies if `omega0` or `t_end` is not finite. `error`, `growth` and `digits` report the accuracy
+    of the last result.
 
-    Threads may share a solver and call it at the same time. The kernel releases the GIL, unless the
-    solution takes less time than releasing it, as a closed form does. Solvers can be copied and
-    pickled; a copy has made no call yet.
+    Threads may share a solver and call it at the same time. The kernel releases the interpreter's
+    lock (GIL), unless the solution takes less time than releasing the lock, as a closed form does.
+    Solvers can be copied and pickled. A copy does not contain the status of the last call.
 
     Attributes
     ----------
     plan : Plan
-        The method and the parts that are computed, with the reasons.
+        The chosen method, and the parts of the computation that are carried out, with reasons.
     status, error, growth, digits, steps, method
-        The status, the accuracy, the number of steps and the method of this thread's last call.
+        Reports on this thread's last call: how it ended, its estimated error, its error
+        amplification, its number of correct digits, its number of steps and its method.
     many : callable
-        Solves many initial angular velocities in one call.
+        A function that solves the scene from many initial angular velocities in one call.
 
     Examples
     --------
@@ -92,10 +95,11 @@ class Solver(LastCall, BoundKernel):
     # The base class binds a kernel to its data in C. A call goes from the interpreter into the
     # kernel without Python code in between, which would take as long as an easy solution.
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
-        """Pack the data that all calls share; users call `prepare` instead.
+        """Create a solver and pack the data that all calls share; users call `prepare` instead.
 
-        `chosen` is the plan, which contains the scene. `tolerance` is relative, `asked` is the name
-        of the requested method, and `effort` is a factor on the work limit of a call.
+        `chosen` is the plan, which contains the scene. `tolerance` is relative to the largest
+        |omega|. `asked` is the name of the requested method, such as `auto`. `effort` is a factor
+        on the work limit of a call.
         """
         kernel = extension().solve_packed
         packed = packed_scene(chosen.scene, _code(chosen), tolerance, effort)
@@ -116,12 +120,13 @@ class Solver(LastCall, BoundKernel):
         """Return the function that solves many initial omegas in one call.
 
         Call it as ``solver.many(omega0, t_end, threads=1, out=None)``. `omega0` (rad/s) has shape
-        (n, 3), `t_end` (s) is a number or has shape (n,). A call returns omega, shape (n, 3), which
-        is `out` if that is given, and an array of statuses, int8, with the values that `Ensemble`
-        documents. Each result depends only on its own initial omega and time, not on the number of
-        rows, their order or the threads. A result meets the same tolerance as a call of the solver,
-        but its rounding errors differ, even for a single row. Any other argument is refused with an
-        InputError.
+        (n, 3). `t_end` (s) is one number or has shape (n,). A call returns two arrays. The first is
+        omega at `t_end` (rad/s), shape (n, 3), which is written into `out` if that is not None. The
+        second contains the statuses, int8, shape (n,), with the values that `Ensemble` documents.
+        The result of a row depends only on its own initial omega and time, and not on the other
+        rows or on the number of threads. It meets the same tolerance as a call of the solver, but
+        its rounding errors differ, even if there is only one row. An argument of another type or
+        shape raises an InputError.
         """
         from pyharness._many import ManyStarts
 
@@ -132,9 +137,10 @@ class Solver(LastCall, BoundKernel):
 
     @property
     def method(self) -> str:
-        """Return the name of the method that solved this thread's last call.
+        """Return the name of the method that solved the scene in this thread's last call.
 
-        It is the plan's method, unless the kernel chose another method.
+        It is the plan's method, with two exceptions. The kernel may have chosen between `quick` and
+        `taylor`, or it may have used the plan's `fallback` because the closed form was refused.
         """
         steps = self._counted()
         if not steps:
@@ -146,8 +152,9 @@ class Solver(LastCall, BoundKernel):
     def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
         """Return the trajectory from `omega0` (rad/s) at `times` (s), as `solve` computes it.
 
-        The times are strictly monotonic, on one or both sides of 0. Raise InputError if `omega0` is
-        not three finite numbers, or if the times are not in order.
+        `omega0` is the angular velocity at time 0. The times must be strictly monotonic; they may
+        be positive and negative. Raise InputError if `omega0` is not three finite numbers, or if
+        the times are not strictly monotonic.
         """
         return self._rows(replace(self.plan.scene, omega=three("omega0", omega0)), times)
 
@@ -157,16 +164,17 @@ class Solver(LastCall, BoundKernel):
 
         tolerance, asked, effort = self._given
         method = "taylor" if asked == "quick" else asked
-        # A method with a fixed step takes no tolerance: `solve` expects 1 for it.
+        # A method with a fixed step takes no tolerance. For such a method `solve` expects 1.
         tolerance = max(tolerance, METHODS[method].finest)
         return solve(scene, times, method, tolerance, effort=effort)
 
 
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
-    """Convert arguments of a call that the C function can't read directly.
+    """Convert arguments of a solver call that are of types which the C function can't read.
 
-    Return the three numbers of `omega0` (rad/s) and the time (s). Raise InputError for an argument
-    that is not allowed, such as an `out` into which three floats can't be written.
+    Return the three numbers of `omega0` (rad/s) as floats, and `t_end` (s) as a float. Raise
+    InputError if `omega0` is not three real numbers, if `t_end` is not a real number, or if three
+    floats can't be written into `out`.
     """
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     if out is not None and (found := no_buffer(out)):
@@ -175,7 +183,10 @@ def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
 
 
 def no_buffer(out: object) -> str:
-    """Return a description of `out` if it can't receive three floats, else an empty text."""
+    """Return why three floats can't be written into `out`, as text; empty if they can.
+
+    The text describes `out` for a message, for example by its type and shape.
+    """
     if not isinstance(out, np.ndarray):
         try:
             return reprlib.repr(out)
@@ -190,11 +201,14 @@ def no_buffer(out: object) -> str:
 
 
 def _code(chosen: Plan) -> int:
-    """Return the integer that the kernel uses for the method of the plan `chosen`."""
+    """Return the integer that selects the method of the plan `chosen` in the compiled kernel.
+
+    The integers are defined in `pyharness.model.codes.Methods`.
+    """
     if chosen.closed_form == "sphere":
         return CODES["sphere"]
     if chosen.method == "closed-form":
-        # The closed form refuses a perturbation that is too small to be squared. The kernel then
-        # takes the series, unless the closed form was requested explicitly.
+        # The closed form refuses a perturbation whose square would underflow. The kernel then
+        # uses the Taylor series, unless the closed form was requested explicitly.
         return Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else CODES["closed-form"]
     return CODES[chosen.method]

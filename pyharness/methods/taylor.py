@@ -1,4 +1,4 @@
-"""Taylor series by recurrence, with adapted order and step size."""
+"""Integration by Taylor series, with adapted order and step size."""
 
 from collections.abc import Sequence
 
@@ -18,15 +18,18 @@ def taylor(
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) by Taylor series.
 
-    The attitude is computed too if the scene has one. Another integration follows if the error of
-    the first is too large. In the trajectory, `steps` counts the steps of the last integration, and
-    `evaluations` counts the steps of all integrations, since each step takes one Taylor series.
-    Under a torque about the axes of space there are at least two integrations, the later ones with
-    a smaller local tolerance. The difference between integrations then gives the error, and the
-    error amplification (`growth`) is unknown. `effort` is a factor on the work limit.
+    The attitude is computed too if the scene has one. `tolerance` is relative to the largest
+    |omega|, and `effort` is a factor on the work limit. If the error of the first integration is
+    too large, the scene is integrated again.
+
+    In the trajectory, `steps` is the number of steps of the last integration. `evaluations` is the
+    number of steps of all integrations, because each step computes one Taylor series. Under a
+    torque about the axes of space there are at least two integrations, the later ones with a
+    smaller local tolerance. Their difference is the estimate of the error, and the error
+    amplification (`growth`) is unknown.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
-    # The attitude at time 0, and then a column for each time.
+    # The first column is the attitude at time 0. A column for each time follows.
     n_attitudes = 0 if scene.attitude is None else len(times)
     joint = np.empty((4, n_attitudes + 1), order="F")
     joint[:, 0] = scene.attitude or IDENTITY

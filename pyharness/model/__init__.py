@@ -1,1 +1,1 @@
-"""The base layer: plain data types for scenes, listings, trajectories, and their files."""
+"""The data types that all other subpackages use: scenes, listings, trajectories and reports."""

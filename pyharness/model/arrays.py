@@ -1,7 +1,6 @@
-"""Checks of arrays for many bodies: shape, type, values and number of rows.
+"""Checks of a user's arrays for many bodies: shape, type, values and number of rows.
 
-All functions that take arrays for many bodies call these checks, and therefore have the same error
-messages.
+All functions that take such arrays call these checks, so that they have the same error messages.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,7 +15,7 @@ from pyharness.model.values import integer, number
 
 _MOST_THREADS = 1024
 _REAL = "iuf"
-# A test that is applied to each number of an array, and the allowed numbers in words.
+# A test that is applied to each number of an array, and a phrase that names the allowed numbers.
 Rule = tuple[Callable[[Array], NDArray[np.bool_]], str]
 
 ABOVE_ZERO: Rule = (
@@ -29,9 +28,10 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
     """Return user values as a float array with one row per body, or one row that all bodies share.
 
-    `shape` is the shape of one row, in which a letter means any length. If `values` is a single
-    row, the result has one row. Raise InputError, with `where` in front of the message, for another
-    shape, for an element that is not a real number, and for a number that fails the test of `rule`.
+    `shape` is the shape of one row, in which a letter is for any length. If `values` is a single
+    row, the result has one row. `rule` is a test that every number must pass, with a phrase that
+    names the allowed numbers. Raise InputError, with `where` in front of the message, for another
+    shape, an element that is not a real number, or a number that fails the test.
     """
     found = numbers_of(where, values)
     own = found.shape[-len(shape) :] if shape else ()
@@ -46,7 +46,7 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
 
 
 def numbers_of(where: str, values: object) -> Array:
-    """Return user values as a float64 array, of whatever shape the values have.
+    """Return user values as a float64 array of the same shape, which may be any shape.
 
     Raise InputError, with `where` in front of the message, if an element is not a real number.
     Fractions, decimals, and integers beyond 64 bits are accepted as real numbers.
@@ -73,18 +73,19 @@ def numbers_of(where: str, values: object) -> Array:
 def waves_of(where: str, values: object) -> Array:
     """Return user values as an array of k torque waves for each of n bodies, shape (n, k, 4).
 
-    A wave consists of three amplitudes and a frequency (rad/s). n is 1 if all bodies share the
-    waves. `where` is put in front of the message of an InputError.
+    A wave consists of three amplitudes, one for each axis, and a frequency (rad/s). n is 1 if all
+    bodies share the waves. Raise InputError, with `where` in front of the message, for values that
+    have another shape or are not real numbers.
     """
     found = numbers_of(where, values)
     return rows_of(where, found, "k", 4) if found.size else np.empty((1, 0, 4))
 
 
 def count_bodies(rows: Mapping[str, Array]) -> int:
-    """Return the number of bodies of several arrays, given by name, with one row per body each.
+    """Return the number of bodies for which several arrays have rows.
 
-    An array may also have a single row, which all bodies share. Raise InputError if the arrays
-    disagree about the number of bodies.
+    `rows` maps the name of each array to the array. An array has one row for each body, or a single
+    row that all bodies share. Raise InputError if the arrays disagree about the number of bodies.
     """
     counts = {len(each) for each in rows.values()}
     n = 0 if 0 in counts else max(counts, default=1)
@@ -118,7 +119,7 @@ def only_one(given: Mapping[str, object]) -> str:
 
 
 def threads_of(threads: object) -> int:
-    """Return the argument `threads`; raise InputError unless it is an integer from 1 to 1024."""
+    """Return a user's number of threads; raise InputError if it is no integer from 1 to 1024."""
     found = integer("threads", threads)
     if not 1 <= found <= _MOST_THREADS:
         raise InputError(f"threads is {found}; allowed: 1 to {_MOST_THREADS}")
@@ -126,10 +127,11 @@ def threads_of(threads: object) -> int:
 
 
 def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
-    """Return the user's output array unchanged if a kernel can write its results to it.
+    """Return the user's output array unchanged if a compiled kernel can write its results to it.
 
-    The array must have `shape` and the NumPy type character `kind`, and be writable and contiguous.
-    Raise InputError, with `where` in front of the message, for any other value.
+    The array must have `shape` and the NumPy type character `kind`, as in "d". It must be writable,
+    contiguous and aligned. Raise InputError, with `where` in front of the message, for any other
+    value of `array`.
     """
     right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype.char == kind
     if not (right and array.flags.c_contiguous and array.flags.writeable and array.flags.aligned):
@@ -140,7 +142,7 @@ def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
 
 
 def spread(rows: Array, n: int) -> Array:
-    """Return a contiguous array with one row for each of n bodies; a single row is repeated."""
+    """Return `rows` as an array with one row for each of `n` bodies; a single row is repeated."""
     if len(rows) == n:
         return rows
     return np.ascontiguousarray(np.broadcast_to(rows, (n, *rows.shape[1:])))

@@ -1,8 +1,9 @@
 """Attitudes as unit quaternions from body to space, scalar first, with Hamilton's product.
 
-A vector v of the body has the components q v q* in space, where q* is the conjugate of q. The
-quaternion satisfies q' = q (0, omega)/2. Angles and matrices are for output only; they are not
-integrated.
+If a vector has the components v about the body axes, it has the components q v q* about the axes of
+space. Here q is the quaternion and q* its conjugate. The quaternion satisfies the equation
+q' = q (0, omega)/2, and is integrated. Angles and matrices are only other forms of it, for input
+(angles) and output (angles and matrices).
 """
 
 import math
@@ -18,12 +19,12 @@ Quaternion = tuple[float, float, float, float]
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 SEQUENCES = ("3-1-3", "3-2-1")
 FORMS = ("quaternion", *SEQUENCES, "matrix")
-NEAR_ONE = 1e-12  # a norm that is closer to 1 than this was meant to be 1
-_ROUNDED = 2.0**-51  # deviation of a norm from 1 that normalisation can not reduce
+NEAR_ONE = 1e-12  # a norm that differs from 1 by at most this was intended to be 1
+_ROUNDED = 2.0**-51  # deviation of a norm from 1 that normalisation cannot reduce
 
 
 def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
-    """Return four numbers as a normalised quaternion, and the norm that they had before.
+    """Return four numbers as a normalised quaternion, and their norm before normalisation.
 
     Raise InputError, with `where` in front of the message, unless `values` are four finite numbers,
     not all 0.
@@ -45,9 +46,10 @@ def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
 
 
 def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
-    """Return the attitude that three successive rotations about body axes lead to.
+    """Return the attitude that results from three successive rotations about body axes.
 
-    `angles_deg` are the angles in degrees. `sequence` names the axes, as in "3-1-3". Raise
+    At first the body axes are parallel to the axes of space. `angles_deg` are the three angles in
+    degrees. `sequence` names the axes of the rotations by number, as in "3-1-3". Raise
     InputError, with `where` in front of the message, unless `angles_deg` are three finite numbers
     and `sequence` is one of `SEQUENCES`.
     """
@@ -79,10 +81,10 @@ def angles(attitude: Array, sequence: str) -> Array:
     """Return n attitudes as angles (degrees) of three successive rotations, shape (n, 3).
 
     `attitude` is an array of n quaternions, shape (n, 4). `sequence` names the body axes of the
-    rotations, and is one of `SEQUENCES`. The angles are computed by arc tangents of half angles,
-    which keep their digits at the poles. A pole is an attitude at which the axes of the first and
-    the last rotation are parallel in space. There only the sum or the difference of the first and
-    last angle is determined; the last angle is then set to 0.
+    rotations, and is one of `SEQUENCES`. A pole is an attitude at which the axes of the first and
+    the last rotation are parallel in space. At a pole only the sum or the difference of the first
+    and the last angle is determined, and the last angle is set to 0. The angles are computed from
+    arc tangents of half angles, which are accurate even near a pole.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":
@@ -120,8 +122,9 @@ def matrices(attitude: Array) -> Array:
 def angle_between(attitude: Array, other: Array) -> Array:
     """Return the angle (rad) of the rotation between each pair of attitudes, shape (n,).
 
-    `attitude` and `other` are arrays of quaternions, shape (n, 4). Opposite quaternions are the
-    same attitude.
+    The first attitude of a pair is in `attitude`, the second in `other`; both are arrays of
+    quaternions, shape (n, 4). The angle between a quaternion and its negative is 0, because both
+    represent the same attitude.
     """
     a, b, c, d = attitude.T
     e, f, g, h = other.T

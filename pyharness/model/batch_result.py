@@ -1,4 +1,4 @@
-"""The result type of a batch of bodies, which solvers and compiled programs share."""
+"""The base class of the results of solvers and compiled programs for a batch of many bodies."""
 
 from dataclasses import dataclass
 
@@ -14,12 +14,13 @@ _RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BatchResult:
-    """The angular velocities of n bodies, and how the computation of each ended.
+    """The angular velocities of n bodies, and how the computation of each body ended.
 
     Attributes
     ----------
     omega : ndarray, shape (n, ..., 3)
-        Angular velocity about the body axes, rad/s; NaN for a body without result.
+        Angular velocity about the body axes, rad/s; NaN for a body without result. The axis between
+        n and 3, if there is one, is for the times of the results.
     status : ndarray of int8, shape (n,)
         How the computation of each body ended, as an integer of `pyharness.model.codes.Statuses`.
     """
@@ -31,10 +32,10 @@ class BatchResult:
 
     @property
     def ended(self) -> NDArray[np.str_]:
-        """The status of each body as text, shape (n,), as in complete, stopped or overflow."""
+        """The status of each body as text, for example "complete" or "overflow"; shape (n,)."""
         return np.array(ENDS)[self.status]
 
     @property
     def has_result(self) -> NDArray[np.bool_]:
-        """Whether each body has all of its results: boolean array, shape (n,)."""
+        """Whether all results of a body are present, for each body: boolean array, shape (n,)."""
         return np.isin(self.status, _RESULTS)

@@ -1,4 +1,4 @@
-"""The build of this installation, and the packages that it depends on."""
+"""Versions and build options of this installation, and the packages that it depends on."""
 
 import importlib.util
 import os
@@ -35,7 +35,7 @@ class Build:
 
 
 def build() -> Build:
-    """Return the versions, compiler and flags of this installation."""
+    """Return the versions, the Fortran compiler and the compiler flags of this installation."""
     compiler = flags = extension = None
     try:
         from pyharness import _build, _kernels
@@ -60,8 +60,8 @@ def build() -> Build:
 def machine(packages: Iterable[str]) -> dict[str, str]:
     """Return a description of this machine: processor, number of cores, and installed packages.
 
-    The result maps "processor", "cores", and the name of each installed package among `packages` to
-    text; for a package the text is its version.
+    The result is a dictionary with the keys "processor" and "cores". It also has the name of each
+    installed package among `packages` as a key, whose value is the version.
     """
     found = {"processor": _processor(), "cores": str(os.cpu_count())}
     return found | {name: text for name in packages if (text := _version(name)) is not None}
@@ -90,7 +90,11 @@ def _version(package: str) -> str | None:
 
 
 def doctor_report(build: Build) -> Report:
-    """Return the report of the verb `doctor`: the build, and the state of each optional package."""
+    """Return the report of the verb `doctor`, which lists the versions and optional packages.
+
+    It shows the versions, compiler and flags in `build`. For each optional package it shows whether
+    the package is installed, and what it is needed for.
+    """
     rows = {
         "pyharness": build.version,
         "extension": build.extension or "not built: 'make compare', or 'pip install .'",

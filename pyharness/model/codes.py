@@ -1,20 +1,20 @@
 """Integers and other constants that Python and the Fortran kernels share.
 
-The script fortran/make_codes.py writes each class as a Fortran module, so that both languages have
-the same values.
+The script fortran/make_codes.py writes each class as a Fortran module, so that the constants have
+the same values in both languages.
 """
 
 
 class Statuses:
-    """The integers by which a kernel reports how a computation ended, counted from 0."""
+    """The integers, from 0, with which a compiled kernel reports how a computation ended."""
 
-    COMPLETE = 0  # all rows are results
+    COMPLETE = 0  # all requested rows are present
     STOPPED = 1  # the Lipschitz test ended the run
     OVERFLOW = 2  # an angular velocity overflowed
-    REFUSED = 3  # the method does not apply to these coefficients
+    REFUSED = 3  # the method does not apply to the input, for example to these coefficients
     GAVE_UP = 4  # work limit exceeded, or no digit of the phase is left
-    INTERRUPTED = 5  # by the user; a Python exception is set
-    SENSITIVE = 6  # all rows are results, but the amplified rounding error exceeds the tolerance
+    INTERRUPTED = 5  # the user interrupted it; a Python exception is set
+    SENSITIVE = 6  # all rows are present, but the amplified rounding error exceeds the tolerance
 
 
 class Methods:
@@ -24,29 +24,32 @@ class Methods:
     """
 
     CLOSED_FORM = 1  # for scenes without torque
-    SPHERE = 2
+    SPHERE = 2  # for bodies with three equal moments
     TAYLOR = 3
     IMPROVED_EULER = 4
     TAYLOR_3 = 5
     RK4 = 6
     QUICK = 7  # Runge-Kutta, for results of few digits
-    QUICK_OR_TAYLOR = 8  # whichever needs fewer operations
-    CLOSED_FORM_OR_TAYLOR = 9  # the series if the closed form ends as REFUSED
-    GAUSS = 10  # Gauss collocation; GAUSS plus the number of stages, 1 to 8
-    SPACE_TORQUE = 19  # the series for a torque about the axes of space, with attitude
+    QUICK_OR_TAYLOR = 8  # QUICK or TAYLOR, whichever needs fewer operations
+    CLOSED_FORM_OR_TAYLOR = 9  # the Taylor series if the status of the closed form is REFUSED
+    GAUSS = 10  # Gauss collocation has the code GAUSS plus its number of stages, 1 to 8
+    SPACE_TORQUE = 19  # the Taylor series for a torque about the axes of space, with attitude
 
 
 class Places:
-    """Indices, from 0, of the quantities in the array that a prepared solver gives its kernel."""
+    """Indices, from 0, into the array of parameters that a prepared solver passes to its kernel.
+
+    A prepared solver solves one scene by one method, for many initial conditions.
+    """
 
     METHOD = 0
-    TOLERANCE = 1  # relative, of the methods that take one
-    STEP = 2  # s, of Gauss collocation and the methods with a fixed step
+    TOLERANCE = 1  # relative; for methods that have a tolerance
+    STEP = 2  # s; for Gauss collocation and the methods with a fixed step
     N_SINES = 3
     N_COSINES = 4
     COEFFICIENTS = 5  # three: A, B, C
-    CONSTANT = 8  # three, 1/s2
-    RATE = 11  # three, 1/s3
+    CONSTANT = 8  # three, 1/s2: constant term of torque over moment
+    RATE = 11  # three, 1/s3: its factor of time
     EFFORT = 14  # factor on the work limits
     COEFFICIENTS_LOW = 15  # three: exact minus rounded A, B, C, for the closed form
     MOMENTS = 18  # three, kg m2: for the closed form with attitude, and for a torque in space
@@ -55,7 +58,7 @@ class Places:
 
 
 class Series:
-    """Limits of the order and of the local tolerance of the Taylor method."""
+    """Limits of the order and of the local tolerance (error per step) of the Taylor method."""
 
     LEAST_ORDER = 12
     MOST_ORDER = 24
@@ -64,12 +67,12 @@ class Series:
 
 
 class Waves:
-    """The limit of our sine function in binary128 (`wide_functions.f90`)."""
+    """The largest angle, a power of 2, that our binary128 sine accepts (`wide_functions.f90`)."""
 
-    ANGLE_BITS = 60  # an angle must be below 2 to this power, rad; else its sine is NaN
+    ANGLE_BITS = 60  # the angle must be below 2**ANGLE_BITS rad; otherwise its sine is NaN
 
 
 class Blocks:
-    """The number of bodies that the compiled programs of the appendix process in parallel lanes."""
+    """The number of bodies that a compiled program of the thesis computes at once, as vectors."""
 
-    LANE_COUNT = 32  # enough that some registers can proceed while others wait
+    LANE_COUNT = 32  # several vector registers, so that some compute while others wait

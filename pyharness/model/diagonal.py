@@ -1,10 +1,10 @@
 """Diagonalisation of symmetric 3 x 3 matrices in integers, with high relative accuracy.
 
-A method in binary64 computes every eigenvalue with an error of some 1e-16 of the largest one. A
-small eigenvalue then has few correct digits or none. The elements of a matrix are binary64 numbers,
-and therefore integer multiples of one unit. Hence the determinant of a
-regular matrix has a lower bound, and so has its smallest eigenvalue. The bound determines how many
-bits the integers need.
+In binary64 the error of every eigenvalue is about 1e-16 times the largest eigenvalue. A small
+eigenvalue then has few correct digits or none. Integers avoid this error. The elements of a matrix
+are binary64 numbers, and therefore integer multiples of one unit, a power of 2. Hence the
+absolute determinant of a regular matrix is at least the cube of the unit, and its smallest absolute
+eigenvalue also has a lower bound. This bound determines how many bits the integers need.
 """
 
 import math
@@ -13,13 +13,13 @@ from fractions import Fraction
 
 Row = tuple[Fraction, Fraction, Fraction]
 
-# Bits of each eigenvalue. Twice the bits of a double-double number are not needed.
+# Least number of bits of an eigenvalue that is not 0. A double-double number has only 106 bits.
 _BITS = 128
 _PAIRS = ((0, 1), (0, 2), (1, 2))
-# Off-diagonal entries below 2 to this power, in units in the last place, are rounding error alone.
+# An off-diagonal element below 2**_NOISE, in units of its last bit, is only rounding error.
 _NOISE = 8
-# Each rotation removes the largest off-diagonal entry. The convergence is quadratic, so that about
-# ten rotations suffice.
+# Limit of the number of rotations. Each rotation makes the largest off-diagonal element 0. The
+# convergence is quadratic, so that about ten rotations suffice.
 _MOST_ROTATIONS = 500
 
 
@@ -30,8 +30,8 @@ class Diagonal:
     Attributes
     ----------
     values : tuple of three Fractions
-        The eigenvalues, each with a relative error of at most 2**-100. An eigenvalue that can not
-        be told from 0, because of rounding, is 0: the matrix is singular.
+        The eigenvalues, each with a relative error of at most 2**-100. An eigenvalue that is 0 up
+        to rounding errors is returned as 0; the matrix is then singular.
     vectors : tuple of three tuples of three Fractions
         `vectors[k]` is the eigenvector of the eigenvalue `values[k]`.
     """
@@ -43,7 +43,8 @@ class Diagonal:
 def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
     """Return the eigenvalues and eigenvectors of a symmetric 3 x 3 matrix of finite floats.
 
-    The method is Jacobi's. The eigenvalues of a diagonal matrix are its diagonal, in its order.
+    The method is Jacobi's. If the matrix is already diagonal, the eigenvalues are its diagonal
+    elements, in their order.
     """
     exponent = min((_last_bit(x) for row in matrix for x in row if x), default=0)
     whole = [[_in_unit(x, exponent) for x in row] for row in matrix]
@@ -68,10 +69,10 @@ def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
 
 
 def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: int) -> None:
-    """Rotate the matrix `a` and its vectors in place, so that element p, q of the matrix vanishes.
+    """Rotate the matrix `a` and the `vectors` in place, so that element p, q of `a` becomes 0.
 
-    The rotation is by the smaller of the two possible angles (Rutishauser 1966). The integers in
-    `vectors` are components in units of 2**-bits.
+    The rotation is about the axis other than p and q, by the smaller of the two possible angles
+    (Rutishauser 1966). The integers in `vectors` are components in units of 2**-bits.
     """
     r = 3 - p - q
     gap, twice = a[q][q] - a[p][p], 2 * a[p][q]

@@ -12,5 +12,8 @@ def version() -> str:
 
 
 def install_command(extra: str) -> str:
-    """Return the pip command that installs the optional packages of `extra`, as in ``plots``."""
+    """Return the pip command that installs a named group of optional packages.
+
+    `extra` is the name of the group in pyproject.toml, for example ``plots``.
+    """
     return f"pip install '{DISTRIBUTION}[{extra}]'"

@@ -1,7 +1,8 @@
-"""Work limits, and the option `effort` that raises them.
+"""Limits of the work of a computation, and the option `effort` that changes them.
 
-A limit counts work, for example steps times torque waves, and is chosen so that a method stops
-after some ten seconds. The option `effort` is a factor on all limits.
+Work is counted, for example, in steps times torque waves. A limit is chosen so that a method
+reaches it after some ten seconds. The option `effort` is a factor by which all limits are
+multiplied.
 """
 
 import math
@@ -13,28 +14,29 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, number
 
-_SLACK = 2.0  # safety factor of a forecast: the pace so far may not last
-_ROUNDING = 1.0 + 1e-9  # allows for the rounding of an effort that a message suggested
-_UNFORESEEN = 10.0  # factor on the effort where there is no forecast
-# The largest number of steps of a program without waves, some 30 s for the slowest program, and the
-# cost of a wave relative to such a step. The key "another word" is for the Python twin with another
-# word length than binary64. The keys "binary32" and "binary128" are for the compiled programs.
+_SLACK = 2.0  # safety factor on an estimate of the needed effort, which may be too low
+_ROUNDING = 1.0 + 1e-9  # tolerates the rounding of an effort that a message suggested
+_UNFORESEEN = 10.0  # factor on the present effort if the needed effort is not estimated
+# For each implementation two numbers: the largest number of steps of a program if the torque has no
+# waves (some 30 s for the slowest program), and the work for one wave relative to such a step. The
+# key "another word" is for a Python program in another arithmetic than binary64. The keys
+# "binary32" and "binary128" are for the compiled programs in these arithmetics.
 _LIMITS = {
     "fortran": (1e8, 1.0),
     "python": (5e5, 0.05),
     "another word": (5e4, 0.3),
     "binary32": (2e5, 0.1),
-    "binary128": (2e5, 10.0),  # with our sine, not the compiler's
+    "binary128": (2e5, 10.0),  # its waves take long, by our own sine function
 }
-# The same limit for the compiled programs on many bodies: steps summed over the bodies.
+# The largest number of steps of a compiled program on many bodies, summed over the bodies.
 _MOST_STEPS_OF_ALL = 1e9
 
 
 class Integrator(Protocol):
     """The type of a function that integrates a scene and returns a trajectory at requested times.
 
-    The times (s) are on one side of 0, in order away from 0. `tolerance` is relative to the largest
-    |omega|. `effort` is the factor on the work limit.
+    The times (s) have one sign, and their distance from 0 increases. `tolerance` is relative to the
+    largest component of omega. `effort` is the factor on the work limit.
     """
 
     def __call__(
@@ -44,9 +46,9 @@ class Integrator(Protocol):
 
 
 def checked_effort(effort: Number) -> float:
-    """Return the factor on the work limits as a float.
+    """Return `effort`, the user's factor on the work limits, as a float.
 
-    Raise InputError unless `effort` is a finite number above 0.
+    Raise InputError unless it is a finite number above 0.
     """
     value = number("effort", effort)
     if not 0.0 < value < math.inf:
@@ -55,11 +57,11 @@ def checked_effort(effort: Number) -> float:
 
 
 def advice(instead: str, effort: float, needed: float | None = None) -> str:
-    """Return the last part of a message about an exceeded work limit: what the user can do.
+    """Return the end of a message about an exceeded work limit, which says what the user can do.
 
-    `instead` is a remedy that keeps within the limit, as in "use fewer steps". `effort` is the
-    present factor on the limit, and `needed` is an estimate of the factor that the computation
-    takes, or None if there is no estimate.
+    `instead` is a remedy that does not exceed the limit, as in "use fewer steps". `effort` is the
+    present factor on the limit. `needed` is an estimate of the factor with which the computation
+    completes, or None if there is no estimate.
     """
     factor = suggested(effort, needed)
     return f"{instead}, or allow more work: --effort {factor} (effort={factor} in Python)"
@@ -69,7 +71,7 @@ def suggested(effort: float, needed: float | None = None) -> str:
     """Return, as text, a factor on the work limit that should suffice, rounded up to two digits.
 
     `effort` is the present factor, which did not suffice. `needed` is an estimate of the factor
-    that the computation takes; without one, the result is ten times `effort`.
+    with which the computation completes. Without an estimate the result is ten times `effort`.
     """
     factor = max(_SLACK * needed, effort) if needed else _UNFORESEEN * effort
     factor = min(1e300, factor)
@@ -79,15 +81,15 @@ def suggested(effort: float, needed: float | None = None) -> str:
 
 
 def waves(scene: Scene) -> int:
-    """Return the number of waves in the torque of a scene, which every step has to sum."""
+    """Return the number of waves, which are sine and cosine terms, in the torque of a scene."""
     return len(scene.torque.sines) + len(scene.torque.cosines)
 
 
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
     """Raise InputError if the run of a program on one scene would exceed its work limit.
 
-    `program` is a name for the message. `implementation` selects the limit, as in "fortran" or
-    "binary128". `effort` is the factor on the limit.
+    `program` is the name of the program, for the message. `implementation` is a key of `_LIMITS`
+    and selects the limit, as in "fortran" or "binary128". `effort` is the factor on the limit.
     """
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)
@@ -104,8 +106,8 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
     """Raise InputError if the run of a compiled program on many bodies would exceed the work limit.
 
-    `program` is a name for the message, `bodies` the number of bodies, and `effort` the factor on
-    the limit.
+    The work is the number of steps, summed over the bodies. `program` is the name of the program,
+    for the message. `bodies` is the number of bodies, and `effort` the factor on the limit.
     """
     cost = 1.0 + _LIMITS["fortran"][1] * waves(scene)
     needed = bodies * scene.steps * cost / _MOST_STEPS_OF_ALL

@@ -1,13 +1,14 @@
-"""Errors with messages of one line: what is wrong, where, and what is allowed."""
+"""Exceptions for users. Each message is one line: what is wrong, where, and what is allowed."""
 
 from collections.abc import Iterable
 
-# The most characters of a message. A longer message quotes long input, and is shortened.
+# The most characters of a message. A message is longer only if it quotes long input; it is then
+# shortened.
 _LONGEST = 900
 
 
 class InputError(ValueError):
-    """An error in the user's input; exit status 2 on the command line.
+    """The exception for an error in the user's input; the command then has exit status 2.
 
     The message is one line of printable characters, even if it quotes other text.
 
@@ -38,7 +39,8 @@ class InputError(ValueError):
 class TimedError(InputError):
     """An InputError whose message contains a time (s), as when a method reached its work limit.
 
-    The time is in the unit of the scene that was solved, which may have rescaled time.
+    The time is that of the scene that was integrated. This scene may be a copy of the user's scene
+    with rescaled time; `slower` then converts the time.
     """
 
     def __init__(self, message: str, time: float) -> None:
@@ -60,7 +62,7 @@ class TimedError(InputError):
 
 
 class NotBuiltError(RuntimeError):
-    """The error that the compiled extension is missing; exit status 3 on the command line.
+    """The exception for a missing compiled extension; the command then has exit status 3.
 
     Examples
     --------
@@ -75,9 +77,10 @@ class NotBuiltError(RuntimeError):
 
 
 def printable(text: str, kept: str = "") -> str:
-    r"""Return `text` with its control and other unprintable characters as escape sequences.
+    r"""Return `text` with its unprintable characters replaced by escape sequences.
 
-    The characters in `kept`, for example ``"\n\t"``, stay as they are.
+    Control characters are unprintable too. The characters in `kept`, for example ``"\n\t"``, are
+    not replaced.
     """
     if text.translate(dict.fromkeys(map(ord, kept))).isprintable():
         return text
@@ -87,9 +90,9 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def kind_of(value: object) -> str:
-    """Return the kind of a value in words, as in "a list", for an error message.
+    """Return the type of a value in words for an error message, for example "a list".
 
-    A value from a TOML file and the corresponding Python or NumPy value have the same kind.
+    The words are the same for a value from a TOML file and the corresponding Python or NumPy value.
     """
     kinds = {
         "text": (str, bytes, bytearray), "true or false": (bool,), "a whole number": (int,),
@@ -111,10 +114,11 @@ def kind_of(value: object) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return the InputError for a name that is not allowed, which suggests the closest allowed one.
+    """Return the InputError for a name that is not among the allowed names.
 
-    `what` is the kind of thing that `name` should denote, as in "case". `where` is put in front of
-    the message, and is the option or key with the name, as in "--fix".
+    Its message lists the allowed names, and suggests one that is similar to `name`, if there is
+    one. `what` says what `name` should denote, as in "case". `where` is the option or key to which
+    the name was given, as in "--fix"; the message begins with it.
     """
     import difflib
 

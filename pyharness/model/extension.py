@@ -1,4 +1,4 @@
-"""The compiled extension, and the status numbers that it shares with Python."""
+"""Access to the compiled Fortran extension, and the status integers that its kernels return."""
 
 from types import ModuleType
 from typing import Any
@@ -13,7 +13,7 @@ from pyharness.model.scene import Wave
 COMPLETE, STOPPED, OVERFLOW = Statuses.COMPLETE, Statuses.STOPPED, Statuses.OVERFLOW
 REFUSED, GAVE_UP, INTERRUPTED = Statuses.REFUSED, Statuses.GAVE_UP, Statuses.INTERRUPTED
 SENSITIVE = Statuses.SENSITIVE
-# The statuses in words, for users.
+# The statuses in words, for users; the index in the tuple is the integer of the status.
 ENDS = tuple(name.lower().replace("_", " ") for name in vars(Statuses) if name.isupper())
 
 
@@ -33,8 +33,8 @@ def extension() -> ModuleType:
 def columns(waves: tuple[Wave, ...], kind: type = float) -> NDArray[Any]:
     """Return n torque waves as an array for the kernels, shape (4, n), in Fortran order.
 
-    A column consists of the three amplitudes of a wave and its frequency (rad/s). `kind` is the
-    type of the numbers.
+    A column consists of the three amplitudes of a wave, one for each axis, and its frequency
+    (rad/s). `kind` is the type of the numbers in the array.
     """
     columns: NDArray[Any] = np.empty((4, len(waves)), dtype=kind, order="F")
     for index, (amplitude, frequency) in enumerate(waves):

@@ -1,6 +1,6 @@
 """Facts about the thesis from the TOML files in `pyharness/data`.
 
-Each file is read once, and names the source of its facts.
+Each file names the sources of its facts, and is read at most once in a process.
 """
 
 import tomllib
@@ -14,16 +14,19 @@ _FOLDER = _PACKAGE / "data"
 
 @cache
 def facts(name: str) -> dict[str, Any]:
-    """Return the content of ``data/<name>.toml``, which callers must not change."""
+    """Return the content of ``data/<name>.toml`` as a dictionary.
+
+    The dictionary is cached, so callers must not change it.
+    """
     with open(_FOLDER / f"{name}.toml", "rb") as file:
         return tomllib.load(file)
 
 
 def shipped(name: str) -> Path:
-    """Return the path of a project folder without Python code, as in ``fortran/original``.
+    """Return the path of a folder of the project outside the package, as in ``fortran/original``.
 
-    `name` is ``docs``, ``web`` or a folder in ``fortran``. An installed package contains all of
-    these but ``docs``. A checkout has them beside the package.
+    `name` is ``docs``, ``web`` or a folder in ``fortran``. An installed package contains these
+    folders in its folder ``data``, except ``docs``. In a checkout they are beside the package.
     """
     installed = _FOLDER / name
     return installed if installed.exists() else _PACKAGE.parent / name

@@ -1,8 +1,7 @@
-"""Elementary functions of floats and of numbers in other formats.
+"""Elementary functions of floats and of numbers in other floating-point formats.
 
-For floats the functions call the C library. Numbers of another word length
-(`pyharness.original.word`) have methods of their own, which round correctly to the nearest number
-of that word.
+For floats the functions call the C library. Numbers in other formats, such as that of the CDC, are
+instances of a class in `pyharness.original.word`. Its methods return the correctly rounded result.
 """
 
 import math
@@ -10,7 +9,7 @@ from typing import Any
 
 
 def is_finite(x: Any) -> bool:
-    """Return whether a number, of any format, is neither NaN nor infinite."""
+    """Return whether a number, in any floating-point format, is neither NaN nor infinite."""
     return math.isfinite(x) if isinstance(x, float) else x.is_finite
 
 
@@ -20,7 +19,7 @@ def square_root(x: Any) -> Any:
 
 
 def sine(angle: Any) -> Any:
-    """Return the sine of an angle (rad); NaN for an infinite float."""
+    """Return the sine of an angle (rad), or NaN if the angle is an infinite float."""
     if not isinstance(angle, float):
         return angle.sin()
     # Python raises an error for an infinite angle; Fortran, like IEEE 754, returns NaN.
@@ -28,7 +27,7 @@ def sine(angle: Any) -> Any:
 
 
 def cosine(angle: Any) -> Any:
-    """Return the cosine of an angle (rad); NaN for an infinite float."""
+    """Return the cosine of an angle (rad), or NaN if the angle is an infinite float."""
     if not isinstance(angle, float):
         return angle.cos()
     return math.cos(angle) if math.isfinite(angle) else math.nan

@@ -4,14 +4,15 @@ import sys
 import warnings
 from typing import Protocol
 
-# Modules whose frames come between the user's line and the scene that it creates.
+# Modules whose stack frames are between the user's call and the creation of the scene.
 _BETWEEN = ("copy", "dataclasses", "pyharness.model.scene", "pyharness.model.scene_file", __name__)
 
 
 class ImpossibleBodyWarning(UserWarning):
     """The warning that the moments of a body break the triangle inequality.
 
-    The largest moment exceeds the sum of the other two. The results are computed anyway.
+    The largest moment of inertia exceeds the sum of the other two. The results are nevertheless
+    computed.
 
     Examples
     --------
@@ -31,10 +32,10 @@ class _Body(Protocol):
 
 
 def warn_of_impossible(body: _Body) -> None:
-    """Warn if user code creates a body whose moments break the triangle inequality.
+    """Warn if user code creates a scene whose moments of inertia break the triangle inequality.
 
-    The warning names the line of the user's code. Scenes that the package itself creates cause no
-    warning.
+    `body` is the scene. The warning names the line of the user's code. Scenes that the package
+    itself creates cause no warning.
     """
     frame, level = sys._getframe(), 1
     while frame.f_back is not None and frame.f_globals.get("__name__") in _BETWEEN:

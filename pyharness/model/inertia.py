@@ -15,7 +15,7 @@ from pyharness.model.values import Triple, number_list, three
 
 Exact = tuple[Fraction, Fraction, Fraction]
 
-_ALIKE = 1e-12  # allowed difference of two elements that should be equal, relative to the largest
+_ALIKE = 1e-12  # allowed difference of elements that should be equal, over the largest element
 # The most by which rounding of the matrix may change a moment, relative to the largest moment.
 _ROUNDED = Fraction(1, 1 << 50)
 _KEPT = 256  # number of matrices whose principal frames are cached
@@ -30,11 +30,11 @@ class PrincipalFrame:
     moments, moments_low : tuple of three floats
         The moments rounded to nearest (kg m2), and the exact moments minus the rounded ones.
     axes : ndarray, shape (3, 3)
-        The axes in columns, rounded to nearest. They form a right-handed frame, the one nearest to
-        the body's own axes.
+        The axes in columns, rounded to nearest. They form a right-handed frame. Their order and
+        signs are chosen so that each axis is near to the body's own axis of the same number.
     exact_moments, exact_axes : tuples of Fractions
-        Moments (kg m2) and axes to some 38 digits. Each axis is a tuple of its components about
-        the body's own axes.
+        Moments (kg m2) and axes, correct to some 38 digits. Each axis is a tuple of its components
+        about the body's own axes.
     """
 
     moments: Triple
@@ -44,7 +44,7 @@ class PrincipalFrame:
     exact_axes: tuple[Exact, Exact, Exact]
 
     def into(self, vector: Exact) -> Exact:
-        """Transform a vector from components about the body's own axes to the principal axes."""
+        """Return a vector's principal components from its components about the body's axes."""
         first, second, third = (
             sum((x * v for x, v in zip(axis, vector, strict=True)), Fraction(0))
             for axis in self.exact_axes
@@ -53,7 +53,7 @@ class PrincipalFrame:
 
 
 def checked_inertia(where: str, values: object) -> Matrix:
-    """Return a user's inertia matrix (kg m2), made exactly symmetric.
+    """Return a user's inertia matrix (kg m2) as a tuple of rows, made exactly symmetric.
 
     Raise InputError, with `where` in front of the message, unless `values` are three rows of three
     finite numbers, symmetric up to rounding, with positive principal moments.
@@ -86,12 +86,13 @@ def checked_inertia(where: str, values: object) -> Matrix:
 def principal_frame(inertia: Matrix) -> PrincipalFrame:
     """Return the principal moments and axes of a symmetric inertia matrix (kg m2).
 
-    The moments are not sorted, because their axes are in the order of the nearest body axes. Every
-    moment is accurate to its last digit, however small it is relative to the others.
+    The moments are not sorted by size, because each principal axis has the number of the body axis
+    that it is nearest to. Every moment is accurate to its last digit, even if it is much smaller
+    than the others. The result is cached.
     """
     found = diagonalised(inertia)
     order: list[int] = []
-    # Each body axis takes the nearest of the remaining eigenvectors.
+    # To each body axis, the nearest of the remaining eigenvectors is assigned.
     for row in range(3):
         left = [k for k in range(3) if k not in order]
         order.append(max(left, key=lambda k: abs(found.vectors[k][row])))
@@ -112,8 +113,8 @@ def principal_frame(inertia: Matrix) -> PrincipalFrame:
 def principal_axes(inertia: Matrix) -> tuple[Triple, Array]:
     """Return the principal moments (kg m2) of an inertia matrix, and its principal axes.
 
-    The axes are the columns of a (3, 3) array. They form a right-handed frame, the one nearest to
-    the body's own axes.
+    The axes are the columns of a (3, 3) array. They form a right-handed frame. Their order and
+    signs are chosen so that each axis is near to the body's own axis of the same number.
     """
     found = principal_frame(inertia)
     return found.moments, found.axes.copy()
@@ -122,8 +123,8 @@ def principal_axes(inertia: Matrix) -> tuple[Triple, Array]:
 def breaks_triangle(inertia: Matrix) -> bool:
     """Return whether the largest principal moment exceeds the sum of the other two.
 
-    In a flat body the largest moment equals this sum. An excess that the rounding of the matrix may
-    have caused does not count.
+    In a flat body the largest moment equals this sum. An excess that may only be due to rounding
+    errors of the matrix elements is ignored.
     """
     low, middle, high = sorted(principal_frame(inertia).exact_moments)
     return high - low - middle > _ROUNDED * high
@@ -134,7 +135,7 @@ def _turned(axis: Exact) -> Exact:
 
 
 def _determinant(axes: list[Exact]) -> float:
-    """Return the determinant of three orthonormal axes, as a float since its sign is enough."""
+    """Return the determinant, 1 or -1, of three orthonormal axes; floats suffice for its sign."""
     (a, b, c), (d, e, f), (g, h, k) = ([float(x) for x in axis] for axis in axes)
     return a * (e * k - f * h) - b * (d * k - f * g) + c * (d * h - e * g)
 

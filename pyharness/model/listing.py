@@ -1,7 +1,8 @@
 """Listings: programs of the thesis with a choice of their defects, readings and conjectures.
 
-A defect is a mistake of the printed program, and a reading an interpretation of a doubtful card. A
-conjecture is an assumption about a statement for which no card exists.
+A card has one line of a program. A defect is a mistake of the printed program, and a reading is an
+interpretation of a doubtful card. A conjecture is an assumption about a statement for which no card
+exists.
 """
 
 from collections.abc import Iterable, Set
@@ -27,9 +28,9 @@ class Listing:
     defects : frozenset of str
         The active defects, which are mistakes of the printed program that are not corrected.
     readings : frozenset of str
-        The active readings. An active reading interprets an original statement in the way that the
-        edition does not adopt. A corrected program has no readings, since no reading changes a
-        corrected statement.
+        The active readings. An active reading interprets an original statement in the way that this
+        edition of the programs does not adopt. A corrected program has no readings, because no
+        reading changes a corrected statement.
     conjectures : frozenset of str
         The active assumptions about statements for which no card exists. Names of conjectures and
         readings are also accepted among `defects`.
@@ -64,7 +65,7 @@ class Listing:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Sort the given names by kind; raise InputError for a name that the program lacks."""
+        """Assign each name to its kind; raise InputError for a name that the program lacks."""
         _check_program(self.program)
         given = {field: _names(field, getattr(self, field)) for field in _FIELDS.values()}
         for kind in ("reading", "conjecture"):
@@ -82,8 +83,8 @@ class Listing:
     def label(self) -> str:
         """The kind of listing, as text: `original`, `corrected` or `custom`.
 
-        It is `corrected` if no name is active, and `original` if the names that `switches` returns
-        are active, with any readings.
+        The label is `corrected` if no name is active. It is `original` if, apart from readings,
+        exactly the names that `switches` returns are active. It is `custom` otherwise.
         """
         if not self.active:
             return "corrected"
@@ -98,7 +99,7 @@ class Listing:
 
     @property
     def flags(self) -> int:
-        """The active names as an integer, the bit mask that the Fortran programs read."""
+        """The active names as the bit mask, an integer, that the compiled programs take."""
         return sum(1 << entry["flag"] for entry in flagged() if entry["id"] in self.active)
 
     def has(self, name: str) -> bool:
@@ -107,9 +108,10 @@ class Listing:
 
 
 def flagged() -> list[dict[str, Any]]:
-    """Return the entries of the apparatus that have a flag, which is a bit of `Listing.flags`.
+    """Return the entries of the critical apparatus that a listing can switch on or off.
 
-    They are the defects, readings and conjectures. Each entry is a table of `apparatus.toml`.
+    They are the defects, readings and conjectures. Each entry is a table of `data/apparatus.toml`,
+    and its key "flag" is the number of its bit in `Listing.flags`.
     """
     return [entry for entry in facts("apparatus")["entry"] if "flag" in entry]
 
@@ -117,7 +119,8 @@ def flagged() -> list[dict[str, Any]]:
 def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
     """Return the names of all defects, of all readings or of all conjectures.
 
-    `kind` is "defect", "reading" or "conjecture". With `program`, only its names are returned.
+    `kind` is "defect", "reading" or "conjecture". If `program` is given, only the names that this
+    program has are returned.
     """
     return tuple(
         entry["id"]
@@ -127,9 +130,10 @@ def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
 
 
 def switchable(program: str | None = None) -> tuple[str, ...]:
-    """Return the names of all defects, readings and conjectures, which --fix and --keep accept.
+    """Return the names of all defects, readings and conjectures, in this order.
 
-    The defects come first. With `program`, only its names are returned.
+    The options --fix and --keep accept these names. If `program` is given, only the names that this
+    program has are returned.
     """
     return tuple(name for kind in _FIELDS for name in names_of(kind, program))
 
@@ -137,7 +141,8 @@ def switchable(program: str | None = None) -> tuple[str, ...]:
 def switches(program: str) -> tuple[str, ...]:
     """Return the names that are active in the original program: its defects and some conjectures.
 
-    A conjecture is active in the original if the apparatus marks it as `in_original`.
+    A conjecture is active in the original if its entry in `data/apparatus.toml` has the key
+    `in_original`, with the value true.
     """
     return tuple(
         entry["id"]
@@ -150,13 +155,13 @@ def switches(program: str) -> tuple[str, ...]:
 def original(program: str, readings: Iterable[str] = ()) -> Listing:
     """Return the listing of the original program, with all its defects active.
 
-    Its own conjectures are active too, and so are the names in `readings`.
+    The conjectures that `switches` returns, and the given `readings`, are active too.
     """
     return Listing(program, frozenset(switches(program)), frozenset(readings))
 
 
 def corrected(program: str) -> Listing:
-    """Return the listing of the corrected program, in which no name is active."""
+    """Return the listing of the corrected program, without defects, readings or conjectures."""
     return Listing(program, frozenset())
 
 
@@ -169,7 +174,10 @@ def subset(
     readings: Iterable[str] = (),
     conjectures: Iterable[str] | None = None,
 ) -> Listing:
-    """Return the listing that the options of the command line describe.
+    """Return the listing of a program with a selection of defects, readings and conjectures.
+
+    The parameters correspond to the options --program, --listing (`base`), --fix, --keep, --reading
+    and --conjecture of the command line.
 
     Parameters
     ----------
@@ -179,11 +187,11 @@ def subset(
         The listing to start from. The default is `corrected` if `keep` has names and `fix` has no
         names, else `original`.
     fix, keep : iterable of str
-        The names (defects, readings or conjectures) to correct, and the names to keep active.
+        Names of defects, readings or conjectures: those to correct, and those to keep active.
     readings : iterable of str
-        The readings to activate; an active reading replaces the adopted one. A corrected statement
-        has its intended form under every reading. If the base is `corrected`, only `keep` therefore
-        activates a reading.
+        The readings to activate; an active reading replaces the adopted one. If the base is
+        `corrected`, only `keep` activates a reading, because a corrected statement has its intended
+        form under every reading.
     conjectures : iterable of str, optional
         The assumptions to make where no card exists, or ``none`` for no assumption. The default is
         the conjectures of the listing that `original` returns. If the base is `corrected`, only
@@ -238,7 +246,7 @@ def subset(
 
 
 def checked_listing(listing: object) -> Listing:
-    """Return the argument `listing`; raise InputError if it is not a Listing."""
+    """Return the user's argument `listing`, or raise InputError if it is not a Listing."""
     if isinstance(listing, Listing):
         return listing
     raise InputError(f"listing is {kind_of(listing)}; it must be a Listing, as subset makes one")

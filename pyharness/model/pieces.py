@@ -1,4 +1,4 @@
-"""Computations for many bodies, divided into pieces that threads process."""
+"""Division of a computation for many bodies into ranges of bodies, which threads process."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-# Bodies in a piece: some milliseconds of work, after which Python checks for a signal.
+# The most bodies in a piece. They take some milliseconds, after which Python checks for a signal.
 _PIECE = 1 << 18
-# The fewest bodies for which a further thread is worth its cost.
+# The fewest bodies per thread. With fewer, a further thread costs more time than it saves.
 _SMALL = 256
 
 
@@ -19,13 +19,14 @@ def share(
     threads: int,
     given_up: NDArray[np.int32],
 ) -> None:
-    """Call `work` for each piece, a range of bodies, in at most `threads` threads.
+    """Call `work` for each of `pieces`, which are ranges of bodies, in at most `threads` threads.
 
-    `given_up` is an array of one number, 0, which the kernels poll. An exception, for example after
-    Ctrl-C, sets it to 1, so that the kernels in all threads end.
+    `given_up` is an array of one integer, 0 at first, which the kernels that `work` calls poll. It
+    is set to 1 if an exception is raised, for example after Ctrl-C. The kernels in all threads then
+    end early.
     """
     if threads == 1 or len(pieces) < 2:
-        # The work is done in this thread and in no other, because Python delivers signals here.
+        # The work is done in the calling thread, because only the main thread receives signals.
         for piece in pieces:
             work(piece)
         return
@@ -35,7 +36,7 @@ def share(
             for job in jobs:
                 job.result()
         except BaseException:
-            # Signals don't reach the other threads.
+            # Only the main thread receives signals; the others poll this number.
             given_up[0] = 1
             pool.shutdown(cancel_futures=True)
             raise
@@ -44,9 +45,9 @@ def share(
 def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, threads: int) -> None:
     """Divide n bodies into pieces, and call `work` for each piece in at most `threads` threads.
 
-    `work` takes a piece, which is a slice of the bodies, and an array of one number. The number
-    becomes 1 after an interrupt by the user, and the work should then end. All pieces have nearly
-    the same size, so that no thread waits long for another.
+    `work` takes a piece, which is a slice of the bodies, and an array of one integer. The integer
+    is set to 1 after an exception, such as an interrupt by the user, and `work` should then end.
+    All pieces have nearly the same size, so that all threads end at nearly the same time.
     """
     if not n:
         return

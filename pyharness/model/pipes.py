@@ -16,7 +16,7 @@ def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) 
     """Return the content of a file that a user named.
 
     All files that users name are read by this function. The file may be a regular file, or a pipe
-    (among them ``/dev/stdin``) with a writer.
+    (for example ``/dev/stdin``) to which another process writes.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) 
     ------
     InputError
         For a file that can't be read, a folder, a device, a file larger than `limit`, or a pipe
-        that stays silent for `PATIENCE` seconds.
+        that delivers no data for `PATIENCE` seconds.
     """
     try:
         content = _read(os.fspath(path), limit)
@@ -46,9 +46,10 @@ def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) 
 
 
 def _read(path: str, limit: int) -> bytes:
-    """Return a file's content, at most `limit` + 1 bytes; raise OSError if it can't be read.
+    """Return the first `limit` + 1 bytes of a file, or all if it has fewer bytes.
 
-    The additional byte shows that the file is larger than `limit`.
+    If the result has more than `limit` bytes, the file is too large. Raise OSError if the file
+    can't be read.
     """
     # Without O_NONBLOCK, opening a pipe waits for a writer.
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
@@ -72,9 +73,9 @@ def _read(path: str, limit: int) -> bytes:
 
 
 def _is_quiet(handle: int) -> bool:
-    """Return whether an open character device, the file descriptor `handle`, may be read.
+    """Return whether the open file `handle` is one of the character devices that may be read.
 
-    A terminal and the null device may be read.
+    These are terminals and the null device. `handle` is the file descriptor of a character device.
     """
     return os.isatty(handle) or os.fstat(handle).st_rdev == os.stat(os.devnull).st_rdev
 

@@ -1,4 +1,4 @@
-"""Transformation of a scene to the principal axes of its body, and of its results back."""
+"""Transformation of scenes to principal axes, and of the results back to the body's own axes."""
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -15,27 +15,27 @@ from pyharness.model.waves import exact_law
 
 @dataclass(frozen=True)
 class PrincipalScene(Scene):
-    """A scene about principal axes, whose moments are known in double-double precision.
+    """A scene in components about principal axes, with moments in double-double precision.
 
-    A, B, C of equations 13-15 are computed from the moments in double-double precision, because
-    rounding errors of nearly equal moments would be a large part of their difference. `moments_low`
-    is the exact moments minus `moments` (kg m2).
+    The coefficients A, B, C of Euler's equations (13-15 of the thesis) contain differences of
+    moments. If two moments are nearly equal, rounding errors in binary64 would be a large part of
+    their difference. `moments_low` is the exact moments minus `moments` (kg m2).
     """
 
     moments_low: Triple = (0.0, 0.0, 0.0)
 
     @property
     def exact_moments(self) -> Exact:
-        """The principal moments (kg m2), as fractions with double-double precision."""
+        """The sums of `moments` and `moments_low` (kg m2) as exact fractions."""
         pairs = zip(self.moments or (), self.moments_low, strict=True)
         first, second, third = (Fraction(high) + Fraction(low) for high, low in pairs)
         return first, second, third
 
     @cached_property
     def euler_coefficients(self) -> Triple:
-        """The coefficients A, B, C of equations 13-15, without unit.
+        """The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
 
-        Each coefficient is computed exactly from the moments, and then rounded once.
+        Each coefficient is computed exactly from `exact_moments`, and then rounded once.
         """
         i1, i2, i3 = self.exact_moments
         exact = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
@@ -44,7 +44,7 @@ class PrincipalScene(Scene):
 
 
 def principal(scene: Scene) -> tuple[Scene, Array]:
-    """Return a scene about the principal axes of its body, and the axes themselves.
+    """Return a scene in components about the principal axes of its body, and these axes.
 
     Parameters
     ----------
@@ -55,17 +55,18 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
     Returns
     -------
     scene : Scene
-        The same problem about the principal axes, with `moments` in place of `inertia`. Its
-        `attitude` is the attitude of the principal axes. A torque about the axes of space is
-        unchanged; the attitude then has a value even if `scene` has none.
+        The same problem in components about the principal axes, with `moments` instead of
+        `inertia`. Its `attitude` is the attitude of the principal axes. A torque about the axes of
+        space is unchanged. With such a torque the result has an attitude even if `scene` has none.
     axes : ndarray, shape (3, 3)
         The principal axes in columns, as components about the body's own axes. They form a
-        right-handed frame, the one nearest to the body's own axes.
+        right-handed frame. Their order and signs are chosen so that each axis is near to the body's
+        own axis of the same number.
 
     Raises
     ------
     InputError
-        If a torque has waves of one frequency whose amplitudes have a sum beyond the range of
+        If amplitudes of the torque's waves of one frequency have a sum beyond the range of
         binary64.
 
     Examples
@@ -112,8 +113,8 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
 def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
     """Return a trajectory about principal axes, transformed back to the body's own axes.
 
-    `found` is the trajectory of the scene that `principal` returns, and `axes` the array of
-    principal axes, shape (3, 3), that `principal` returns with it.
+    `found` is a trajectory of the scene that `principal` returned. `axes` is the array of principal
+    axes, shape (3, 3), that `principal` returned with this scene.
     """
     attitude = found.attitude
     if attitude is not None:

@@ -3,7 +3,11 @@
 from collections.abc import Callable
 
 Progress = Callable[[int, int, str], None]
-"""A function with three arguments: the numbers of completed and of all parts, the current part."""
+"""The type of a function that is called as a computation completes its parts.
+
+Its arguments are the number of completed parts, the number of all parts, and the name of the part
+that is computed next.
+"""
 
 
 def no_progress(done: int, total: int, what: str) -> None:

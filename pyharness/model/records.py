@@ -1,4 +1,4 @@
-"""Dictionaries for JSON output: of a scene, a listing, the end of a run and the installation."""
+"""Dictionaries for JSON output that describe a scene, a listing, a run or the installation."""
 
 from dataclasses import asdict
 from typing import Any
@@ -13,7 +13,8 @@ from pyharness.model.trajectory import Trajectory
 def scene_record(scene: Scene) -> dict[str, Any]:
     """Return a scene as a dictionary for JSON.
 
-    It has the tables and keys of a scene file, and in addition the number of the case in Table 1.
+    It has the tables and keys of a scene file. In addition it has the key "case", the number of the
+    scene's case in Table 1 of the thesis, or None.
     """
     body, values = body_of(scene)
     return {
@@ -43,7 +44,7 @@ def _wave(wave: Wave) -> dict[str, Any]:
 def listing_record(listing: Listing) -> dict[str, Any]:
     """Return a listing as a dictionary for JSON.
 
-    It has the label of the listing and its active defects, readings and conjectures.
+    It has the listing's label, and the names of its active defects, readings and conjectures.
     """
     return {
         "label": listing.label,
@@ -56,8 +57,9 @@ def listing_record(listing: Listing) -> dict[str, Any]:
 def ending_record(trajectory: Trajectory) -> dict[str, Any]:
     """Return how a run ended, as a dictionary for JSON.
 
-    It has the number of steps, the number of evaluated right-hand sides, the point at which the
-    Lipschitz test stopped the run (or None), and the status, as in "complete".
+    Its keys are "steps", "evaluations" (of the right-hand side), "stop" and "ended". "stop" has the
+    step, variable and quotient with which the Lipschitz test stopped the run, or is None. "ended"
+    is the status in words, as in "complete".
     """
     stop = trajectory.stop
     return {
@@ -71,8 +73,8 @@ def ending_record(trajectory: Trajectory) -> dict[str, Any]:
 def estimate_record(trajectory: Trajectory) -> dict[str, float | None]:
     """Return a method's own estimates of its accuracy, as a dictionary for JSON.
 
-    It has the relative error, the error amplification ("growth") and the number of correct decimal
-    digits. A value that is not known is None.
+    Its keys are "error" (relative), "growth" (error amplification) and "digits" (number of correct
+    decimal digits). A value that is not known is None.
     """
     return {name: getattr(trajectory, name) for name in ("error", "growth", "digits")}
 

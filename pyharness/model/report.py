@@ -1,7 +1,7 @@
 """Reports: the results of a verb (subcommand) as data, which `pyharness.views` renders.
 
-The types are named tuples, where other modules have dataclasses. They are created at every cold
-start, and creating one dataclass takes as long as creating five named tuples.
+The types are named tuples and not dataclasses, because they are created whenever the program
+starts. The creation of a dataclass takes as long as that of five named tuples.
 """
 
 import math
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 
 def exact(value: Any) -> str:
-    """Return a value as text in full, for CSV.
+    """Return a value as text with all its digits, for CSV.
 
-    A float has so many digits that it round-trips, and None becomes an empty text.
+    A float has as many digits as are needed to restore it exactly. None becomes an empty text.
     """
     if isinstance(value, float):
         return float.__repr__(value)  # the repr of a NumPy float names its type
@@ -57,20 +57,21 @@ def counted(number: int, what: str) -> str:
 class Column(NamedTuple):
     """A column of a table: its heads, its unit, and the functions that format its values.
 
-    `head` and `write` are used in formatted output, `name` and `full` in CSV.
+    In formatted output `head` is the head, and `write` formats the values. In CSV `name` is the
+    head, and `full` formats the values.
     """
 
     head: str
     write: Callable[[Any], str] = plain
-    left: bool = False  # words are aligned left, numbers right
-    unit: str = ""  # of the values in full; `write` may scale them
-    name: str = ""  # head in CSV; if empty, `head`
+    left: bool = False  # whether the values are aligned left; numbers are aligned right
+    unit: str = ""  # of the values, as CSV has them; `write` may convert them
+    name: str = ""  # head in CSV; if empty, `head` is used
     full: Callable[[Any], str] = exact
-    fit: str = ""  # "wrap" or "cut": treatment of a last column that is too wide
+    fit: str = ""  # "wrap" or "cut": what is done with a last column that is too wide
 
 
 def words(heads: str) -> list[Column]:
-    """Return a left-aligned column of words for each head; `heads` are separated by blanks."""
+    """Return a left-aligned column for each head in the text `heads`, separated by blanks."""
     return [Column(head, left=True) for head in heads.split()]
 
 
@@ -84,11 +85,11 @@ class Table(NamedTuple):
     rows: "Sequence[Sequence[Any]] | Array"
 
     def written(self) -> list[list[str]]:
-        """Return the heads and all rows as text, with formatted numbers."""
+        """Return the heads and all rows as text, with formatted (rounded) numbers."""
         return self._cells([(each.head, each.write) for each in self.columns])
 
     def in_full(self) -> list[list[str]]:
-        """Return the heads and all rows as text, with numbers in full, for CSV."""
+        """Return the heads and all rows as text, with all digits of the numbers, for CSV."""
         return self._cells([(each.name or each.head, each.full) for each in self.columns])
 
     def _cells(self, columns: list[tuple[str, Callable[[Any], str]]]) -> list[list[str]]:
@@ -98,7 +99,7 @@ class Table(NamedTuple):
 
 
 def numbers(names: str, rows: Sequence[Sequence[Any]]) -> Table:
-    """Return a table for CSV only; `names` are its heads, separated by blanks."""
+    """Return a table of `rows` for CSV only; `names` has its heads, separated by blanks."""
     return Table([Column(name) for name in names.split()], rows)
 
 
@@ -115,15 +116,15 @@ class Field(NamedTuple):
     text: str
 
 
-# Paragraphs and tables without blank lines between them. Blank lines separate sections.
+# A section is a list of paragraphs and tables. Blank lines are only written between sections.
 Section = Sequence[str | Field | Table]
 
 
 class Picture:
-    """A picture: a matplotlib figure, the table of its numbers, and the paragraphs of its title."""
+    """A matplotlib figure, the table of the numbers that it shows, and its title in paragraphs."""
 
     def __init__(self, figure: "Figure", numbers: Table, title: Sequence[str] = ()) -> None:
-        """Store the figure, the table of its numbers and its title."""
+        """Store the figure, the table of the numbers that it shows, and its title."""
         self.figure, self.numbers, self.title = figure, numbers, title
 
 
@@ -132,7 +133,7 @@ Case = tuple[str, str, str, str]
 
 
 class Report(NamedTuple):
-    """The results of a verb as data for every output format."""
+    """The results of a verb (subcommand) as data, from which every output format is written."""
 
     title: str  # the verb that made the report
     text: Sequence[Section]  # for the terminal; empty sections are skipped

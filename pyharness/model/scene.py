@@ -1,4 +1,7 @@
-"""Scenes: a body, a torque law, initial conditions and steps; every value is checked once."""
+"""Scenes, which are problems to solve: a body, a torque law, initial conditions and steps.
+
+Every value is checked when a scene is created.
+"""
 
 import itertools
 import math
@@ -29,13 +32,14 @@ if TYPE_CHECKING:
     from pyharness.model.inertia import Exact
 
 Wave = tuple[Triple, float]  # amplitude per axis, frequency in rad/s
-# Accepted forms of the waves of a law: pairs of three amplitudes and a frequency.
+# The waves of a torque law as a user gives them: pairs of three amplitudes and a frequency.
 Waves = Iterable[tuple[Numbers, Number]]
 
-# The bytes of a result row (eight binary64 numbers and the error code IER), which is stored twice:
-# in the kernel and in the trajectory.
+# The bytes of memory for the results of a step: eight binary64 numbers and the error code IER. They
+# are stored twice, in the kernel and in the trajectory.
 _BYTES_PER_STEP = 2 * (8 * 8 + 4)
-# The compiled programs count steps and right-hand sides, at most five per step, in 32 bits.
+# The compiled programs count steps and right-hand sides in 32 bits. A step evaluates at most five
+# right-hand sides.
 _COUNTABLE_STEPS = 400_000_000
 _LONGEST_NAME = 60
 FULL_INERTIA = (
@@ -55,9 +59,9 @@ class TorqueLaw:
 
     N(t) = constant + rate t + sum of amplitude sin(frequency t) + sum of amplitude cos(frequency t)
 
-    The unit is N m for a body with moments or inertia, and 1/s2 (torque over moment) for a body
-    with coefficients. Three numbers may be a list, a tuple or an array; the fields are plain tuples
-    of floats.
+    The unit of N is N m for a body with moments or inertia. It is 1/s2 (torque over moment) for a
+    body with coefficients. Three numbers may be a list, a tuple or an array; the fields of the law
+    are plain tuples of floats.
 
     Parameters
     ----------
@@ -123,9 +127,9 @@ class TorqueLaw:
 
     @property
     def in_space(self) -> bool:
-        """Whether the torque is not zero and is about the axes of space.
+        """Whether the torque is not zero and its components are about the axes of space.
 
-        Then omega depends on the attitude.
+        Under such a torque omega depends on the attitude.
         """
         return self.frame == "space" and not self.is_zero
 
@@ -161,18 +165,18 @@ class Scene:
     moments : three numbers, optional
         The principal moments of inertia (kg m2).
     coefficients : three numbers, optional
-        A, B, C of equations 13-15, without unit.
+        The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
     torque : TorqueLaw
         The torque on the body; zero by default.
     step_size : float
         The step size of the programs and of methods with a fixed step (s).
     steps : int
-        The number of steps.
+        The number of steps of a program.
     masses, forces : three numbers
-        The mass (kg) and force (N) in the equation of each velocity component, which the programs
-        integrate too. The defaults are the numbers on the cards of the programs.
+        The masses (kg) and forces (N) in the equations of the three velocity components, which the
+        programs integrate too. The defaults are the numbers in the printed programs.
     case : int, optional
-        The number of the case in Table 1, if the scene is one of these.
+        The number of the case in Table 1 of the thesis, if the scene is one of these cases.
     attitude : four numbers, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
     inertia : three rows of three numbers, optional
@@ -225,7 +229,7 @@ class Scene:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Convert the values, and raise InputError for a scene that no method can run."""
+        """Check the values and convert them to floats; raise InputError for an invalid value."""
         if not isinstance(self.name, str):
             raise InputError(f"name is {kind_of(self.name)}; it must be text")
         self._set("name", printable(" ".join(self.name.split()))[:_LONGEST_NAME].rstrip())
@@ -281,9 +285,10 @@ class Scene:
 
     @property
     def euler_coefficients(self) -> Triple:
-        """The coefficients A, B, C of equations 13-15, without unit.
+        """The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
 
-        A full inertia matrix raises InputError.
+        A is (I2 - I3)/I1; B and C follow by cyclic permutation. Raise InputError if the scene has a
+        full inertia matrix.
         """
         if self.coefficients is not None:
             return self.coefficients
@@ -296,7 +301,7 @@ class Scene:
     def exact_moments(self) -> "Exact | None":
         """The principal moments (kg m2) as exact fractions, or None if only A, B, C are known.
 
-        A full inertia matrix raises InputError.
+        Raise InputError if the scene has a full inertia matrix.
         """
         if self.coefficients is not None:
             return None
@@ -310,12 +315,12 @@ class Scene:
 
     @property
     def moments_low(self) -> Triple:
-        """The exact principal moments minus `moments` (kg m2): 0, since users give floats."""
+        """The exact moments minus `moments` (kg m2); 0 except in the subclass `PrincipalScene`."""
         return 0.0, 0.0, 0.0
 
     @property
     def is_impossible(self) -> bool:
-        """Whether no body can have the moments, as the largest exceeds the sum of the other two."""
+        """Whether no rigid body has these moments: the largest exceeds the sum of the other two."""
         if self.inertia is not None:
             from pyharness.model.inertia import breaks_triangle
 
@@ -329,29 +334,32 @@ class Scene:
     def body_torque(self) -> TorqueLaw:
         """The torque law about the axes of the body.
 
-        A torque about the axes of space raises InputError. Therefore code that can not treat such a
-        torque reads the law from this property, and not from `torque`.
+        Raise InputError if the torque is about the axes of space. Code that cannot treat such a
+        torque therefore reads this property instead of `torque`.
         """
         if self.torque.in_space:
             raise InputError(SPACE_TORQUE)
         return self.torque
 
     def times(self) -> list[float]:
-        """Return the times (s) of a program's results, which are multiples of the step size.
+        """Return the times (s) of a program's results, one for each step.
 
         They are n times the step size, for n from 1 to the number of steps.
         """
         return [n * self.step_size for n in range(1, self.steps + 1)]
 
     def normalized_torque(self, time: float) -> Triple:
-        """Return M = N / I at `time` (s), the torque components over the moments (1/s2)."""
+        """Return the torque over the moments, M = N / I, at `time` (s): three components (1/s2).
+
+        If the body has coefficients instead of moments, its torque law is already M.
+        """
         first, second, third = self.body_torque.at(time)
         if self.moments is None:
             return first, second, third
         return first / self.moments[0], second / self.moments[1], third / self.moments[2]
 
     def right_hand_side(self) -> Callable[[float, Sequence[float]], list[float]]:
-        """Return the right-hand side f(t, omega) of equations 16-18.
+        """Return the right-hand side f(t, omega) of Euler's equations (16-18 of the thesis).
 
         The arguments of f are a time (s) and omega (rad/s). It returns three plain floats (rad/s2).
         """
@@ -374,13 +382,16 @@ class Scene:
 
 
 def most_steps() -> int:
-    """Return the largest number of steps of a run whose results fit in half of the memory."""
+    """Return the largest number of steps whose results fit in half of this machine's memory.
+
+    It is at most 400 million, because the compiled programs count in 32 bits.
+    """
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return min(memory // 2 // _BYTES_PER_STEP, _COUNTABLE_STEPS)
 
 
 def _size(steps: int, limit: int) -> str:
-    # Python integers have no bound, but Python refuses to format or convert one of many digits.
+    # Python refuses to format an integer of several thousand digits.
     if abs(steps) > 10**18:
         return "a number of more than 18 digits"
     size = f" (it would need {steps * _BYTES_PER_STEP / 1e9:.3g} GB)"
@@ -390,8 +401,8 @@ def _size(steps: int, limit: int) -> str:
 def checked_scene(scene: object, any_axes: bool = False, any_torque: bool = False) -> Scene:
     """Return the argument `scene`; raise InputError unless it is a Scene that the caller accepts.
 
-    With `any_axes` the scene may have a full inertia matrix. With `any_torque` its torque may be
-    about the axes of space.
+    A full inertia matrix is accepted if `any_axes` is true. A torque about the axes of space is
+    accepted if `any_torque` is true.
     """
     if isinstance(scene, Scene):
         if scene.torque.in_space and not any_torque:

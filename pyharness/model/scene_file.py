@@ -1,4 +1,4 @@
-"""Scenes of the cases of Table 1 of the thesis, and scenes in TOML files that users write."""
+"""Scenes for the cases of Table 1 of the thesis, and scenes in TOML files that users write."""
 
 import os
 import tomllib
@@ -25,7 +25,7 @@ _WAVES = ("sines", "cosines")
 
 
 def case_numbers() -> list[int]:
-    """Return the numbers of the cases of Table 1."""
+    """Return the numbers of the cases of Table 1 of the thesis."""
     return [entry["number"] for entry in facts("cases")["case"]]
 
 
@@ -40,7 +40,7 @@ def case_scene(number: SupportsIndex) -> Scene:
     Returns
     -------
     Scene
-        The case, with the step size and the number of steps on the cards of the programs.
+        The case, with the step size (0.01 s) and the number of steps (100) that all cases share.
 
     Raises
     ------
@@ -71,18 +71,18 @@ def case_scene(number: SupportsIndex) -> Scene:
 
 
 def read_scene(path: str | os.PathLike[str]) -> Scene:
-    """Return the scene of a TOML file.
+    """Return the scene that a TOML file describes.
 
     Parameters
     ----------
     path : str or path
-        The path of the file, of at most 1 000 000 bytes. Without a ``name`` in the file, the scene
-        has the file's name without its suffix.
+        The path of the file, of at most 1 000 000 bytes. If the file has no key ``name``, the
+        scene's name is the file's name without its suffix.
 
     Returns
     -------
     Scene
-        The scene that the file describes.
+        The scene, with all its values checked.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
     """Return the scene that the content of a scene file describes.
 
-    `default_name` is the name of the scene if the file has no ``name``. Raise InputError, with
+    `default_name` is the name of the scene if the file has no key ``name``. Raise InputError, with
     `where` in front of the message, if the content is invalid.
     """
     data = toml_of(content, where)
@@ -118,7 +118,8 @@ def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
 def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
     """Return the data of a user's TOML file as a dictionary.
 
-    Raise InputError, with `where` in front of the message, if it can't be read or is not TOML.
+    Raise InputError, with `where` in front of the message, if the file can't be read or is not
+    TOML.
     """
     return toml_of(read_file(path, where), where)
 
@@ -127,7 +128,7 @@ def read_file(path: str | os.PathLike[str], where: str) -> bytes:
     """Return the bytes of a user's TOML file.
 
     Raise InputError, with `where` in front of the message, if the file can't be read. A caller that
-    needs the bytes twice has to keep them, because a pipe can be read only once.
+    needs the bytes twice must store them, because a pipe can be read only once.
     """
     return read_input(path, where, _LARGEST_FILE, "a TOML file")
 
@@ -150,8 +151,9 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
 def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     """Return a scene as the text of a scene file, from which `read_scene` restores the scene.
 
-    The restored numbers are bit-for-bit identical. Masses, forces and the number of the case have
-    no place in a scene file. `comments` are lines at the head of the text.
+    The restored numbers are bit-for-bit identical. Masses, forces and the number of the case are
+    not written, because scene files have no keys for them. `comments` are lines at the beginning of
+    the text.
     """
     import json
 
@@ -175,9 +177,9 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
 
 
 def body_of(scene: Scene) -> tuple[str, list[Any]]:
-    """Return the key with which a scene file specifies the body of a scene, and its value.
+    """Return the key and the value with which a scene file specifies the body of `scene`.
 
-    The key is "moments" (kg m2), "coefficients" or "inertia" (kg m2).
+    The key is "moments" (kg m2), "coefficients" or "inertia" (kg m2). The value is a list.
     """
     if scene.inertia is not None:
         return "inertia", [list(row) for row in scene.inertia]
@@ -187,9 +189,10 @@ def body_of(scene: Scene) -> tuple[str, list[Any]]:
 
 
 def scene_of(data: dict[str, Any], default_name: str) -> Scene:
-    """Return the scene that the data of a scene file describe; raise InputError if invalid.
+    """Return the scene that `data`, the content of a scene file as a dictionary, describes.
 
-    `default_name` is the name of the scene if the data have no ``name``.
+    `default_name` is the name of the scene if the data have no key ``name``. Raise InputError if
+    the data are invalid.
     """
     check_written_schema(data, "scene file")
     check_keys(data, ("schema", "name", *_TABLES), "top level")
@@ -242,17 +245,20 @@ def _waves(where: str, entries: object) -> list[tuple[Any, Any]]:
 
 
 def check_written_schema(data: dict[str, Any], kind: str) -> None:
-    """Raise InputError if a file that people write has a schema that this version does not read.
+    """Raise InputError if a file that users write has a schema number that is not supported.
 
-    `data` are the data of the file, in which the number of the schema may be missing. `kind` is the
-    kind of the file, a key of `SCHEMAS`.
+    `data` are the data of the file. A missing schema number is accepted, and stands for the
+    supported one. `kind` is the kind of the file, a key of `SCHEMAS`.
     """
     given = data.get("schema", SCHEMAS[kind])
     check_schema("top level", kind, given, "write it in that form, or take a version that reads it")
 
 
 def check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> None:
-    """Raise InputError, with `where` in front of the message, for a key that is not allowed."""
+    """Raise InputError if a table of a file has a key that is not among the keys in `allowed`.
+
+    `where` names the table; the message begins with it.
+    """
     for key in table:
         if key not in allowed:
             raise unknown("key", key, allowed, where)

@@ -1,4 +1,4 @@
-"""Lines of reports that describe a scene, and how a run ended."""
+"""Lines of a report: a description of a scene, how a run ended, and its estimated errors."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from pyharness.model.trajectory import Trajectory
 def heading(scene: Scene) -> list[str]:
     """Return lines that describe a scene: name, body, torque, initial omega, steps, attitude.
 
-    If no rigid body can have the moments, a further line says so.
+    A further line is a warning if no rigid body can have the moments of inertia.
     """
     if scene.inertia is not None:
         body = f"I = {', '.join(map(_tuple, scene.inertia))} kg m2"
@@ -71,14 +71,14 @@ def ending(trajectory: Trajectory) -> str:
 def sensitive(growth: float | None, digits: float | None) -> str:
     """Return a phrase that describes a result whose amplified rounding error exceeds the tolerance.
 
-    `growth` is the error amplification, and `digits` the number of decimal digits that are left.
+    `growth` is the error amplification. `digits` is the number of decimal digits that are correct.
     """
     left = counted(math.floor(digits or 0.0), "digit")
     return f"sensitive: rounding errors are amplified by {short(growth)}; {left} left"
 
 
 def estimates(trajectory: Trajectory) -> list[str]:
-    """Return a line with a method's estimates of its own error, or no line if it has none."""
+    """Return a list of at most one line, with a method's estimates of its own error, if known."""
     told = []
     if trajectory.error is not None and trajectory.digits is not None:
         told.append(f"estimated error {short(trajectory.error)} of the largest |omega|")

@@ -1,6 +1,7 @@
 """Schema numbers of the files that this project writes and reads.
 
-The files are listed in docs/reference/formats.md.
+A schema number is the version of a file format. The formats are described in
+docs/reference/formats.md.
 """
 
 from pyharness.model.errors import InputError, kind_of
@@ -15,27 +16,26 @@ SCHEMAS = {
     "edition": 1,
     "port request": 1,
 }
-"""The number of the schema that this version writes and reads, by the kind of file.
+"""The schema number that this version of the package writes and reads, for each kind of file.
 
-The number is raised whenever the old reader would misread a file of the new form, or the new reader
-a file of the old form.
+The number is increased if an old version would misread a new file, or a new version an old file.
 """
 
 
 def check_schema(where: str, kind: str, found: object, remedy: str) -> None:
-    """Raise InputError if a file has another schema than the one that this version reads.
+    """Raise InputError if a file's schema number is not the one that this version reads.
 
     Parameters
     ----------
     where : str
-        Name of the file for a message, as in "scene file 'a.toml'".
+        The file, or the level in the file, with which the message begins: "scene file 'a.toml'".
     kind : str
         Kind of the file, a key of `SCHEMAS`.
     found : object
-        The number of the file's schema; None if it has no number. In a file that people write the
-        number may be missing; the caller then passes the number in `SCHEMAS`.
+        The schema number in the file; None if the file has none. If the file may omit the number,
+        the caller passes the number in `SCHEMAS` instead of None.
     remedy : str
-        What the user can do, the last part of the message.
+        What the user can do, with which the message ends.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Short text representations of results, however large their arrays are."""
+"""Short text representations of results, whose length does not depend on the sizes of arrays."""
 
 import textwrap
 from dataclasses import fields, is_dataclass
@@ -11,9 +11,9 @@ _LONGEST = 60  # most characters of one value
 
 
 def short_repr(result: Any) -> str:
-    """Return a result, which is a dataclass instance, as text of at most ten lines.
+    """Return a result, which is an instance of a dataclass, as text of at most ten lines.
 
-    An array is represented by its type and shape. Fields that are None are left out.
+    An array is represented by its type and shape. Fields with the value None are omitted.
     """
     shown = [
         f"{each.name}={_short(value)}"

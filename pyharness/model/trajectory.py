@@ -1,4 +1,4 @@
-"""Trajectories: the results of a method or a program for a scene."""
+"""Trajectories, which are the results of a method or a program for a scene."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 # Largest relative rounding error of a number in binary64.
 ROUNDING = 2.0**-53
-# Endings in which all requested rows are present.
+# The ways to end a run (`Trajectory.ended`) with all requested rows present.
 WITH_ALL_ROWS = ("complete", "sensitive")
 FRAMES = ("body", "space")
 STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
@@ -30,13 +30,13 @@ class Stop:
     Attributes
     ----------
     step : int
-        The number of the step, from 1. Its row is the last row of the trajectory.
+        The number of the step, from 1. The last row of the trajectory is the result of this step.
     variable : str
         The variable that failed the test: `U1` to `U3` (omega), `V1` to `V3` (translational
         velocity), or a norm: `U` (of omega), `UV` (of omega and velocity together).
     quotient : float
-        Change of the slope K between two stages of the step, over the change of the variable U
-        (1/s). It is infinite if U did not change.
+        The Lipschitz quotient (1/s): the change of the derivative between two stages of the step,
+        over the change of the variable. It is infinite if the variable did not change.
 
     Examples
     --------
@@ -53,35 +53,37 @@ class Stop:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """The rows of results of an integration, and how the integration ended.
+    """The results of an integration, one row for each time, and how the integration ended.
 
     Attributes
     ----------
     time : ndarray, shape (n,)
-        True time of each row, s.
+        The true time of each row, s.
     recorded_time : ndarray, shape (n,)
-        The TIME that the program writes to TAPE5, s; for methods the same as `time`.
+        The variable TIME that a program writes to its output file TAPE5, s. A defect may make it
+        differ from `time`. For methods it is the same as `time`.
     omega : ndarray, shape (n, 3)
         Angular velocity about the body axes, rad/s.
     velocity : ndarray, shape (n, 3), or None
         Translational velocity along the body axes, m/s. None if it was not computed.
     steps, evaluations : int
-        Steps taken, and right-hand sides evaluated.
+        The number of steps, and the number of evaluations of the right-hand side.
     ended : {"complete", "sensitive", "stopped", "overflow"}
-        How the integration ended. After an overflow the rows end before the first omega that is
-        not finite. Sensitive means that all rows are present, but the amplified rounding error
-        exceeds the tolerance.
+        How the integration ended. "stopped" means that the Lipschitz test ended it. After an
+        "overflow" the rows end before the first omega that is not finite. "sensitive" means that
+        all rows are present, but the amplified rounding error exceeds the tolerance.
     stop : Stop or None
         The point at which the Lipschitz test ended the run; None if the test did not end it.
     ier : ndarray of int, shape (n,), or None
-        The error code IER as the collocation programs print it.
+        The error code of the linear solver in each step, as the collocation programs print it: 129
+        for a singular matrix. None for other programs and for methods.
     error : float or None
         Estimated error of any component at the requested times, relative to the largest component
         of omega along the trajectory. None if the method does not estimate it, and after an
         overflow.
     growth : float or None
-        Largest norm of the state-transition matrix of omega from any earlier time to the end. None
-        if it is unknown.
+        The error amplification: the largest norm of the state-transition matrix of omega from any
+        earlier time to the end. None if it is unknown.
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs. None if they were not
         requested.
@@ -90,9 +92,9 @@ class Trajectory:
     axes : ndarray, shape (3, 3), or None
         The principal axes, in columns; None if they are the body's own axes.
     exact : ndarray of object, shape (n, 8), or None
-        Rows of a program that ran with another word length: `time`, `recorded_time`, `omega` and
-        `velocity` as numbers of that word. The other arrays hold the nearest floats. None for
-        binary64, and if there are no rows.
+        Rows of a program that ran in another arithmetic than binary64: `time`, `recorded_time`,
+        `omega` and `velocity` as numbers of this arithmetic. The attributes of these names have the
+        nearest floats. None for binary64, and if there are no rows.
     tolerance : float or None
         The tolerance to which a method integrated the scene. None for programs and for methods
         with a fixed step, which have no tolerance.
@@ -197,7 +199,7 @@ class Trajectory:
 
     @property
     def digits(self) -> float | None:
-        """The number of correct decimal digits at the end; None if the error is unknown."""
+        """The number of correct decimal digits of omega, from `error`; None if `error` is None."""
         return digits_left(self.error)
 
     @property
@@ -209,7 +211,8 @@ class Trajectory:
 def turned_to_space(attitude: Array, vectors: Array) -> Array:
     """Transform n vectors from components about the body axes to components about axes of space.
 
-    `attitude` are n quaternions, shape (n, 4). `vectors` and the result have the shape (n, 3).
+    `attitude` has a quaternion for each vector, shape (n, 4). `vectors` and the result have the
+    shape (n, 3).
     """
     scalar, vector = attitude[:, :1], attitude[:, 1:]
     twice = 2.0 * np.cross(vector, vectors)
@@ -217,8 +220,9 @@ def turned_to_space(attitude: Array, vectors: Array) -> Array:
 
 
 def digits_left(error: float | None) -> float | None:
-    """Return the number of correct decimal digits of a number with a given relative error.
+    """Return the number of correct decimal digits of a result with the relative error `error`.
 
-    It is from 0 to 15.95, the digits of binary64, and None if `error` is None.
+    It is at least 0, and at most 15.95, the number of digits of binary64. It is None if `error` is
+    None.
     """
     return None if error is None else max(0.0, -math.log10(max(error, ROUNDING)))

@@ -1,4 +1,4 @@
-"""Conversion of user input to plain Python numbers, with checks."""
+"""Functions that check user input and convert it to plain Python numbers."""
 
 import itertools
 import math
@@ -12,7 +12,7 @@ Triple = tuple[float, float, float]
 Matrix = tuple[Triple, Triple, Triple]
 # A number that float() converts: int, Fraction, Decimal, a NumPy scalar; text is excluded.
 Number = SupportsFloat | SupportsIndex
-# For example a list, a tuple, an array or a generator.
+# Several numbers: for example a list, a tuple, an array or a generator.
 Numbers = Iterable[Number]
 
 _TOO_LARGE = "a number too large for binary64"
@@ -24,7 +24,7 @@ _THREE_FLOATS = [float, float, float]
 def number(where: str, value: object) -> float:
     """Return a user's real number as a float; infinities and NaN are accepted.
 
-    Raise InputError, with `where` in front of the message, for any other value.
+    Raise InputError, with `where` in front of the message, if `value` is no real number.
     """
     found = converted(value)
     if isinstance(found, float):
@@ -35,7 +35,10 @@ def number(where: str, value: object) -> float:
 
 
 def converted(value: object) -> float | str:
-    """Return a real number as a float; for any other value return its kind in words, a string."""
+    """Return a real number as a float; for any other value return a phrase that names its type.
+
+    For a number beyond the range of binary64 the phrase says that it is too large.
+    """
     if type(value) is float:
         return value
     if is_no_number(value):
@@ -51,9 +54,9 @@ def converted(value: object) -> float | str:
 
 
 def is_no_number(value: object) -> bool:
-    """Return whether a value must be rejected as a real number, although float() may accept it.
+    """Return whether a value is of a type that is rejected even if float() accepts the value.
 
-    The values to reject are text, booleans, arrays, and complex numbers of NumPy.
+    These types are text, booleans, arrays, and NumPy scalars that are not real numbers.
     """
     if isinstance(value, (bool, str, bytes, bytearray, memoryview)):
         return True
@@ -64,7 +67,8 @@ def is_no_number(value: object) -> bool:
 def three(where: str, values: object) -> Triple:
     """Return three finite numbers of a user as a tuple of floats.
 
-    Raise InputError, with `where` in front of the message, for any other value.
+    Raise InputError, with `where` in front of the message, unless `values` are three finite
+    numbers.
     """
     found = three_floats(where, values)
     for each in found:
@@ -74,9 +78,9 @@ def three(where: str, values: object) -> Triple:
 
 
 def three_floats(where: str, values: object) -> Triple:
-    """Return three numbers of a user, finite or not, as a tuple of floats.
+    """Return three numbers of a user, which need not be finite, as a tuple of floats.
 
-    Raise InputError, with `where` in front of the message, for any other value.
+    Raise InputError, with `where` in front of the message, unless `values` are three real numbers.
     """
     if type(values) is tuple and [type(each) for each in values] == _THREE_FLOATS:
         return values
@@ -92,7 +96,7 @@ def three_floats(where: str, values: object) -> Triple:
 def finite(where: str, value: object) -> float:
     """Return a finite number of a user as a float.
 
-    Raise InputError, with `where` in front of the message, for any other value.
+    Raise InputError, with `where` in front of the message, if `value` is no finite number.
     """
     found = number(where, value)
     if not math.isfinite(found):
@@ -105,10 +109,10 @@ def _not_finite(where: str, value: float) -> InputError:
 
 
 def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
-    """Return an iterator over a user's list, tuple, array or other ordered values.
+    """Return an iterator over a user's list, tuple, array or another ordered collection.
 
-    The values themselves are not checked. Raise InputError for text, a set, a mapping or a single
-    value. Its message begins with `where` and ends with `allowed`.
+    The elements are not checked. Raise InputError if `values` is text, a set, a mapping or a single
+    value. The message begins with `where`, and ends with `allowed`, which says what is allowed.
     """
     if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):
         try:
@@ -121,7 +125,8 @@ def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
 def integer(where: str, value: object) -> int:
     """Return a whole number of a user as an int.
 
-    Raise InputError, with `where` in front of the message, for any other value.
+    Raise InputError, with `where` in front of the message, if `value` is no integer. A float is no
+    integer, even if it is whole.
     """
     if not is_no_number(value):
         try:
@@ -132,7 +137,7 @@ def integer(where: str, value: object) -> int:
 
 
 def boolean(where: str, value: object) -> bool:
-    """Return a user's value that is True or False, also that of NumPy, as a bool.
+    """Return a user's truth value, True or False of Python or of NumPy, as a bool.
 
     Raise InputError, with `where` in front of the message, for any other value.
     """
@@ -144,8 +149,8 @@ def boolean(where: str, value: object) -> bool:
 def tolerance_of(value: object, finest: float) -> float:
     """Return a user's tolerance as a float; raise InputError if it is no number.
 
-    The range of the tolerance is not checked here. The message names `finest`, the smallest
-    tolerance that the caller allows.
+    The caller checks the range of the tolerance. `finest` is the smallest tolerance that it allows,
+    and is only used in the message.
     """
     found = converted(value)
     if isinstance(found, float):

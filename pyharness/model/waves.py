@@ -1,9 +1,10 @@
 """Exact sums of the waves of a torque law that have the same frequency.
 
-A wave is a sine or cosine term of the law. Each amplitude is divided by a moment, and each quotient
-is rounded. If two waves nearly cancel, their rounding errors remain. For example, opposite waves
-whose amplitudes differ by 1e-10 would leave six digits of the torque. An exact sum before the
-division leaves all digits, and fewer waves take less work.
+A wave is a sine or cosine term of the law. A solver divides each amplitude by a moment of inertia,
+and rounds the quotient. If two waves nearly cancel, the rounding errors of the quotients remain.
+For example, if two opposite amplitudes differ by a relative 1e-10, only six digits of their sum
+would be correct. If the amplitudes are added exactly before the division, all digits are correct.
+Fewer waves also take less work.
 """
 
 import math
@@ -30,7 +31,7 @@ _ZERO = (Fraction(0), Fraction(0), Fraction(0))
 class ExactLaw:
     """A torque law with at most one sine and one cosine per frequency, in exact fractions.
 
-    The attributes have the meanings and units of the attributes of `TorqueLaw`.
+    The attributes have the same meanings and units as those of `TorqueLaw`.
     """
 
     constant: Exact
@@ -40,7 +41,7 @@ class ExactLaw:
     frame: str
 
     def turned(self, turn: Callable[[Exact], Exact]) -> "ExactLaw":
-        """Return the law with `turn`, a rotation, applied to every vector of three components."""
+        """Return the law with every vector of three components rotated by the function `turn`."""
 
         def waves(each: tuple[ExactWave, ...]) -> tuple[ExactWave, ...]:
             return tuple((turn(amplitude), frequency) for amplitude, frequency in each)
@@ -50,7 +51,7 @@ class ExactLaw:
         )
 
     def rounded(self) -> TorqueLaw:
-        """Return the law as a TorqueLaw in floats, each number rounded once.
+        """Return the law as a TorqueLaw, with each exact number rounded to the nearest float.
 
         Raise InputError if a number is beyond the range of floats.
         """
@@ -70,17 +71,22 @@ class ExactLaw:
 def merged(law: TorqueLaw) -> TorqueLaw:
     """Return a torque law with at most one sine and one cosine per frequency.
 
-    If there is nothing to merge, the result is the argument itself. Sines of opposite frequencies
-    are merged with opposite signs, cosines with the same sign. A cosine of frequency 0 is added to
-    the constant, and a sine of frequency 0 is dropped.
+    Waves of equal or opposite frequencies are merged by adding their amplitudes; for sines of
+    opposite frequencies the amplitudes are subtracted. A cosine of frequency 0 is added to the
+    constant, and a sine of frequency 0 is removed. The result is the argument itself if no waves
+    can be merged or removed.
     """
     return exact_law(law).rounded() if is_mergeable(law) else law
 
 
 def is_mergeable(law: TorqueLaw) -> bool:
-    """Return whether a law has a wave of frequency 0, two sines of one frequency or two cosines."""
+    """Return whether a torque law has waves that `merged` would merge or remove.
+
+    Such waves are a wave of frequency 0, two sines of equal or opposite frequency, and two cosines
+    of equal or opposite frequency. Waves of amplitude 0 are ignored.
+    """
     for waves in (law.sines, law.cosines):
-        # A wave without amplitude does not count.
+        # A wave of amplitude 0 is ignored.
         counts = Counter(abs(frequency) for amplitude, frequency in waves if any(amplitude))
         if 0.0 in counts or any(count > 1 for count in counts.values()):
             return True
@@ -88,7 +94,7 @@ def is_mergeable(law: TorqueLaw) -> bool:
 
 
 def exact_law(law: TorqueLaw) -> ExactLaw:
-    """Return a torque law in exact fractions, with waves of equal frequency merged."""
+    """Return a torque law in exact fractions, with waves merged as by `merged`."""
     constant = _exact(law.constant)
     cosines = _summed(law.cosines, even=True)
     # A cosine of frequency 0 is 1 at all times, whereas a sine is 0.
@@ -105,7 +111,7 @@ def exact_law(law: TorqueLaw) -> ExactLaw:
 
 
 def _summed(waves: Iterable[Wave], even: bool) -> list[ExactWave]:
-    """Return the sums of waves of equal frequency, without sums of zero amplitude.
+    """Return the sums of waves of equal or opposite frequency, without sums of amplitude 0.
 
     All `waves` are cosines if `even` is true, otherwise sines. A sine of negative frequency is
     added as the opposite of a sine of positive frequency.
@@ -149,9 +155,10 @@ def with_merged_waves(scene: Scene) -> Scene:
 def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Array, Array, Array]:
     """Return the constants, sines and cosines of many torque laws, with merged waves in each law.
 
-    The shapes are (m, 3), (m, k, 4) and (m, l, 4). In each array m is the number of laws, or 1 if
-    all laws share one row. Each law becomes the law that `merged` returns for it. A wave that was
-    merged into another one has amplitude and frequency 0. A law that is not finite is unchanged.
+    The shapes are (m, 3), (m, k, 4) and (m, l, 4), where a wave is three amplitudes and a frequency
+    (rad/s). In each array m is the number of laws, or 1 if all laws share one row. Each law becomes
+    the law that `merged` returns for it, filled up with waves of amplitude and frequency 0. A law
+    that is not finite is unchanged.
     """
     concerned = _mergeable_rows(sines, cosines)
     if not concerned.any():
@@ -184,16 +191,17 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
 
 
 def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
-    """Return for each torque law whether `is_mergeable` holds, a boolean array of shape (m,).
+    """Return whether `is_mergeable` is true, for each torque law: a boolean array, shape (m,).
 
-    `sines` and `cosines` are arrays of m laws (or of one), as in `with_merged_rows`.
+    `sines` and `cosines` have the waves of m laws, or of one law, as in `with_merged_rows`. The
+    result has one element if both arrays are of one law.
     """
     found = np.zeros(1, bool)
     for waves in (sines, cosines):
         if waves.size:
             acts = waves[..., :3].any(axis=-1)
             frequencies = np.abs(waves[..., 3])
-            # The padding of a shorter law has no amplitude, and does not count as a wave.
+            # A law with fewer waves is filled up with waves of amplitude 0, which are ignored.
             found = found | (acts & (frequencies == 0.0)).any(axis=-1)
             sizes = np.sort(np.where(acts, frequencies, np.nan), axis=-1)
             found = found | (sizes[:, 1:] == sizes[:, :-1]).any(axis=-1)
@@ -210,10 +218,10 @@ def _waves_of(rows: Array) -> list[Wave]:
 
 
 def _without_empty(waves: Array) -> Array:
-    """Return an array of waves, shape (m, k, 4), without columns in which no law has a wave.
+    """Return the waves of m torque laws without the indices at which no law has a wave.
 
-    A column is one of the k places for a wave. A column with a frequency that is not finite is
-    kept, so that only its own law is refused.
+    `waves` has the shape (m, k, 4), and the index is its second, from 0 to k - 1. An index at which
+    a law has a frequency that is not finite is kept, so that the solver refuses only this law.
     """
     is_one = waves[..., :3].any(axis=-1) | ~np.isfinite(waves[..., 3])
     return np.ascontiguousarray(waves[:, is_one.any(axis=0)])

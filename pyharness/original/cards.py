@@ -1,9 +1,10 @@
-"""The text of the edition: every card of the three decks, and how the scan shows it.
+"""The text of the edition: every card of the three decks, and the way in which the scan shows it.
 
-A line of the scan is a card number, a dash and the text of the card; blanks are ignored. The tables
-in `data/cards` hold the decks, the pages of the scan in its order, and, for each card, the lines of
-the Python twin that correspond to it. An entry is an entry of the critical apparatus
-(`data/apparatus.toml`), which records and explains a deviation.
+A deck consists of the cards of a program. A line of the scan is a card number, a dash and the text
+of the card; blanks are ignored. The tables in `data/cards` contain the decks, and the pages of the
+scan in their order. They also name the lines of the Python twin that correspond to each card. The
+critical apparatus (`data/apparatus.toml`) has entries that record and explain the deviations of the
+scan from our text.
 """
 
 import re
@@ -23,7 +24,7 @@ _PORT = "fortran/original"
 
 
 class Difference(NamedTuple):
-    """A passage of a card that the scan shows in other characters than our text.
+    """A passage of a card that has different characters in our text and in the scan.
 
     `ours` and `scans` are the characters in our text and in the scan, without blanks. `entry` is
     the identifier of the apparatus entry that explains the difference.
@@ -43,7 +44,7 @@ class Place(NamedTuple):
 
 
 class Card(NamedTuple):
-    """A card of a deck, and how the scan shows it.
+    """A card of a deck, and the way in which the scan of the thesis shows it.
 
     Attributes
     ----------
@@ -52,15 +53,15 @@ class Card(NamedTuple):
     number : int
         Card number: 100, 110, 120, ...
     text : str
-        Columns 1 to 72 as we read them.
+        Columns 1 to 72 of the card in our text.
     differences : tuple of Difference
-        The passages that the scan shows otherwise, from left to right. Each is the first occurrence
-        of its characters after the previous one; blanks are ignored.
+        The passages whose characters differ in the scan, from left to right. Each passage is the
+        first occurrence of its characters after the previous passage; blanks are ignored.
     printed : tuple of (str, str) or None
-        The card number that the scan shows if it is not `number`, and the identifier of the
-        apparatus entry that says why.
+        If the scan shows another card number than `number`: this other number, and the identifier
+        of the apparatus entry that explains it.
     lost : str or None
-        If the card is missing from the scan, the identifier of the apparatus entry that says so.
+        If the card is missing from the scan: the identifier of the apparatus entry about its loss.
     """
 
     program: str
@@ -102,18 +103,18 @@ class Card(NamedTuple):
     def passages(self) -> Iterator[tuple[str, Difference | None]]:
         """Yield the card's text in passages, each with its difference from the scan.
 
-        The difference is None for a passage that the scan shows as it is.
+        The difference is None for a passage that is the same in the scan.
         """
         return passages(self.text, self.differences)
 
     @property
     def deviates(self) -> bool:
-        """Return whether the line of the scan differs from the card."""
+        """Return whether the card's line in the scan differs from our text, or is missing."""
         return bool(self.lost or self.printed or self.differences)
 
     @property
     def entries(self) -> tuple[str, ...]:
-        """Return the identifiers of the apparatus entries that name the card."""
+        """Return the identifiers of the entries of the critical apparatus that name the card."""
         return tuple(
             each["id"]
             for each in facts("apparatus")["entry"]
@@ -128,7 +129,7 @@ class Deck:
     """
 
     def __init__(self, program: str) -> None:
-        """Read the program's table of cards."""
+        """Read the table of cards of the program from `data/cards`."""
         self.program = program
         self._places = facts("cards/places")[program]
         self.cards = {
@@ -156,34 +157,43 @@ class Deck:
 
     @cached_property
     def absent(self) -> dict[int, str]:
-        """Return the reason, by card number, why the Fortran port leaves out an executable card."""
+        """Return, by card number, the reasons why the Fortran port omits executable cards."""
         return {n: why for cards, why in self._places["absent"] for n in numbers(cards)}
 
     @cached_property
     def otherwise(self) -> dict[int, str]:
-        """Return the reason, by card number, why a statement differs in the Fortran port."""
+        """Return, by card number, the reasons why the Fortran port has other statements."""
         return {n: why for cards, why in self._places["otherwise"] for n in numbers(cards)}
 
     @cached_property
     def port(self) -> dict[int, list[Place]]:
-        """Return the lines of the Fortran port by card number, as its margin names the cards."""
+        """Return, by card number, the lines of the Fortran port that correspond to the card.
+
+        The comment at the end of a line of the port names the cards of this line.
+        """
         return _by_card((cards, place) for place, cards in margin(self.program))
 
     @cached_property
     def twin(self) -> dict[int, list[Place]]:
-        """Return the lines of the Python twin by card number."""
+        """Return, by card number, the lines of the Python twin that correspond to the card."""
         places = self._places["twin"]
         return _by_card((cards, _line_of(file, text)) for cards, file, text in places)
 
 
 @cache
 def deck(program: str) -> Deck:
-    """Return the deck of a program. It is cached, so callers must not change it."""
+    """Return the deck of a program.
+
+    The deck is read only once and then shared, so that callers must not change it.
+    """
     return Deck(program)
 
 
 def numbers(ranges: str) -> list[int]:
-    """Return the card numbers that a text names: ``750-770, 800`` is 750, 760, 770 and 800."""
+    """Return the card numbers that a text names.
+
+    The text ``750-770, 800`` names 750, 760, 770 and 800.
+    """
     found: list[int] = []
     for each in ranges.split(",") if ranges else ():
         first, _, last = each.strip().partition("-")
@@ -218,7 +228,8 @@ def chosen(asked: Iterable[str]) -> list[Card]:
     Raises
     ------
     InputError
-        If an item of `asked` is no program, card or range, or is a range without cards.
+        If an item of `asked` is not a program, a card or a range, or if it is a range without
+        cards.
     """
     found: dict[Card, None] = {}
     for each in list(asked) or PROGRAMS:
@@ -285,9 +296,10 @@ def _cards_of(asked: str) -> list[Card]:
 
 
 def margin(program: str) -> Iterator[tuple[Place, str]]:
-    """Yield each line of the Fortran port that names cards in its margin, and their numbers.
+    """Yield each line of a program's Fortran port that names cards, with the card numbers.
 
-    The numbers are a text such as ``750-770, 800``.
+    The numbers are in the margin of the line, which is a comment at its end. They are yielded as
+    text, as in ``750-770, 800``.
     """
     file = f"{program.replace('-', '_')}.fypp"
     for number, text in enumerate(_lines(shipped(_PORT) / file), 1):
@@ -300,11 +312,11 @@ def passages(
 ) -> Iterator[tuple[str, Difference | None]]:
     """Yield the text of a card in passages, each with its difference from the scan.
 
-    `differences` are in the order of the text. The difference is None for a passage that the scan
-    shows as it is. Raise ValueError if the text does not contain the differing characters in this
-    order.
+    `differences` are all differences of the card, in the order of the text. For a passage that is
+    the same in the scan, None is yielded as its difference. Raise ValueError if the text does not
+    contain the differing characters in this order.
     """
-    # Blanks are ignored; these are the indices of all other characters.
+    # Indices of all characters that are not blanks. Blanks are ignored.
     places = [n for n, letter in enumerate(text) if not letter.isspace()]
     letters = tight(text)
     done = at = 0

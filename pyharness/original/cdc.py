@@ -1,11 +1,11 @@
 """The rounding rules of the floating-point arithmetic of the CDC 6600 and CYBER 70.
 
 The source is the CYBER 170 hardware reference, CDC 60463560. A number is an integer coefficient of
-p = 48 bits and an exponent; a sum is formed in a register of 2 p bits, here called a frame. `FX`
-are the truncating instructions 30, 31, 40 and 44 (octal; sum, difference, product, quotient), and
-`RX` their rounding counterparts 34, 35, 41 and 45. NX (24) normalises a sum. No guard bit survives,
-because the bits below the unit of the larger operand are truncated before NX shifts the sum to the
-left.
+p = 48 bits and an exponent. A sum is formed in a register of 2 p bits, here called a frame. `FX`
+denotes the truncating instructions for sum, difference, product and quotient, which have the octal
+codes 30, 31, 40 and 44. `RX` denotes their rounding counterparts 34, 35, 41 and 45. The instruction
+NX (24) normalises a sum. A sum has no guard bit, because the bits below the unit of the larger
+operand are truncated before NX shifts the sum to the left.
 """
 
 from pyharness.original.rounding import Operation, Pair, Rules, rounding
@@ -19,7 +19,7 @@ def cdc(p: int, rounds: bool) -> Rules:
 
     It is the arithmetic of the rounding instructions RX if `rounds`, else of the truncating
     instructions FX. Literals, such as the constants .2 and .01 in the decks, are rounded to
-    nearest. No source says that the compiler FTN did so.
+    nearest. This is an assumption: no source states how CDC's compiler FTN converted literals.
     """
     settled = rounding(p, LEAST, MOST, cut=True, gradual=False)
     quarter = 1 << p - 2 if rounds else 0
@@ -51,10 +51,10 @@ def _sum(p: int, rounds: bool) -> Operation:
 def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[int, int]:
     """Return the sum of xm 2**xe and ym 2**ye before normalisation, as a pair (frame, e).
 
-    The frame is the sum as an integer, in units of 2**(e - p), where e is the larger exponent. The
-    coefficients xm and ym must have p bits. The alignment shift truncates the operand with the
-    smaller exponent. If `rounds`, as in the instruction RX, half a unit in the last place is added
-    to each operand before the shift.
+    The frame is the sum as an integer, in units of 2**(e - p), where e is the larger of the
+    exponents xe and ye. The coefficients xm and ym must have p bits. The operand with the smaller
+    exponent is shifted for alignment, and truncated. If `rounds`, as in the instruction RX, half a
+    unit in the last place is added to each operand before the shift.
     """
     if xe <= ye:
         xm, xe, ym, ye = ym, ye, xm, xe

@@ -1,4 +1,8 @@
-"""Cells: the combinations of program, case and listing for which Fortran and twin are compared."""
+"""Cells: combinations of a listing and a case, for which Fortran port and twin are compared.
+
+A listing is a program of the thesis with a choice of active defects, readings and conjectures. A
+case is a scene of Table 1. The twin is the Python port of a program.
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,9 +19,10 @@ def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
 
 
 def all_listings(program: str) -> Iterator[Listing]:
-    """Yield every listing of a program: each subset of its switches with each of its readings.
+    """Yield every listing of a program: each subset of its switches with each subset of readings.
 
-    The switches are the names active in the original program: its defects and some conjectures.
+    The switches are the names that are active in the original program: its defects and some
+    conjectures.
     """
     for readings in subsets(names_of("reading", program)):
         for defects in subsets(switches(program)):
@@ -40,15 +45,19 @@ def all_cells() -> Iterator[tuple[Listing, int]]:
 
 
 def cell_name(listing: Listing, case: int) -> str:
-    """Return a name for a listing and a case: ``two-term/case-3/dt-accumulates+torque-held``."""
+    """Return a name for a listing and a case number.
+
+    An example is ``two-term/case-3/dt-accumulates+torque-held``.
+    """
     return f"{listing.program}/case-{case}/{listing_name(listing)}"
 
 
 def listing_name(listing: Listing) -> str:
     """Return the name of a listing, without blanks.
 
-    It is `corrected`, or `original` with its readings after colons. For any other listing it is
-    the names of all active defects, readings and conjectures, joined by ``+``.
+    The name is ``corrected``, or ``original`` followed by the active readings, each after a colon.
+    For any other listing it consists of the names of all active defects, readings and conjectures,
+    joined by ``+``.
     """
     if listing.label == "custom":
         return "+".join(sorted(listing.active))

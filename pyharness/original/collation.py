@@ -1,4 +1,7 @@
-"""The collation: checks that the scan, our text of the cards and the critical apparatus agree."""
+"""The collation: checks that the scan, our text of the cards and the critical apparatus agree.
+
+The critical apparatus (`data/apparatus.toml`) lists, among others, the deviations of the scan.
+"""
 
 import difflib
 import re
@@ -12,10 +15,11 @@ HEADING = "APPENDIX AND PROGRAMS"
 
 
 def expected_lines() -> list[tuple[str, str]]:
-    """Return every line that the scan's appendix should have, as pairs of text and name.
+    """Return every line that the appendix of the scan has by our tables, as pairs (text, name).
 
-    The text has no blanks. The name is a card's name, as in ``two-term:1660``, ``furniture`` for a
-    line that an editor added, or ``phantom`` for text that belongs to no card at its place.
+    The text is the line without blanks. The name is usually that of a card, as in
+    ``two-term:1660``. It is ``furniture`` for a line that an editor added, and ``phantom`` for text
+    that belongs to no card at its place.
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -33,7 +37,7 @@ def expected_lines() -> list[tuple[str, str]]:
 def unexplained(scan: str) -> list[str]:
     """Return one sentence for each line in which a scan and our tables of cards disagree.
 
-    `scan` is the text of the whole scan of the thesis. The list is empty if all lines agree.
+    `scan` is the text of the whole thesis, as scanned. The list is empty if all lines agree.
 
     Raises
     ------
@@ -66,9 +70,10 @@ def unexplained(scan: str) -> list[str]:
 def undeclared() -> list[str]:
     """Return one sentence for each disagreement between the cards and the critical apparatus.
 
-    Each deviation of the scan that a card records must be declared by the entry of the apparatus
-    that the card names, and each declared deviation must be recorded. A card that is missing from
-    the scan must name an entry of the kind ``missing text``.
+    A card names an entry of the apparatus for each deviation of the scan from its text. This entry
+    must declare the deviation. Conversely, each deviation that an entry declares must be recorded
+    with a card. A card that is missing from the scan must name an entry of the kind ``missing
+    text``.
     """
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):

@@ -1,10 +1,11 @@
-"""Collocation as in IV.2, with up to five terms: one interval, and a run of the two programs.
+"""Collocation as in IV.2 of the thesis, with up to five terms: a step, and a run of many steps.
 
-Every unknown is approximated by a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). Its derivative
-equals the right-hand side at as many collocation points as there are terms after x(0) (eq. 36). The
-right-hand side depends on the unknowns themselves. A first estimate of the polynomials therefore
-takes the right-hand side as constant. One correction then evaluates the right-hand side at the
-collocation points, with the unknowns of that estimate.
+A step is called an interval, as in the thesis. In each interval every unknown is approximated by a
+polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). The derivative of the polynomial equals the
+right-hand side at as many collocation points as there are terms after x(0) (eq. 36). Because the
+right-hand side depends on the unknowns, a first estimate of the polynomials assumes a constant
+right-hand side. One correction then evaluates the right-hand side at the collocation points, with
+the unknowns of the first estimate.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,12 +30,13 @@ def march(
     points_of: Callable[[float], list[float]],
     rates: Callable[[Sequence[Vector], int, Vector], list[float]],
 ) -> Trajectory:
-    """Run a collocation program on a scene.
+    """Run a collocation program on a scene, and return its trajectory.
 
-    `points_of` returns the collocation points (s from the start of the interval) for DT, the step
-    (s) as the program computes it. `rates` returns the right-hand sides of the unknowns. It takes
-    the torques over the moments (1/s2) at the start and at all collocation points, the number k of
-    a collocation point (0 for the start), and the unknowns there.
+    The function `points_of` returns the collocation points, in seconds from the start of an
+    interval, for DT, the step size (s) as the program computes it. The function `rates` returns the
+    right-hand sides of all unknowns at one point. Its first argument is the torques over the
+    moments (1/s2) at the start and at all collocation points. The others are the number k of the
+    collocation point (0 for the start), and the unknowns at this point.
     """
     h = scene.step_size
     dt = h
@@ -66,12 +68,12 @@ def march(
 def interval(
     start: Vector, points: Sequence[float], end: float, rates: Rates
 ) -> tuple[list[float], int]:
-    """Advance all unknowns by one interval; return them, and an error code.
+    """Return all unknowns after one interval, which is one step, and an error code.
 
-    `start` has the unknowns at the start of the interval. The collocation points `points` and the
-    time `end` of the result are in seconds from there. `rates` returns the right-hand sides. The
-    error code is IER of the linear solver LEQT1F for the correction, its second solution in the
-    interval. The programs print this code.
+    `start` contains the unknowns at the start of the interval. The collocation points `points` and
+    the time `end` of the result are in seconds from the start. `rates` returns the right-hand
+    sides. The error code is IER of the linear solver LEQT1F in the correction, for which LEQT1F is
+    called the second time in the interval. The programs print this code.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))
@@ -84,16 +86,18 @@ def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[flo
     """Return the coefficients c1, c2, ... of each unknown's polynomial, and the error code IER.
 
     With these coefficients the polynomials have the derivatives `rates` at the collocation points
-    `points` (s), one row of derivatives for each point. IER is the code of LEQT1F.
+    `points` (s). `rates` has one row for each point. IER is the error code of the linear solver
+    LEQT1F.
     """
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(collocation_matrix(points), by_unknown)
 
 
 def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
-    """Return the derivatives of t, t**2, ... at the collocation points (eq. 36).
+    """Return the matrix of the derivatives of t, t**2, ... at the collocation points (eq. 36).
 
-    The matrix has a row for each point (s) and a column for each power of t.
+    The matrix has a row for each of `points` (s), and a column for each power of t. There are as
+    many powers as points.
     """
     return [
         [1.0, 2.0 * t, 3.0 * (t * t), 4.0 * (t * t * t), 5.0 * (t * t * t * t)][: len(points)]
@@ -104,8 +108,8 @@ def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
 def values(start: Vector, coefficients: Sequence[Vector], t: float) -> list[float]:
     """Return every unknown's polynomial x(0) + c1 t + c2 t**2 + ... at the time `t` (s).
 
-    `start` has x(0) of each unknown, and `coefficients` its c1, c2, ... The terms are added in this
-    order, because the rounding errors depend on it.
+    `start` contains x(0) of each unknown, and `coefficients` contains its c1, c2, ... The terms are
+    added in this order, because the rounding errors depend on the order.
     """
     t2 = t * t
     powers = [t, t2, t2 * t, t2 * t2, t2 * t2 * t]

@@ -1,4 +1,4 @@
-"""Runs of the appendix's compiled programs on a scene, with the results as a trajectory."""
+"""Runs of the compiled programs of the thesis's appendix on a scene."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -20,9 +20,10 @@ def run(
     may_stop: bool = True,
     velocity: bool = True,
 ) -> Trajectory:
-    """Run the compiled program of a listing; parameters and result are those of `run_program`.
+    """Run the compiled program of a listing on a scene, and return its trajectory.
 
-    The arguments are not checked. Raise NotBuiltError if the extension is not built.
+    The parameters and the result are those of `run_program`, but the arguments are not checked.
+    Raise NotBuiltError if the extension is not built.
     """
     rows, ier, n_rows, status, evaluations, variable, quotient = extension().run_program(
         *program_arguments(scene, listing, lipschitz, may_stop, velocity)
@@ -39,10 +40,10 @@ def read_rows(
     """Return the output of a compiled program as a trajectory.
 
     `rows` has shape (n, 8): true time and recorded TIME (s), omega (rad/s) and translational
-    velocity (m/s). `ier` has at least n error codes of the linear solver. `evaluations` counts the
-    right-hand sides. `ended` says how the run ended. `stop_variable` is the number from 1 in
-    `STOP_VARIABLES` of the variable that failed the stop test, or 0. `stop_quotient` is its
-    quotient (1/s).
+    velocity (m/s). `ier` contains at least n error codes of the linear solver. `evaluations` is the
+    number of evaluations of the right-hand sides. `ended` says how the run ended, as in
+    `Trajectory`. `stop_variable` is 0, or the number, from 1, in `STOP_VARIABLES` of the variable
+    that failed the stop test. `stop_quotient` is the quotient of this variable (1/s).
     """
     n = len(rows)
     is_stopped = stop_variable > 0
@@ -62,7 +63,9 @@ def read_rows(
 class Arguments(NamedTuple):
     """The arguments of the extension's function `run_program`, in the order of its signature.
 
-    `body` is the moments (kg m2) if `by_moments`, else the coefficients A, B and C.
+    `flags` is a bit mask of the active defects, readings and conjectures. `body` contains the
+    moments (kg m2) if `by_moments`, else the coefficients A, B and C. `torque_first` is the initial
+    torque over the moments (1/s2), or zeros.
     """
 
     program: int
@@ -123,7 +126,7 @@ def program_arguments(
 def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:
     """Return whether a run needs the translational velocity because the stop test reads it.
 
-    The stop test reads it only with the defect `lipschitz-tests-velocity`, and if the test may end
-    the run (`may_stop`).
+    The stop test reads the velocity if the defect `lipschitz-tests-velocity` is active in
+    `listing`, and if the test may end the run (`may_stop`).
     """
     return may_stop and listing.has("lipschitz-tests-velocity")

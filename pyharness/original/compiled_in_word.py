@@ -1,6 +1,6 @@
 """Runs of the compiled programs in a word, which is a floating-point format of IEEE 754.
 
-Numbers are passed to the extension, and returned by it, as bytes.
+Numbers are passed to the compiled extension module, and returned by it, as bytes.
 """
 
 import itertools
@@ -64,9 +64,9 @@ def run(
 
 
 def compiled_words() -> tuple[str, ...]:
-    """Return the names of the words, or floating-point formats, that the extension supports.
+    """Return the names of the floating-point formats (words) that the compiled programs support.
 
-    The tuple is empty if the extension is not built.
+    The tuple is empty if the extension module that contains the programs is not built.
     """
     try:
         from pyharness import _build

@@ -1,7 +1,8 @@
-"""The collation of the decks with each other and with sections II to V, operation by operation.
+"""A comparison of the decks with each other and with the thesis's text, operation by operation.
 
-A deck is the cards of a program. `data/cards/collation.toml` lists the operations of the programs.
-Whether the decks agree on an operation is computed from their statements.
+A deck consists of the cards of a program. The text is sections II to V of the thesis. The table
+`data/cards/collation.toml` lists the operations of the programs, and what the text states about
+them. Whether the decks agree on an operation is computed from their statements.
 """
 
 import re
@@ -15,14 +16,15 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 
 
 class Row(NamedTuple):
-    """A row of the collation table: one operation of the programs, and who agrees on it.
+    """A row of the collation table: one operation, and whether decks and thesis agree on it.
 
     Attributes
     ----------
     what : str
-        The operation: what its cards do.
+        A description of the operation.
     cards : dict of str to str
-        The cards of each deck that has the operation, as in ``750-770, 800``.
+        For each program whose deck has the operation, the numbers of its cards, as in
+        ``750-770, 800``.
     decks : str
         ``agree`` if all decks that have the operation have the same statements. ``names`` if their
         statements differ only in names, ``order`` if they differ only in names and order, else
@@ -31,8 +33,8 @@ class Row(NamedTuple):
         Whether the text of the thesis ``agrees`` with the decks or ``differs``; ``silent`` if it
         does not mention the operation.
     text, says : str
-        The place in the thesis, and the statement made there; both are empty if the thesis is
-        silent.
+        The place in the thesis that mentions the operation, and the statement at this place. Both
+        are empty if the thesis is silent.
     entries : tuple of str
         The identifiers of the apparatus entries that explain a disagreement.
     reason : str
@@ -50,21 +52,25 @@ class Row(NamedTuple):
 
     @property
     def is_explained(self) -> bool:
-        """Return whether the three decks and the thesis agree, or the row explains why not."""
+        """Return whether decks and thesis agree on the operation, or the row explains why not.
+
+        They agree if all three decks have the same statements, and the thesis agrees with them.
+        """
         agrees = self.decks == "agree" and len(self.cards) == len(PROGRAMS)
         return (agrees and self.thesis == "agrees") or bool(self.entries or self.reason)
 
 
 def rows() -> list[Row]:
-    """Return the rows of the collation table, in the order of the decks."""
+    """Return the rows of the collation table, in the order of the operations in the decks."""
     return [_row(each) for each in facts("cards/collation")["row"]]
 
 
 def faults(found: list[Row]) -> list[str]:
     """Return one sentence for each mistake or unexplained disagreement in the collation table.
 
-    `found` is the rows of the table. A mistake is an apparatus entry that is unknown, unused or
-    names no card of its row, or a card that is in no row, in two rows, or unknown.
+    `found` contains the rows of the table. An apparatus entry is a mistake if it is unknown, is in
+    no row, or names no card of its row. A card is a mistake if it is unknown, in no row, or in two
+    rows.
     """
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}
@@ -94,7 +100,7 @@ def faults(found: list[Row]) -> list[str]:
 def statements(program: str, cards: str) -> list[str]:
     """Return the statements on some cards of a program, without blanks, labels and comments.
 
-    `cards` names the cards, as in ``750-770, 800``.
+    `cards` contains the numbers of the cards as text, as in ``750-770, 800``.
     """
     found: list[str] = []
     for number in numbers(cards):
@@ -150,13 +156,16 @@ def _same(found: dict[str, list[str]]) -> bool:
 
 
 def _renamed(statement: str, names: str) -> str:
-    """Return a statement with names replaced: `names` is pairs of old and new, ``A=A1 B=B1``."""
+    """Return a FORTRAN statement with some names replaced.
+
+    `names` lists the old and the new name of each replacement, as in ``A=A1 B=B1``.
+    """
     changes = dict(each.split("=") for each in names.split())
     return re.sub(r"[A-Z][A-Z0-9]*", lambda name: changes.get(name[0], name[0]), statement)
 
 
 def _names_a_card(entry: dict[str, Any], row: Row) -> bool:
-    """Return whether an entry of the apparatus names a card of the row, or no card at all."""
+    """Return whether an apparatus entry names a card of a row of the table, or no card at all."""
     return not entry["cards"] or any(
         set(numbers(entry["cards"].get(program, ""))) & set(numbers(cards))
         for program, cards in row.cards.items()

@@ -1,9 +1,9 @@
-"""Decks: the cards of a program as fixed-form FORTRAN, and their runs with a Fortran compiler.
+"""Decks: the cards of a program as fixed-form FORTRAN, and runs of them after compilation.
 
-This is a third, independent way from the cards to the results, besides the Fortran port and the
-Python twin. It shares the table of cards with the edition, and no code with the port and the twin.
-The compiler reads the author's own statements and a separate version of LEQT1F, the linear solver
-(`data/cards/leqt1f.f`).
+The run of a deck is a third, independent way from the cards to the results, besides the Fortran
+port and the Python twin. It shares the table of cards with the edition, but no code with the port
+and the twin. The compiler translates the author's own statements, and a separate version of LEQT1F,
+the linear solver (`data/cards/leqt1f.f`).
 """
 
 import re
@@ -24,7 +24,9 @@ from pyharness.original.cards import deck, numbers
 
 DIALECTS = ("1982", "gfortran", "ftn")
 SYSTEMS = ("nos", "nosbe")
-MODELS = (3, 5)  # terms of the models that V.2 used in Case 6; the thesis has no decks of them
+# Numbers of terms of two further collocation programs, which V.2 of the thesis used in Case 6. The
+# thesis does not print their decks.
+MODELS = (3, 5)
 COMPILER = "gfortran"
 # REAL is binary64, variables are 0 until they are set, and no operations are fused.
 FLAGS = (
@@ -43,7 +45,8 @@ class Run(NamedTuple):
     tape5 : array (n, 7)
         TIME (s), U1 to U3 (rad/s) and V1 to V3 (m/s), one row for each record of TAPE5.
     page : str
-        TAPE6 as it was printed, without carriage control and trailing blanks.
+        The text of TAPE6, the printed output, without carriage-control characters and trailing
+        blanks.
     """
 
     tape5: np.ndarray
@@ -63,16 +66,16 @@ def deck_text(
     listing : Listing
         The program, its active defects and readings.
     scene : Scene, optional
-        A case of Table 1, which is set by the deck's own assignment cards and DO limit. By default
-        it is the case on the published cards: Case 2 with 300 steps in the collocation decks,
-        Case 5 with 100 steps in the Runge-Kutta deck.
+        A case of Table 1. Its numbers are written on the deck's own assignment cards, and its
+        number of steps in the DO statement. By default it is the case on the published cards: Case
+        2 with 300 steps in the collocation decks, Case 5 with 100 steps in the Runge-Kutta deck.
     dialect : {"1982", "gfortran", "ftn"}
-        "1982" is the text of the cards itself. "ftn", for the compiler for which the decks were
-        written, adds only the torque of Case 7. "gfortran" adds the torque of Case 7 and the
-        changes that a modern compiler needs.
-        Column 73 marks each card that a dialect adds or replaces.
+        With "1982" the text is that of the cards, without changes for a compiler. "ftn" is for the
+        compiler for which the decks were written, and adds only the torque of Case 7. "gfortran"
+        adds this torque and the changes that a modern compiler needs. A mark in column 73 shows
+        each card that a dialect adds or replaces.
     terms : int, optional
-        Number of terms, 3 or 5, of a collocation model whose deck the thesis does not print. The
+        Number of terms, 3 or 5, of a collocation program whose deck the thesis does not print. The
         deck is derived from the four-term deck, and is a conjecture.
 
     Raises
@@ -119,7 +122,7 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
     system : {"nos", "nosbe"}
         The operating system whose control statements surround the deck.
     rounds : bool
-        Whether FTN's option ROUND is set, by which sums, products and quotients are rounded.
+        Whether FTN's option ROUND is set, with which sums, products and quotients are rounded.
 
     Raises
     ------
@@ -140,9 +143,11 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
 def _is_made(
     alteration: Mapping[str, Any], listing: Listing, dialect: str, case: int | None
 ) -> bool:
-    """Return whether all conditions of an alteration of cards hold for a listing and a dialect.
+    """Return whether an alteration of cards applies to a listing, a dialect and a case.
 
-    `case` is the number of the case of Table 1, or None for the case on the published cards.
+    `alteration` is an entry of `data/cards/alterations.toml`, and applies if all its conditions are
+    satisfied. `case` is the number of the case of Table 1, or None for the case on the published
+    cards.
     """
     named = alteration.get
     return (
@@ -168,11 +173,12 @@ def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
 
 
 def model_cards(terms: int) -> dict[int, str]:
-    """Return the text of each card, by new card number, of a collocation deck with `terms` terms.
+    """Return the text of each card, by card number, of a collocation deck with `terms` terms.
 
-    The cards are modelled on the four-term deck. They are a conjecture, because V.2 used the three-
-    and five-term models in Case 6, but the thesis does not print their decks. With n terms the
-    collocation points are k/(n+1) of the interval, k = 1 to n.
+    The cards are derived from the four-term deck, and have new numbers. They are a conjecture,
+    because V.2 of the thesis uses models of three and five terms in Case 6, but the thesis does not
+    print their decks. With n terms the collocation points are at the fractions k/(n+1) of the
+    interval, where k is 1 to n.
     """
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
@@ -275,7 +281,7 @@ def _literal(value: float) -> str:
 
 
 def solver_cards() -> int:
-    """Return the number of cards in our version of LEQT1F, without comments."""
+    """Return the number of cards, except comments, in our version of the linear solver LEQT1F."""
     return sum(not line.startswith("C") for line in _SOLVER.read_text().splitlines())
 
 
@@ -285,14 +291,14 @@ def compiler() -> str | None:
 
 
 def run_deck(text: str, folder: Path | None = None) -> Run:
-    """Compile a deck in the dialect `gfortran`, run it, and return what it wrote.
+    """Compile and run a deck in the dialect `gfortran`, and return the contents of its files.
 
     Parameters
     ----------
     text : str
         The deck, as `deck_text` returns it.
     folder : Path, optional
-        A folder that keeps the compiled solver LEQT1F, as in `solver_object`. By default each call
+        A folder in which the compiled solver LEQT1F is stored for later calls. By default each call
         compiles the solver again.
 
     Raises
@@ -326,7 +332,7 @@ def _command(words: list[str], folder: Path) -> None:
 def _records(path: Path) -> np.ndarray:
     """Return the records of the unformatted file TAPE5 as an array of shape (n, 7).
 
-    Each record is 7 numbers between two copies of the record's length.
+    Each record of the file consists of 7 numbers between two copies of the length of the record.
     """
     record = np.dtype([("begin", "i4"), ("values", "f8", 7), ("end", "i4")])
     return np.fromfile(path, dtype=record)["values"]

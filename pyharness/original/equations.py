@@ -1,4 +1,4 @@
-"""Right-hand sides, and the record of a run, which the Python twins of all programs share."""
+"""Right-hand sides and the record of a run, for the Python twins of all three programs."""
 
 from collections.abc import Sequence
 
@@ -16,8 +16,8 @@ Vector = Sequence[float]
 def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
     """Return F, G, H of equations 16-18, the rates of change of omega (rad/s2).
 
-    `coefficients` is A, B, C of Euler's equations, `m` the torque over the moment of inertia about
-    each axis (1/s2), and `u` the angular velocity omega (rad/s).
+    `coefficients` contains A, B, C of Euler's equations, `m` the torque over the moment of inertia
+    about each axis (1/s2), and `u` the angular velocity omega (rad/s).
     """
     a, b, c = coefficients
     return [m[0] + a * u[1] * u[2], m[1] + b * u[0] * u[2], m[2] + c * u[0] * u[1]]
@@ -47,10 +47,10 @@ def accelerations(scene: Scene, listing: Listing) -> list[float]:
 
 
 def initial_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque of a scene over its moments (1/s2), or None.
+    """Return the initial torque of a scene over its moments of inertia (1/s2), or None.
 
-    It is None if the scene has no moments or is not a case of Table 1 with an initial torque. Under
-    the conjecture `initial-torque` this torque acts over the first step.
+    The result is None if the scene has no moments, or is not a case of Table 1 with an initial
+    torque. By the conjecture `initial-torque` this torque acts during the first step.
     """
     given = card_torque(scene)
     if given is None or scene.moments is None:
@@ -59,16 +59,16 @@ def initial_torque(scene: Scene) -> Vector | None:
 
 
 def card_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque (N m) that the thesis gives for a scene's case of Table 1.
+    """Return the initial torque (N m) that the thesis specifies for a scene's case of Table 1.
 
-    It is None if the scene is no such case, or if its case has no initial torque.
+    The result is None if the scene is not a case of Table 1, or if its case has no initial torque.
     """
     given = {each["case"]: each["torque"] for each in facts("printer")["initial_torque"]}
     return given.get(scene.case)
 
 
 def all_finite(values: Vector) -> bool:
-    """Return whether all values are finite: none is NaN or infinite."""
+    """Return whether all values are finite, so that no value is NaN or infinite."""
     return all(map(is_finite, values))
 
 
@@ -78,7 +78,8 @@ class Record:
     def __init__(self, scene: Scene, evaluations_per_step: int) -> None:
         """Start without rows.
 
-        `evaluations_per_step` is how often a step evaluates the right-hand sides.
+        `scene` supplies the step size. `evaluations_per_step` is the number of evaluations of the
+        right-hand sides in a step.
         """
         self._step_size = scene.step_size
         self._per_step = evaluations_per_step
@@ -86,10 +87,10 @@ class Record:
         self._ier: list[int] = []
 
     def add(self, recorded_time: float, omega: Vector, velocity: Vector, ier: int = 0) -> None:
-        """Add the row of the next step.
+        """Add the row of results of the next step.
 
-        `recorded_time` is TIME (s) as the program computes it. `ier` is the error code of the
-        linear solver in that step.
+        `recorded_time` is TIME (s) as the program computes it. `omega` (rad/s) and `velocity` (m/s)
+        are the results of the step. `ier` is the error code of the linear solver in the step.
         """
         true_time = (len(self._rows) + 1) * self._step_size
         self._rows.append([true_time, recorded_time, *omega, *velocity])
@@ -100,9 +101,10 @@ class Record:
     ) -> Trajectory:
         """Return the trajectory of all rows that were added.
 
-        `ended` says how the run ended, and `stop` what the stop test found if the test ended it.
-        `prints_ier` says whether the program prints IER, so that the trajectory has it. A step that
-        overflows counts among the evaluations, but has no row.
+        `ended` says how the run ended, as in `Trajectory`. `stop` is the result of the stop test if
+        this test ended the run. If `prints_ier`, the program prints the error code IER, and the
+        trajectory contains it. A step that overflows has no row, but its evaluations of the
+        right-hand sides are counted.
         """
         given = np.array(self._rows).reshape(-1, 8)
         rows = given.astype(np.float64)

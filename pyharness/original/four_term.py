@@ -1,6 +1,6 @@
 """Four-term collocation: the second program of the appendix, Jacobs 1982, IV.2.
 
-The residual of the equations of motion is zero at .2, .4, .6 and .8 of the interval.
+The residual of the equations of motion is zero at the fractions .2, .4, .6 and .8 of each step.
 """
 
 from collections.abc import Sequence
@@ -15,9 +15,10 @@ from pyharness.original.equations import Vector, accelerations, omega_rate, velo
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run a listing of the four-term program on a scene, and return its trajectory.
+    """Run the four-term program on a scene, and return its trajectory.
 
-    `lipschitz` and `may_stop` have no effect, because the program has no stop test.
+    `listing` is the program with its active defects, readings and conjectures. `lipschitz` and
+    `may_stop` have no effect, because the program has no stop test.
     """
     coefficients = scene.euler_coefficients
     acceleration = accelerations(scene, listing)

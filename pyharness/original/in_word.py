@@ -1,4 +1,7 @@
-"""Runs of a program's Python twin in a word, which is a floating-point format of `word.py`."""
+"""Runs of a program's Python twin in a word, which is a floating-point format of `word.py`.
+
+The twin is the Python port of one of the three programs of the thesis.
+"""
 
 import copy
 import importlib
@@ -19,8 +22,9 @@ def run(
 ) -> Trajectory:
     """Run the Python twin of a listing's program in a word, which is a floating-point format.
 
-    The other parameters are those of `run_program`; no argument is checked. The trajectory has the
-    floats that are nearest to the results, and in `exact` the results as numbers of the word.
+    The other parameters are those of `run_program`, but no argument is checked. The trajectory
+    contains the results rounded to floats. Its attribute `exact` contains the results as numbers of
+    the word.
     """
     twin = importlib.import_module(f"pyharness.original.{listing.program.replace('-', '_')}")
     found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)
@@ -32,7 +36,7 @@ def run(
 def scene_in(scene: Scene, word: Word) -> Scene:
     """Return a copy of `scene` with all its numbers, except counts, converted to a word.
 
-    The scene must have been checked, because the copy is not.
+    The numbers of the copy are not checked. Therefore `scene` itself must have been checked.
     """
     law = scene.torque
 

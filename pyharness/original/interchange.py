@@ -1,6 +1,6 @@
 """Conversions between numbers of an IEEE 754 word and the bytes of its interchange format.
 
-The bytes are in this machine's order, as the compiled programs take and return them.
+The bytes of a number are in the byte order of this machine, as the compiled programs require.
 """
 
 import math
@@ -18,7 +18,10 @@ _BITS = {24: 32, 53: 64, 113: 128}
 
 
 def n_bytes(word: Word) -> int:
-    """Return how many bytes a number of `word` has; `word` is binary32, binary64 or binary128."""
+    """Return the number of bytes of a number in the interchange format of a word.
+
+    `word` is binary32, binary64 or binary128.
+    """
     return _BITS[word.p] // 8
 
 
@@ -34,9 +37,10 @@ def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
 
 
 def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
-    """Return the numbers of `word` that `given`, an array made by `to_bytes`, represents.
+    """Return the numbers of a word that an array of bytes, as `to_bytes` returns it, represents.
 
-    The first axis of `given` runs over the bytes of a number. The result has the other axes.
+    `given` is the array of bytes, in column-major order. Its first axis is the bytes of a number.
+    The shape of the result is that of the other axes.
     """
     size = n_bytes(word)
     written = given.tobytes(order="F")
@@ -53,7 +57,8 @@ def _pattern(x: Number) -> int:
     places, most = p - 1, (1 << _BITS[p] - p) - 1
     if x.m:
         sign, coefficient = x.m < 0, abs(x.m)
-        # A subnormal number has the exponent field 0, with the unit of the exponent field 1.
+        # A subnormal number has the exponent field 0, but the same unit in the last place as a
+        # number with the exponent field 1.
         field = x.e + places + (most >> 1) if coefficient >> places else 0
         fraction = coefficient & (1 << places) - 1
     else:

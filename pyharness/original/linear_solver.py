@@ -1,6 +1,7 @@
 """A replacement for LEQT1F of the IMSL library, which solves A X = B for several right-hand sides.
 
-This solver computes LU factors in Crout's order, with implicit row scaling and partial pivoting.
+The replacement computes LU factors in Crout's order, with implicit row scaling and partial
+pivoting.
 """
 
 SINGULAR = 129
@@ -11,8 +12,8 @@ def leqt1f(
 ) -> tuple[list[list[float]], int]:
     """Return the solutions x of A x = b for all right-hand sides b, and the error code IER.
 
-    `matrix` is the rows of A, and `right_hand_sides` is a list of vectors b; both stay unchanged.
-    If A is algorithmically singular, IER is `SINGULAR`, and every b is returned instead of its x.
+    `matrix` contains the rows of A, and `right_hand_sides` the vectors b. Neither is changed. If A
+    is algorithmically singular, IER is `SINGULAR` (129), and every b is returned instead of its x.
     Otherwise IER is 0.
     """
     factors = [list(row) for row in matrix]
@@ -25,8 +26,8 @@ def leqt1f(
 def _factor(a: list[list[float]]) -> list[int] | None:
     """Overwrite `a`, the rows of a matrix, by its LU factors, and return the pivot rows.
 
-    They are, for each column, the index of the row that was exchanged with the row of the diagonal.
-    The result is None if the matrix is singular.
+    The pivot row of a column is the index of the row that was exchanged with the row of the
+    diagonal element. The result is None if the matrix is singular.
     """
     n = len(a)
     pivots = []
@@ -44,8 +45,8 @@ def _factor(a: list[list[float]]) -> list[int] | None:
                 total = total - row[k] * a[k][j]
             row[j] = total
 
-        # Elements on and below the diagonal are candidates for the pivot. The first one is taken if
-        # several have the same scaled magnitude.
+        # The pivot is the element on or below the diagonal with the largest scaled magnitude. If
+        # several elements have this magnitude, the first one is taken.
         biggest = 0.0
         pivot = j
         for i in range(j, n):
@@ -66,9 +67,9 @@ def _factor(a: list[list[float]]) -> list[int] | None:
 
 
 def _substitute(a: list[list[float]], pivots: list[int], b: list[float]) -> list[float]:
-    """Return the solution for the right-hand side `b`, by forward and backward substitution.
+    """Return the solution x of A x = b, by forward and backward substitution.
 
-    `a` is the LU factors and `pivots` the row exchanges that `_factor` made.
+    `a` contains the LU factors of A, and `pivots` the pivot rows, as `_factor` computes them.
     """
     n = len(a)
     x = list(b)

@@ -1,4 +1,4 @@
-"""Runs of the appendix's programs for many bodies in one call."""
+"""Runs of a compiled program of the thesis's appendix for many bodies in one call."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -30,16 +30,17 @@ from pyharness.model.values import Number, boolean, integer, number_list
 from pyharness.original.compiled import stop_reads_velocity
 from pyharness.original.equations import card_torque
 
-_LEAST_WORK = 100_000  # fewest steps, of all bodies of a piece, that are worth a thread
-_PIECES = 8  # pieces for each thread, because bodies may end early
+_LEAST_WORK = 100_000  # fewest steps, over all bodies of one call, that are worth a thread
+_PIECES = 8  # calls of the kernel for each thread, because the runs of some bodies may end early
 _NOT_REACHED = -1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ProgramEnsemble(BatchResult):
-    """The results of a program for n bodies, at m steps each.
+    """The results of a program for n bodies, with rows for m steps of each body.
 
-    A row that a body did not reach is NaN, and -1 in `ier`. `run_many` returns a ProgramEnsemble.
+    A row is NaN, and -1 in `ier`, if the run of the body ended before that step. `run_many` returns
+    a ProgramEnsemble.
 
     Attributes
     ----------
@@ -53,16 +54,18 @@ class ProgramEnsemble(BatchResult):
     velocity : ndarray, shape (n, m, 3), or None
         Translational velocity along the body axes, m/s; None if it was not requested.
     recorded_time : ndarray, shape (m,), or (n, m) where the step sizes differ
-        The TIME that the program writes to TAPE5, s. A single row for all bodies has NaN at a step
-        that no body reached.
+        The variable TIME of the program, which it writes to its file TAPE5, s. If one row applies
+        to all bodies, it has NaN at a step that no body reached.
     n_rows : ndarray of int32, shape (n,)
-        The number of steps with a result.
+        The number of steps of each body that have a result.
     stop_variable : ndarray of int8, shape (n,)
-        The variable by which the stop test ended a run: 1-3 for U1-U3, 4-6 for V1-V3, 7 for the
-        norm of U, 8 for the norm of U and V; 0 if the test did not end the run.
+        The variable that failed the stop test, or 0 if this test did not end the run: 1-3 for
+        U1-U3, 4-6 for V1-V3, 7 for the norm of U, 8 for the norm of U and V. U is the angular
+        velocity and V the translational velocity.
     stop_quotient : ndarray, shape (n,)
-        If the stop test ended a run, the change of the right-hand sides K over the change of the
-        unknowns U (1/s), infinite if U did not change. NaN if the test did not end the run.
+        The change of the right-hand side over the change of the variable that failed the stop test
+        (1/s). It is infinite if the variable did not change, and NaN if the test did not end the
+        run.
     ier : ndarray of int32, shape (n, m), or None
         The error code IER of the linear solver, as the collocation programs print it; None for the
         Runge-Kutta program.
@@ -77,7 +80,8 @@ class ProgramEnsemble(BatchResult):
     ier: NDArray[np.int32] | None
 
 
-# Annotations as text: otherwise the signature shows ArrayLike's definition, 300 characters each.
+# The annotations are text, because otherwise the signature shows the definition of ArrayLike, which
+# has 300 characters, in each of them.
 def run_many(
     scene: Scene,
     listing: Listing,
@@ -103,24 +107,26 @@ def run_many(
     scene : Scene
         The scene that supplies every value for which no array is specified.
     listing : Listing
-        The program, its active defects and readings.
+        The program with its active defects, readings and conjectures.
     omega0, moments, coefficients, torque_constant : array_like, shape (n, 3) or (3,), optional
-        Values in place of the scene's: initial angular velocities (rad/s), moments (kg m2) or
-        coefficients A, B, C, and torques. Torques are in N m, or in 1/s2 for bodies specified by
-        coefficients. At most one of `moments` and `coefficients` may be specified.
+        Values that replace those of the scene: initial angular velocities (rad/s), moments of
+        inertia (kg m2) or Euler coefficients A, B, C, and constant torques. Torques are in N m, or
+        in 1/s2 for bodies specified by coefficients. At most one of `moments` and `coefficients`
+        may be specified.
     step_size, lipschitz : array_like, shape (n,) or one number, optional
-        Step sizes (s; by default the scene's) and constants of the stop test (1/s).
+        Step sizes (s; by default the step size of the scene) and constants of the stop test (1/s).
     may_stop : bool
         Whether the stop test, which only the Runge-Kutta program has, may end runs.
     velocity : bool
         Whether to return the translational velocities.
     at : sequence of int, optional
-        The steps whose rows are returned, counted from 1, in any order; by default the last step.
+        The steps whose results are returned, counted from 1, in any order; by default only the last
+        step.
     threads : int
         The number of threads among which the bodies are divided. The results do not depend on it.
     effort : float
-        Factor on the work limit. The work is the number of bodies times steps, times one plus the
-        number of waves of the torque.
+        Factor on the work limit. The work is the product of the number of bodies, the number of
+        steps, and one plus the number of sines and cosines in the torque.
 
     Returns
     -------
@@ -131,9 +137,9 @@ def run_many(
     Raises
     ------
     InputError
-        If `run_program` would refuse a body; the message names its row. Also if the arrays differ
-        in their numbers of rows, if the results do not fit in memory, or if the work limit is
-        exceeded.
+        If `run_program` would reject a body; the message names the row of this body. Also if the
+        arrays differ in their numbers of rows, if the results do not fit in memory, or if the work
+        limit would be exceeded.
     NotBuiltError
         If the extension is not built.
 
@@ -198,8 +204,8 @@ def _run(
 ) -> ProgramEnsemble:  # fmt: skip
     """Run the program of `run_many` for n bodies, with arguments that have been checked.
 
-    `by_moments` says whether ``inputs["body"]`` has moments or coefficients. `wanted` is the steps
-    whose rows are returned.
+    `inputs` contains the arrays of the arguments by name. ``inputs["body"]`` contains moments if
+    `by_moments`, else coefficients. `wanted` contains the steps whose results are returned.
     """
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
@@ -209,7 +215,7 @@ def _run(
     )
     computes_velocity = velocity or stop_reads_velocity(listing, may_stop)
     prints_ier = listing.program != "runge-kutta"
-    # The kernel needs at least one row.
+    # The kernel needs at least one requested step.
     at = np.unique(wanted) if wanted.size else np.full(1, scene.steps, dtype=np.int32)
     back = np.searchsorted(at, wanted)
     # The first axis is the body, so that the transposes are the kernel's column-major arrays.
@@ -250,10 +256,11 @@ def _run(
 
 
 def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
-    """Yield the range of bodies for each call of the kernel.
+    """Yield the range of bodies for each call of the kernel, the compiled program.
 
-    One thread takes all n bodies in one call. For several threads the calls are shorter, and each
-    but the last has a multiple of the number of bodies that the kernel processes side by side.
+    A single thread processes all n bodies in one call. Several threads share a larger number of
+    calls. The number of bodies in each call but the last is a multiple of the number of bodies that
+    the kernel processes simultaneously. `steps` is the number of steps of each body.
     """
     size = n
     if threads > 1:
@@ -276,9 +283,10 @@ def _check_ends(step_size: Array, steps: int) -> None:
 
 
 def _steps(at: Sequence[SupportsIndex] | None, steps: int) -> NDArray[np.int32]:
-    """Return the steps `at` whose rows were requested; by default only the last of `steps` steps.
+    """Return the requested steps `at` as an array; if `at` is None, only the last step.
 
-    Raise InputError if a requested step is not from 1 to `steps`.
+    `steps` is the number of steps of the run. Raise InputError if a requested step is not from 1 to
+    `steps`.
     """
     if at is None:
         return np.array([steps], dtype=np.int32)

@@ -1,8 +1,8 @@
 """Numbers of a CDC machine, written in octal, and the results of CDC instructions on them.
 
-A CDC word has 60 bits: an exponent field of 12 bits, of which the lower 11 hold the exponent, and a
-coefficient of 48 bits. All 60 bits of a negative number are complemented. The exponent is the field
-minus 2000 (octal), plus one if the field is below 2000.
+A CDC word has 60 bits: a sign bit, an exponent field of 11 bits, and a coefficient of 48 bits. All
+60 bits of a negative number are complemented. The exponent is the field minus 2000 (octal), plus
+one if the field is below 2000 (octal).
 """
 
 import math
@@ -27,9 +27,10 @@ _INSTRUCTIONS = tuple(
 def from_octal(text: str) -> Pair:
     """Return the number m 2**e that a CDC word represents, as the pair (m, e).
 
-    `text` is the 60-bit word as 20 octal digits; blanks are ignored. A word whose bits are all zero
-    or all one is zero. For zero, infinity and nan, m is 0 and e is the value as a float. Raise
-    InputError if the text is not 20 octal digits, or if the coefficient is not normalised.
+    `text` is the 60-bit word as 20 octal digits; blanks are ignored. A word whose bits are all 0 or
+    all 1 represents the number zero. For zero, infinity and nan, m is 0 and e is the value as a
+    float. Raise InputError if the text is not 20 octal digits, or if the coefficient is not
+    normalised.
     """
     digits = "".join(text.split()) if isinstance(text, str) else ""
     if not _WORD.fullmatch(digits):
@@ -54,7 +55,8 @@ def from_octal(text: str) -> Pair:
 def to_octal(number: Pair) -> str:
     """Return the CDC word of a number, as 20 octal digits in groups of four.
 
-    `number` is a pair (m, e) as `from_octal` returns it, with a coefficient m of 48 bits.
+    `number` is a pair (m, e), which represents m 2**e. m has 48 bits. For zero, infinity and nan, m
+    is 0 and e is the value as a float.
     """
     m, e = number
     if m:
@@ -68,9 +70,9 @@ def to_octal(number: Pair) -> str:
 def operated(name: str, x: str, y: str) -> str:
     """Return the result of a CDC instruction on the CDC words `x` and `y`, all in octal.
 
-    `name` is an operation of two registers: F (truncating) or R (rounding), X, and an operator, as
-    in ``FX*``. A sum or difference is normalised only with NX, as in ``RX+ NX``. Raise InputError
-    if the instruction is unknown, or if `x` or `y` is not a CDC word.
+    `name` is the instruction: F (truncating) or R (rounding), X, and the operator +, -, * or /, as
+    in ``FX*``. A sum or difference is normalised only if NX follows, as in ``RX+ NX``. Raise
+    InputError if the instruction is unknown, or if `x` or `y` is not a CDC word.
     """
     if name not in _INSTRUCTIONS:
         raise unknown("instruction", name, _INSTRUCTIONS)

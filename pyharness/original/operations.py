@@ -1,9 +1,9 @@
-"""Counts of the floating-point operations of a program's step, made on the cards themselves.
+"""Counts of the floating-point operations in a step of a program, made on the cards themselves.
 
-The statements of a deck are interpreted as the author wrote them, on numbers that count the
+The statements of a deck are interpreted as the author wrote them, with numbers that count the
 operations applied to them. The linear solver LEQT1F is our own version, because the original source
-is not published. `T**2` counts as one multiplication, `T**3` and `T**4` count as two. Subscripts,
-jumps, ABS and WRITE are not counted.
+is not published. `T**2` counts as one multiplication, and `T**3` and `T**4` count as two each.
+Operations in subscripts, jumps, ABS and WRITE are not counted.
 """
 
 import re
@@ -24,15 +24,15 @@ _TARGET = re.compile(r"(\w+?)(?:\(([\w,]+)\))?=(.*)")
 
 
 class Count(NamedTuple):
-    """The number of additions, subtractions, multiplications and divisions of a step.
+    """The number of additions, subtractions, multiplications and divisions in a program's step.
 
     Attributes
     ----------
     written : int
-        The number of all operations that the cards perform.
+        The number of all operations that the statements on the cards perform.
     once : int
-        The number of distinct operations. An operation that repeats an earlier one of the same step
-        on the same operands is not counted.
+        The number of distinct operations. An operation is not counted if the same operation was
+        applied to the same operands earlier in the step.
     """
 
     written: int
@@ -40,7 +40,7 @@ class Count(NamedTuple):
 
 
 class _Counter:
-    """A counter of the operations of a step, which keeps the result of each distinct operation."""
+    """A counter of the operations in a step, which stores the result of each distinct operation."""
 
     def __init__(self) -> None:
         self.written = 0
@@ -68,8 +68,8 @@ def _value(x: Any) -> float:
 class _Number:
     """A floating-point value whose operations are counted by its counter.
 
-    The same operation on the same operands returns the same object, so that the identity of the
-    object tells how the value was computed.
+    The same operation on the same operands returns the same object. Therefore two objects are
+    identical exactly if their values were computed in the same way.
     """
 
     def __init__(self, counter: _Counter, value: float) -> None:
@@ -126,9 +126,9 @@ class _Array(defaultdict[tuple[int, ...], Any]):
 
 
 def operations_per_step(listing: Listing) -> Count:
-    """Return the operation counts of a program's first step.
+    """Return the operation counts of the first step that the program of a listing performs.
 
-    The step is the first one of the case on the published cards of the program's deck.
+    The scene is the case of Table 1 that is on the published cards of the program's deck.
     """
     statements = list(_statements(deck_text(listing)))
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))
@@ -147,9 +147,9 @@ def operations_per_step(listing: Listing) -> Count:
 
 
 def _moved(value: Any, counter: _Counter) -> Any:
-    """Return a value that was computed before the step, attached to the counter of the step.
+    """Return a copy of a value from before the step, whose operations `counter` counts.
 
-    `value` is a number or an array of numbers; anything else is returned unchanged.
+    `value` is a number or an array of numbers. Any other object is returned unchanged.
     """
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}
@@ -158,7 +158,10 @@ def _moved(value: Any, counter: _Counter) -> Any:
 
 
 def _statements(text: str) -> Iterator[tuple[str, str]]:
-    """Return the label and the text of every statement of a deck, both without blanks."""
+    """Return the label and the text of every statement of a deck, both without blanks.
+
+    `text` is the deck as fixed-form FORTRAN.
+    """
     found: list[list[str]] = []
     for line in text.splitlines():
         label, goes_on, rest = line[:5].strip(), line[5], "".join(line[6:72].split())

@@ -1,9 +1,9 @@
 """The line-printer output of a program, made from its trajectory.
 
-The page is what appeared on paper, without the first character of each record, which is the
-carriage control. That character is always a blank (`data/printer.toml` has the FORMATs, and marks
-what is conjecture). The library `fortranformat` writes the values by the FORMATs. Two kinds of
-value are treated here: zero, and values that are not finite.
+The page is the text that appeared on paper. It lacks the first character of each record, which
+controls the carriage and is always a blank. `data/printer.toml` contains the FORMATs of the
+programs, and marks which parts of them are conjecture. The library `fortranformat` writes the
+values by the FORMATs. Only zeros and values that are not finite are treated in this module.
 """
 
 import math
@@ -22,8 +22,8 @@ from pyharness.model.trajectory import Trajectory
 
 # Zero has no minus sign (FORTRAN 77, 13.5.9).
 _MINUS_ZERO = re.compile(r"-(0?\.0*)(?!\d)")
-# A value that is not finite is printed as one too wide for its field, by asterisks. The machine
-# printed R or I there, which says no more.
+# A value that is not finite is printed as asterisks, like a value that is too wide for its field.
+# The machine printed R or I instead, which contains no more information.
 _TOO_WIDE = 1e300
 _PLACES = re.compile(r"F\d+\.(\d+)")
 
@@ -31,9 +31,10 @@ _PLACES = re.compile(r"F\d+\.(\d+)")
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
     """Return the text that `program` prints for its run, written by the program's FORMATs.
 
-    The header has the scene's moments and torques; the scene must have moments. One line for each
-    row of `trajectory`, the run's results, follows. If the stop test ended the run, the last line
-    is the row of the step that failed the test. Lines have no trailing blanks.
+    The header contains the moments and torques of `scene`, which must have moments. It is followed
+    by one line for each row of `trajectory`, which contains the results of the run. If the stop
+    test ended the run, the last line is the row of the step that failed the test. Lines have no
+    trailing blanks.
     """
     formats = formats_of(program)
     assert scene.moments is not None
@@ -51,8 +52,8 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
 def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
     """Return omega (rad/s) and velocity (m/s) of each row of a trajectory, as six floats.
 
-    If the run had another arithmetic than binary64, its numbers are rounded to the decimals of
-    `form`, the FORMAT of the rows, so that the floats print like those numbers.
+    If the arithmetic of the run was not binary64, its numbers are rounded to as many decimals as
+    `form`, the FORMAT of the rows, prints. The floats are then printed like the exact numbers.
     """
     if trajectory.exact is None:
         assert trajectory.velocity is not None
@@ -79,7 +80,9 @@ def _to_places(x: Any, places: int) -> float:
 def formats_of(program: str) -> dict[str, Any]:
     """Return the FORMATs of a program, by the keys ``header``, ``heads`` and ``rows``.
 
-    Further keys name the cards, and say which characters are certain and which are conjecture.
+    ``header`` is the FORMAT of moments and torques, ``heads`` of the column heads, and ``rows`` of
+    a row of results. Further keys name the cards of the FORMATs, and say which characters are
+    certain and which are conjecture.
     """
     formats: dict[str, dict[str, Any]] = {
         each["name"]: each for each in facts("printer")["program"]
@@ -90,8 +93,8 @@ def formats_of(program: str) -> dict[str, Any]:
 def _torque_cards(scene: Scene) -> tuple[float, float, float]:
     """Return the three torques (N m) that the cards of the deck hold for a scene.
 
-    They are the initial torques of a case that has them, because no card has a torque that varies
-    with time. For any other scene they are its constant torques.
+    For a case of Table 1 with initial torques these are the initial torques, because no card has a
+    torque that varies with time. For any other scene they are its constant torques.
     """
     cards = {entry["case"]: entry["torque"] for entry in facts("printer")["initial_torque"]}
     first, second, third = cards.get(scene.case, scene.torque.constant)
@@ -99,9 +102,10 @@ def _torque_cards(scene: Scene) -> tuple[float, float, float]:
 
 
 def write(text: str, values: Sequence[float]) -> list[str]:
-    """Return the records that a WRITE of `values` by the FORMAT `text` makes.
+    """Return the records (lines) that a WRITE statement of FORTRAN makes of some values.
 
-    Each record begins with its carriage control.
+    `text` is the FORMAT of the statement, and `values` are the values. Each record begins with its
+    carriage-control character.
     """
     printed: str = _writer(text).write([x if math.isfinite(x) else _TOO_WIDE for x in values])
     return [_MINUS_ZERO.sub(r" \1", record) for record in printed.split("\n")]

@@ -1,4 +1,4 @@
-"""The programs of the appendix by name, to be run compiled or as Python twins."""
+"""The three programs of the thesis's appendix, to be run as compiled programs or Python twins."""
 
 import importlib
 from dataclasses import dataclass
@@ -43,9 +43,8 @@ class Program:
     ) -> Trajectory:
         """Run a listing of this program and return its trajectory.
 
-        The parameters, the result and the errors are those of the function `run_program`.
-
-        Raise InputError if the listing belongs to another program.
+        The parameters, the result and the exceptions are those of the function `run_program`. In
+        addition, InputError is raised if the listing belongs to another program.
         """
         checked_scene(scene)
         checked_listing(listing)
@@ -87,7 +86,8 @@ class Program:
 def work_of(word: str, implementation: str) -> str:
     """Return the key by which `check_steps` finds the work limit of a program.
 
-    `word` is the arithmetic, and `implementation` is ``fortran`` or ``python``.
+    `word` is the name of the arithmetic, as in ``binary64``. `implementation` is ``fortran`` for
+    the compiled program or ``python`` for its twin.
     """
     if word == BINARY64:
         return implementation
@@ -97,9 +97,9 @@ def work_of(word: str, implementation: str) -> str:
 def checked_word(word: object, implementation: str) -> str:
     """Return `word` if it is the name of an arithmetic in which the implementation can run.
 
-    `implementation` is ``fortran``, the compiled programs, or ``python``, the twins. Raise
-    InputError if the name is unknown, or if the compiled programs are to run in an arithmetic that
-    they do not support.
+    `implementation` is ``fortran`` for the compiled programs, or ``python`` for their Python ports,
+    the twins. Raise InputError if the name is unknown, or if the compiled programs do not support
+    the arithmetic.
     """
     if not isinstance(word, str) or word not in WORD_NAMES:
         raise unknown("word", word, WORD_NAMES, "--word")
@@ -135,9 +135,9 @@ def run_program(
     Parameters
     ----------
     scene : Scene
-        The body, the initial condition, the torque and the steps.
+        The body, the initial condition, the torque, the step size and the number of steps.
     listing : Listing
-        The program, its active defects and readings.
+        The program with its active defects, readings and conjectures.
     implementation : {"fortran", "python"}
         The compiled program or its Python port, the twin. Their results are bit-for-bit identical.
     lipschitz : float
@@ -146,19 +146,19 @@ def run_program(
         Whether the stop test may end the run.
     velocity : bool
         Whether the translational velocity is needed. If False, the compiled program computes it
-        only if the stop test reads it, and does not return it. No other result depends on this.
+        only if the stop test reads it, and does not return it. The other results are the same.
     effort : float
-        Factor on the work limit, which counts the steps and, for each step, the waves of the
-        torque.
+        Factor on the work limit. The work is the number of steps, plus a contribution of each sine
+        or cosine of the torque in each step.
     word : str
         The arithmetic, one of `pyharness.original.programs.WORD_NAMES`. An arithmetic that is not
-        in `COMPILED_WORDS` there needs `implementation="python"`.
+        in `pyharness.original.programs.COMPILED_WORDS` needs `implementation="python"`.
 
     Returns
     -------
     Trajectory
-        One row for each step, up to a stop or an overflow. In an arithmetic other than binary64,
-        `exact` has the numbers as that arithmetic represents them.
+        One row of results for each step, up to a stop or an overflow. In an arithmetic other than
+        binary64, the attribute `exact` contains the results as numbers of that arithmetic.
 
     Raises
     ------

@@ -4,9 +4,9 @@ A number is a pair (m, e) of integers with the value m 2**e. m has p bits, or fe
 number. If m is 0, e is the float that the pair represents: 0.0, -0.0, inf, -inf or nan. The
 operands of an `Operation` must have m other than 0, but its result may have m = 0.
 
-No library of software floating point has all the rules that are needed here. mpmath and gmpy2 round
-correctly, but have no limited range of exponents. SoftFloat and numpy have only the formats of
-IEEE 754. No library has the rules of the CDC (`cdc.py`).
+No library of software floating-point arithmetic has all the rules that the project needs. mpmath
+and gmpy2 round correctly, but have no limited range of exponents. SoftFloat and numpy have only the
+formats of IEEE 754. No library has the rules of the CDC machines (`cdc.py`).
 """
 
 import math
@@ -26,14 +26,15 @@ class Rules(NamedTuple):
     Attributes
     ----------
     nearest : Rounding
-        Rounds to nearest, ties to even; for square roots, sines, cosines and literals.
+        Rounds to nearest, ties to even. It is used for square roots, sines, cosines and literals.
     cut : Rounding
-        Truncates towards zero; for literals in a word that truncates them.
+        Truncates towards zero. It is used for literals if the word truncates them.
     add, multiply, divide : Operation
-        Operations on two numbers. A difference is computed as the sum with the negative.
+        Sum, product and quotient of two numbers. A difference is computed as the sum with the
+        negative.
     difference : Operation
-        The sum with which two numbers are compared, one of them with opposite sign. The two numbers
-        are equal if it is zero.
+        A sum that is used only to compare two numbers: one number plus the negative of the other.
+        The two numbers are equal if this sum is zero.
     signed_zero : bool
         Whether the word has -0.0 besides 0.0.
     """
@@ -51,9 +52,9 @@ def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Roundin
     """Return a function that rounds m 2**e to p bits and an exponent from `least` to `most`.
 
     The integer m may have any length. The function truncates towards zero if `cut`, else it rounds
-    to nearest, ties to even. A value whose exponent exceeds `most` becomes infinite. A value whose
-    exponent is below `least` underflows gradually, as in IEEE 754, if `gradual`; else it becomes
-    zero.
+    to nearest, ties to even. If the exponent of the result would exceed `most`, the result is
+    infinite. If it would be below `least`, the result underflows gradually, as in IEEE 754, if
+    `gradual`; else it is zero.
     """
     shortened = _cut if cut else _to_even
 
@@ -95,7 +96,8 @@ def ieee(p: int, largest: int, cut: bool) -> Rules:
 
     Numbers are below 2**(largest + 1). If `cut`, sums, products and quotients are truncated towards
     zero, else rounded to nearest. A truncated result that is too large becomes infinite, as on
-    machines that truncated. IEEE 754 would return the largest number.
+    machines that truncated. In this point the arithmetic deviates from IEEE 754, by which it would
+    become the largest number.
     """
     least, most = 2 - largest - p, largest - p + 1
     fit = rounding(p, least, most, cut, gradual=True)
@@ -105,7 +107,8 @@ def ieee(p: int, largest: int, cut: bool) -> Rules:
             xm, xe, ym, ye = ym, ye, xm, xe
         apart = xe - ye
         if apart > p + 2:
-            # y is below an eighth of x's last unit: any such number of its sign rounds the same.
+            # y is below an eighth of the last unit of x. Any such y of the same sign has the same
+            # effect on the rounded sum.
             return fit((xm << 3) + (1 if ym > 0 else -1), xe - 3)
         return fit((xm << apart) + ym, ye)
 

@@ -1,7 +1,7 @@
 """Runge-Kutta: the third program of the appendix, Jacobs 1982, eq. 31 and IV.3.
 
-The stop test is the thesis's use of the Lipschitz condition (eq. 19): a run ends when, within a
-step, the right-hand sides change by more than a constant times the change of the unknowns.
+The stop test is the thesis's use of the Lipschitz condition (eq. 19). It ends a run if, within a
+step, the change of the right-hand sides exceeds a constant times the change of the unknowns.
 """
 
 import math
@@ -24,16 +24,17 @@ from pyharness.original.equations import (
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run a listing of the Runge-Kutta program on a scene, and return its trajectory.
+    """Run the Runge-Kutta program on a scene, and return its trajectory.
 
-    `lipschitz` is the constant of the stop test (1/s). The test is skipped without `may_stop`.
+    `listing` is the program with its active defects, readings and conjectures. `lipschitz` is the
+    constant of the stop test (1/s). If `may_stop` is false, the stop test is skipped.
     """
     a, b, c = scene.euler_coefficients
     acceleration = accelerations(scene, listing)
     dt = scene.step_size
     time = 0.0
     base = [*scene.omega, 0.0, 0.0, 0.0]
-    # Each stage is evaluated and stored under the program's own index: 1, 2, 3, 4.
+    # Points and slopes of the stages are stored under the program's own indices: 1, 2, 3, 4.
     zero = [0.0] * 6
     point = {1: base, 2: zero, 3: zero, 4: zero}
     slope = {1: zero, 2: zero, 3: zero, 4: zero}
@@ -108,9 +109,11 @@ def lipschitz_test(
 
     `change_k` and `change_u` are the magnitudes of the changes of the six right-hand sides and of
     the six unknowns within one step. The condition is violated if the change of the right-hand
-    sides exceeds `lipschitz` (1/s) times the change of the unknowns. The two changes are norms, or
-    with the defect `lipschitz-per-component` those of one component after the other. The quotient
-    is the first change over the second, infinite if the second is zero.
+    sides exceeds `lipschitz` (1/s) times the change of the unknowns. The compared changes are the
+    norms over omega. With the defect `lipschitz-per-component` in `listing`, each component is
+    compared by itself. With the defect `lipschitz-tests-velocity` the velocity is included. The
+    quotient is the change of the right-hand sides over the change of the unknowns. It is infinite
+    if the unknowns do not change.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

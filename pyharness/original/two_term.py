@@ -1,6 +1,6 @@
 """Two-term collocation: the first program of the appendix, Jacobs 1982, IV.2.
 
-The residual of the equations of motion is zero at one third and two thirds of the interval.
+The residual of the equations of motion is zero at one third and two thirds of each step.
 """
 
 from collections.abc import Sequence
@@ -15,9 +15,10 @@ from pyharness.original.equations import Vector, accelerations, omega_rate, velo
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run a listing of the two-term program on a scene, and return its trajectory.
+    """Run the two-term program on a scene, and return its trajectory.
 
-    `lipschitz` and `may_stop` have no effect, because the program has no stop test.
+    `listing` is the program with its active defects, readings and conjectures. `lipschitz` and
+    `may_stop` have no effect, because the program has no stop test.
     """
     a, b, c = scene.euler_coefficients
     unset_c1 = 0.0

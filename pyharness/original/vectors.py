@@ -1,9 +1,10 @@
-"""Test vectors of the CDC's arithmetic: instructions, operands and results, and our own results.
+"""Test vectors for the arithmetic of CDC machines, and the results that we compute for them.
 
-The vectors in `data/words/cdc.json` follow from the rules of the CYBER 170 hardware reference (CDC
-60463560). A public emulator of that machine's floating-point unit gives the same results. A file of
-test vectors is a JSON object with `schema` and `vectors`, a list of objects. Each object has
-`name`, `op` (an instruction of `octal.operated`), and `x`, `y` and `result` in octal.
+A test vector is an instruction with two operands and the expected result. The vectors in
+`data/words/cdc.json` follow from the rules of the CYBER 170 hardware reference (CDC 60463560). A
+public emulator of the floating-point unit of this machine gives the same results. A file of test
+vectors is a JSON object with `schema`, and with `vectors`, a list of objects. Each object has
+`name`, `op` (an instruction as in `octal.operated`), and `x`, `y` and `result` in octal.
 """
 
 import json
@@ -22,7 +23,10 @@ _FIELDS = ("name", "op", "x", "y", "result")
 
 
 class Vector(NamedTuple):
-    """A test vector: name, CDC instruction, two operands and expected result, both in octal."""
+    """A test vector: its name, a CDC instruction, two operands and the expected result.
+
+    `op` is the instruction. The operands `x` and `y` and the result are CDC words in octal.
+    """
 
     name: str
     op: str
@@ -32,22 +36,22 @@ class Vector(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A test vector, and the result of its instruction that we compute (`found`, in octal)."""
+    """A test vector, and `found`, the result in octal that we compute for its instruction."""
 
     vector: Vector
     found: str
 
     @property
     def agrees(self) -> bool:
-        """Return whether our result is the expected one; blanks are ignored."""
+        """Return whether our result equals the expected result; blanks are ignored."""
         return "".join(self.vector.result.split()) == "".join(self.found.split())
 
 
 def answers(path: str | Path = OURS) -> list[Answer]:
     """Return the test vectors of a JSON file, each with the result that we compute.
 
-    By default `path` is our own file, `data/words/cdc.json`. Raise InputError if the file can't be
-    read, does not have the right form, or has no vectors.
+    By default `path` is our own file, `data/words/cdc.json`. Raise InputError if the file cannot be
+    read, does not have the form of a vector file, or has no vectors.
     """
     content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:

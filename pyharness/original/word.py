@@ -1,8 +1,9 @@
 """Words: floating-point formats of p bits with a rounding rule, for runs of the Python twins.
 
 A number of a word behaves like a float: it has operators, comparisons, `abs` and `float`. The other
-operand may be a number of the same word, an integer or a float. A float represents a literal of a
-source text: the shortest decimal that has this float as its nearest one is rounded to the word.
+operand may be a number of the same word, an integer or a float. A float is treated as a literal of
+a source text, as in 0.1. Therefore its shortest decimal representation is rounded to the word, and
+not its exact binary value.
 """
 
 import math
@@ -16,15 +17,15 @@ from pyharness.original.cdc import cdc
 from pyharness.original.rounding import Pair, Rules, ieee
 
 RULES = ("nearest-even", "chop", "FX", "RX")
-# Bits beyond the word's own, to which a sine or cosine is computed before it is rounded.
+# Additional bits with which a sine or cosine is computed before it is rounded to the word.
 _GUARD_BITS = 40
 
 
 class Number:
     """An immutable number of a word, which is a floating-point format: `m` times 2**`e`.
 
-    `m` and `e` are integers. If `m` is 0, `e` is instead the float 0.0, -0.0, inf, -inf or nan,
-    which is then the value. `Word` makes a subclass for each word.
+    `m` and `e` are integers. If `m` is 0, `e` is instead the value as a float: 0.0, -0.0, inf, -inf
+    or nan. `Word` makes a subclass of Number for each word.
     """
 
     __slots__ = ("e", "m")
@@ -36,7 +37,7 @@ class Number:
         self.m, self.e = m, e
 
     def __add__(self, other: Any) -> "Number":
-        """Return the sum with `other`, rounded by the rounding rule of the word."""
+        """Return the sum of this number and `other`, rounded by the rounding rule of the word."""
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -60,7 +61,7 @@ class Number:
         return self.word(other) - self
 
     def __mul__(self, other: Any) -> "Number":
-        """Return the product with `other`, rounded by the rounding rule of the word."""
+        """Return this number times `other`, rounded by the rounding rule of the word."""
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -71,7 +72,7 @@ class Number:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> "Number":
-        """Return this number over `other`, rounded by the rounding rule of the word.
+        """Return this number divided by `other`, rounded by the rounding rule of the word.
 
         A nonzero number over zero is infinite; zero over zero is nan.
         """
@@ -83,7 +84,7 @@ class Number:
         return self._special(_quotient, other)
 
     def __rtruediv__(self, other: Any) -> "Number":
-        """Return `other` over this number, where `other` is converted to the word first."""
+        """Return `other` divided by this number, where `other` is converted to the word first."""
         return self.word(other) / self
 
     def __neg__(self) -> "Number":
@@ -95,14 +96,14 @@ class Number:
         return self.__class__(abs(self.m), self.e if self.m else abs(self.e))
 
     def __bool__(self) -> bool:
-        """Return whether the number is not zero."""
+        """Return whether the number differs from zero; True for nan."""
         return bool(self.m or self.e)
 
     def __eq__(self, other: object) -> bool:
         """Return whether the difference from `other`, computed in the word's arithmetic, is zero.
 
-        In a CDC word the computed difference of two neighbouring numbers can be zero. They are then
-        equal.
+        In a CDC word the computed difference of two different, neighbouring numbers can be zero.
+        Such numbers are regarded as equal.
         """
         x, y = self, self.word(other)
         if x.m and y.m:
@@ -152,9 +153,10 @@ class Number:
         return Fraction(self.m) * Fraction(2) ** self.e if self.m else Fraction(self.e)
 
     def sqrt(self) -> "Number":
-        """Return the square root, correctly rounded to nearest also if the word truncates.
+        """Return the square root, correctly rounded to nearest.
 
-        The root of a number below zero is nan.
+        It is rounded to nearest even if the other operations of the word truncate. The root of a
+        number below zero is nan.
         """
         if self.m <= 0:
             return self._plain(self.e if not self.m and not self.e < 0.0 else math.nan)
@@ -164,11 +166,11 @@ class Number:
         return self.__class__(*self.rules.nearest(root << 1 | rest, (self.e - shift) // 2 - 1))
 
     def sin(self) -> "Number":
-        """Return the sine of this number (rad), rounded to nearest also if the word truncates."""
+        """Return the sine of this number (rad), rounded to nearest even if the word truncates."""
         return self._wave("mpf_sin")
 
     def cos(self) -> "Number":
-        """Return the cosine of this number (rad), rounded to nearest also if the word truncates."""
+        """Return the cosine of this number (rad), rounded to nearest even if the word truncates."""
         return self._wave("mpf_cos")
 
     def _wave(self, name: str) -> "Number":
@@ -185,8 +187,8 @@ class Number:
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
         """Return the result of an operation in which an operand is zero, infinite or nan.
 
-        `operation` is the same operation on floats, which decides between zero, infinity and nan.
-        `other` is the second operand.
+        The operands are this number and `other`. `operation` is the same operation on floats. It
+        determines whether the result is zero, infinite or nan.
         """
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):
@@ -198,13 +200,20 @@ class Number:
 
     @property
     def _shadow(self) -> float:
-        """Return a float for `_special`: 1.0 or -1.0, or the number's own zero, infinity or nan."""
+        """Return a float that replaces this number in `_special`.
+
+        It is 1.0 or -1.0, with the sign of the number, if the number is finite and not zero.
+        Otherwise it is the zero, infinity or nan that the number represents.
+        """
         if self.m:
             return 1.0 if self.m > 0 else -1.0
         return float(self.e)
 
     def _order(self, other: Any) -> float:
-        """Return a number with the sign of the exact difference from `other`; nan if one is nan."""
+        """Return a number with the sign of the exact difference, this number minus `other`.
+
+        The result is nan if this number or `other` is nan.
+        """
         x, y = self, self.word(other)
         if not (x.m and y.m):
             return 0.0 if x._shadow == y._shadow else x._shadow - y._shadow
@@ -221,22 +230,24 @@ def _quotient(x: float, y: float) -> float:
 class Word:
     """A floating-point format with its arithmetic: p bits, and a rounding rule of `RULES`.
 
-    A word is called with a float, an integer, a fraction or the text of a decimal, and returns a
-    `Number` of the word.
+    A word is called like a function, with a float, an integer, a fraction or the text of a decimal.
+    It returns this value as a `Number` of the word.
 
     Parameters
     ----------
     p : int
-        Number of bits of the coefficient.
+        Number of bits of the coefficient (significand).
     rule : {"nearest-even", "chop", "FX", "RX"}
         Rounding to nearest with ties to even; truncation towards zero; or the rules of the CDC's
         instructions FX, which truncate, and RX, which round.
     largest : int, optional
-        Largest exponent with `nearest-even` and `chop`: numbers are below 2**(largest + 1), and the
-        smallest exponent follows as in IEEE 754. By default it is the exponent of binary64 for up
-        to 53 bits, and of binary128 beyond. `FX` and `RX` have the exponents of CDC words.
+        Largest exponent for the rules `nearest-even` and `chop`: numbers are below
+        2**(largest + 1), and the smallest exponent follows as in IEEE 754. By default it is the
+        largest exponent of binary64 if p is at most 53, else of binary128. It has no effect on `FX`
+        and `RX`, which have the exponents of CDC words.
     cut_literals : bool
-        Whether a value is converted to the next number towards zero, instead of the nearest one.
+        Whether a value that is converted to the word is truncated towards zero, instead of rounded
+        to the nearest number.
 
     Raises
     ------
@@ -251,7 +262,7 @@ class Word:
         largest: int | None = None,
         cut_literals: bool = False,
     ) -> None:
-        """Select the arithmetic for `p` and `rule`, and make the class of the word's numbers."""
+        """Select the arithmetic for the parameters, and make the class of the word's numbers."""
         if rule not in RULES:
             raise unknown("rounding", rule, RULES)
         if p < 4:
@@ -273,10 +284,11 @@ class Word:
         return f"Word({self.p}, {self.rule!r})"
 
     def __call__(self, value: Any) -> Number:
-        """Return `value` as a number of the word: the nearest one, unless literals are truncated.
+        """Return `value` as a number of the word: rounded to nearest, or truncated.
 
-        `value` is a float, an integer, a fraction, the text of a decimal, or a number of this word.
-        Raise TypeError for any other type, and for a number of another word.
+        The value is truncated if the word was made with `cut_literals`. `value` is a float, an
+        integer, a fraction, the text of a decimal, or a number of this word. Raise TypeError for
+        any other type, and for a number of another word.
         """
         if isinstance(value, Number) and value.word is self:
             return value

@@ -1,7 +1,7 @@
-"""Random scenes by kind of torque, on which no method was tuned.
+"""Random scenes for a given kind of torque; no method was tuned on these scenes.
 
-Torques and frequencies are relative to the initial angular velocity, so that each kind of torque
-has the same character in a slow body and in a fast body.
+Torques and frequencies are drawn in proportion to the initial angular velocity. Therefore a kind of
+torque affects slow and fast bodies in the same way.
 """
 
 import math
@@ -29,11 +29,12 @@ BODIES: dict[str, Callable[[Random], list[float]]] = {
 
 
 def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tuple[Scene, float]:
-    """Return a random scene, and the time (s) in which its body should make 1 to 300 revolutions.
+    """Return a random scene, and the time (s) in which its body makes roughly 1 to 300 revolutions.
 
     `source` is the random generator, and `name` the name of the scene. `law` is the kind of torque,
-    a member of `LAWS`. `speed` is the range of the wave frequencies, a key of `SPEEDS`, and matters
-    only for waves. `body` is the shape of the body, a key of `BODIES`.
+    a member of `LAWS` such as ``ramp``. `speed` is the range of the frequencies of torque waves, a
+    key of `SPEEDS` such as ``fast waves``; it has no effect without waves. `body` is the shape of
+    the body, a key of `BODIES` such as ``flat``.
     """
     mass = _log(source, 1.0, 50.0)
     moments = [mass * each for each in BODIES[body](source)]
@@ -49,8 +50,8 @@ def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tup
 
     found, horizon = TorqueLaw(), 2.0 * math.pi * turns / start
     if law in ("constant torque", "ramp"):
-        # By the end the torque alone would add `gain` times the initial |omega|. The number of
-        # revolutions follows from the mean |omega|.
+        # Until the end the torque alone would add `gain` times the initial |omega|. The horizon
+        # is such that the mean |omega| leads to the desired number of revolutions.
         gain = _log(source, 0.1, 30.0)
         constant = law == "constant torque"
         horizon /= 1.0 + gain / (2.0 if constant else 3.0)

@@ -1,7 +1,8 @@
-"""Extreme scenes, each with a name and an end time, in named groups that are called suites.
+"""Extreme scenes, each with a name and an end time, in five named groups that are called suites.
 
 The suites contain motions near the separatrix, bodies near symmetry, bodies of extreme shape, one
-motion in many units of time, and bodies with an attitude. Only the scene of Case 6 has a torque.
+motion in many units of time, and bodies with an attitude. Only one scene has a torque: Case 6 of
+the thesis.
 """
 
 import math
@@ -24,18 +25,19 @@ class Circumstance(NamedTuple):
 
 
 def speed(scene: Scene, largest: float) -> float:
-    """Return the rate (1/s) at which omega of a body without torque may change, relative to omega.
+    """Return a bound of the relative rate of change (1/s) of omega in a body without torque.
 
-    It is the largest of |A|, |B|, |C| times `largest`, the largest component of omega (rad/s).
+    It is the largest of |A|, |B| and |C|, the coefficients of Euler's equations, times `largest`,
+    the largest component of omega (rad/s).
     """
     return max(map(abs, scene.euler_coefficients)) * largest
 
 
 def in_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene with a step size and a number of steps that end at `time` (s).
+    """Return the scene with another step size and number of steps, such that it ends at `time` (s).
 
-    The step size times the rate that `speed` returns is .002, unless this would use fewer than 10
-    or more than 20 000 steps; the number of steps is then 10 or 20 000.
+    The step size times the largest rate of change of omega, which `speed` returns, is about .002.
+    However, there are at least 10 and at most 20 000 steps.
     """
     rate = speed(scene, max(map(abs, scene.omega)))
     count = max(10, min(20_000, math.ceil(rate * abs(time) / 0.002)))
@@ -46,17 +48,19 @@ def _stepped(name: str, scene: Scene, time: float) -> Circumstance:
     return Circumstance(name, in_steps(scene, time), time)
 
 
-# Separatrix. A = C = 1/2 are exact in binary64. A perturbation that is equal about axes 1 and 3 is
-# therefore on the separatrix, where the body flips once and never again.
+# Moments of a body for motions near the separatrix. A = C = 1/2 are exact in binary64. Therefore a
+# motion whose perturbations about axes 1 and 3 are equal is on the separatrix, where the body flips
+# only once.
 MIDDLE_AXIS = (6.0, 5.0, 2.0)
 _A, _B = 0.5, 0.8
 _FLIPS = 5
 
 
 def quarter(disturbance: float) -> float:
-    """Return the time (s) until omega2 first vanishes, for the body with moments `MIDDLE_AXIS`.
+    """Return the time (s) until the component of omega about axis 2 first vanishes.
 
-    The initial omega is (`disturbance`, 1, 0) rad/s.
+    The body has the moments `MIDDLE_AXIS`, 6, 5 and 2 kg m2, and no torque. Its initial omega is
+    (`disturbance`, 1, 0) rad/s. The time is a quarter of the period of omega.
     """
     # The quarter period, which is the complete elliptic integral K(k) over the frequency, by the
     # arithmetic-geometric mean.
@@ -67,11 +71,16 @@ def quarter(disturbance: float) -> float:
 
 
 def _separatrix() -> Iterator[Circumstance]:
-    """Yield rotations about the middle axis with perturbations from 1e-1 to 1e-15 rad/s."""
+    """Yield scenes that begin with a perturbed rotation about the axis of the middle moment.
+
+    The perturbations are from 1e-1 to 1e-15 rad/s. The end times are before the first flip of the
+    body, in the middle of the first flip, and in the middle of the fifth flip.
+    """
     for d in (10.0**-k for k in range(1, 16)):
         beside, on = (d, 1.0, 0.0), (d, 1.0, d)
         flip = quarter(d)
-        # The times end in the middle of a flip, where the motion is fastest and errors are largest.
+        # Most end times are in the middle of a flip, where omega changes fastest and errors are
+        # largest.
         for name, omega, time in (
             ("early", beside, min(14.0, 0.75 * flip)),
             ("flip", beside, flip),
@@ -82,14 +91,17 @@ def _separatrix() -> Iterator[Circumstance]:
             yield _stepped(f"{name}-{d:.0e}", scene, time)
 
 
-# In binary64, 1 - 1e-16 is the number next to 1: numbers just below 1 are twice as dense as above.
+# In binary64, 1 - 1e-16 is rounded to the largest number below 1.
 _DIFFERENCES = (*(10.0**-k for k in range(1, 17)), 0.0)
 SYMMETRIC_START = (0.3, 0.9, -0.7)
 _SHORT, LONG = 20.0, 1e6  # s
 
 
 def _near_symmetry() -> Iterator[Circumstance]:
-    """Yield bodies with two or three equal or nearly equal moments."""
+    """Yield scenes of bodies with two or three equal or nearly equal moments, without torque.
+
+    The relative differences of the moments are from 1e-1 to 1e-16, or 0.
+    """
     for difference in _DIFFERENCES:
         near = 1.0 - difference
         size = f"{difference:.0e}" if difference else "equal"
@@ -97,8 +109,8 @@ def _near_symmetry() -> Iterator[Circumstance]:
             ("small-pair", (1.5, 1.0, near), _SHORT),
             ("large-pair", (1.0, near, 0.6), _SHORT),
             ("large-pair-long", (1.0, near, 0.6), LONG),
-            # The nearer the body is to a sphere, the slower omega changes. The time is such that
-            # the angle is the same in all scenes.
+            # The nearer the body is to a sphere, the slower omega changes. The end time is chosen
+            # so that omega changes by the same phase in all these scenes.
             ("sphere", (1.0, near, 1.0 - 2.0 * difference), _SHORT / (difference or 1.0)),
         ):
             scene = Scene(f"near symmetry, {name}, {size}", SYMMETRIC_START, moments=moments)
@@ -107,11 +119,13 @@ def _near_symmetry() -> Iterator[Circumstance]:
 
 _SHAPED = (0.3, 1.0, -0.6)
 _RADIANS = 20.0
-# In these orders of the three moments, every moment is about every axis, in both cyclic senses.
+# Orders of the three moments. With these orders each moment occurs about each axis, and there are
+# even and odd permutations.
 _ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (1, 0, 2))
 _NEEDLE, _PLATE = (1.0, 1.0 - 2.0**-41, 1e-12), (5.0, 3.0, 2.0)
 _BODIES: dict[str, Triple] = {
-    # In the ratios 1 : 1 : 1e-12 and 1 : 1e12 : 1e12, also as far from symmetry as a body may be.
+    # In the ratios 1 : 1 : 1e-12 and 1 : 1e12 : 1e12. The two large moments of the uneven bodies
+    # differ by about half of the largest difference that a body can have.
     "needle": (1.0, 1.0, 1e-12),
     "uneven-needle": _NEEDLE,
     "coin": (1.0, 1e12, 1e12),
@@ -129,14 +143,19 @@ _BODIES: dict[str, Triple] = {
 
 
 def _shapes() -> Iterator[Circumstance]:
-    """Yield needles, coins, flat plates, bodies that can not exist, and Case 6."""
+    """Yield scenes of bodies with extreme ratios of the moments, and Case 6 of the thesis.
+
+    The bodies are needles, coins, flat plates, and bodies that can not exist, because one moment
+    exceeds the sum of the other two. Each body occurs with several orders of its moments.
+    """
     for name, moments in _BODIES.items():
         for axes in _ORDERS:
             first, second, third = (moments[axis] for axis in axes)
             order = "".join(str(axis + 1) for axis in axes)
             scene = Scene(f"{name} {order}", _SHAPED, moments=(first, second, third))
             a, b, c = map(math.sqrt, map(abs, scene.euler_coefficients))
-            # The rates of small motions about the three axes (rad/s); the fastest sets the time.
+            # The rates of small motions about the three axes (rad/s). The end time is such that the
+            # fastest of them advances by _RADIANS.
             rates = zip((b * c, c * a, a * b), scene.omega, strict=True)
             time = _RADIANS / max(w * abs(own) for w, own in rates)
             yield _stepped(f"{name}-{order}", scene, time)
@@ -151,7 +170,11 @@ TWOS = (-996, -500, -100, 100, 498, 996)
 
 
 def _scales() -> Iterator[Circumstance]:
-    """Yield one motion in many units of time, so that omega is from 1e-300 to 1e300 rad/s."""
+    """Yield scenes that are the same motion in different units of time.
+
+    The ratios of the units are from 1e-300 to 1e300. Therefore omega is from about 1e-300 to
+    1e300 rad/s.
+    """
     scene = in_steps(ORDINARY, ORDINARY_TIME)
     named = [(f"1e{power}", float(f"1e{power}")) for power in _TENS]
     named += [(f"2^{power}", math.ldexp(1.0, power)) for power in TWOS]
@@ -163,7 +186,11 @@ POINTED: Quaternion = unit_quaternion("attitude", (0.5, -0.1, 0.7, 0.5))[0]
 
 
 def _attitude() -> Iterator[Circumstance]:
-    """Yield bodies with an attitude: near the separatrix, near symmetry, or of extreme shape."""
+    """Yield scenes with an initial attitude, without torque.
+
+    The scenes contain motions near the separatrix, bodies near symmetry, symmetric bodies, bodies
+    of extreme shape, one steady rotation, and one body at rest.
+    """
     for name, scene, time in _separatrix():
         yield Circumstance(f"separatrix-{name}", replace(scene, attitude=POINTED), time)
     bodies: list[tuple[str, str, Triple, Triple]] = []
@@ -192,4 +219,4 @@ EXTREMES: dict[str, Callable[[], Iterator[Circumstance]]] = {
     "scales": _scales,
     "attitude": _attitude,
 }
-"""The functions that yield the extreme scenes, by the name of the suite."""
+"""The functions that yield the extreme scenes, by the name of the suite, for example scales."""

@@ -1,6 +1,6 @@
-"""Random scenes by kind: for each named kind a function that draws a scene.
+"""Random scenes of several named kinds, such as near-symmetric: a function draws each kind.
 
-The argument `source` of these functions is the random generator from which they draw.
+The argument `source` of these functions is the random generator.
 """
 
 import math
@@ -14,13 +14,19 @@ from pyharness.scenes.rotated import rotated
 
 
 def _body(source: Random) -> list[float]:
-    """Draw moments (kg m2) that a body can have from `source`, in ascending order."""
+    """Return random principal moments (kg m2) that a body can have, in ascending order.
+
+    `source` is the random generator.
+    """
     low, middle = sorted((source.uniform(1.0, 50.0), source.uniform(1.0, 50.0)))
     return [low, middle, source.uniform(middle, low + middle)]
 
 
 def _plain(source: Random) -> Scene:
-    """Draw a scene with a body that can exist and rotates at a few radians per second."""
+    """Return a random scene with a body that can exist and rotates at a few radians per second.
+
+    The torque is random too. `source` is the random generator.
+    """
     moments = _body(source)
     source.shuffle(moments)
     return _scene(source, _vector(source, 5.0), _triple(moments))
@@ -43,9 +49,10 @@ def _near_separatrix(source: Random) -> Scene:
 
 
 def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
-    """Return omega (rad/s): `spin` about axis 2, plus a random perturbation.
+    """Return a rotation about axis 2 plus a random perturbation, as three components of omega.
 
-    Each component of the perturbation, drawn from `source`, is at most `faint` (rad/s).
+    `spin` is the angular velocity about axis 2 (rad/s). Each component of the perturbation is at
+    most `faint` (rad/s). `source` is the random generator.
     """
     return [w + faint * e for w, e in zip((0.0, spin, 0.0), _vector(source, 1.0), strict=True)]
 
@@ -59,7 +66,10 @@ def _violent(source: Random) -> Scene:
 
 
 def _from_rest(source: Random) -> Scene:
-    """Draw a scene with a body at rest under a random torque about one axis or about all three."""
+    """Return a random scene with a body initially at rest, under a torque about one or all axes.
+
+    `source` is the random generator.
+    """
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-3.0, 1.0)
     axes = source.choice(((0,), (1,), (2,), (0, 1, 2), (0, 1, 2)))
@@ -72,9 +82,11 @@ def _from_rest(source: Random) -> Scene:
 
 
 def _slow_waves(source: Random) -> Scene:
-    """Draw a scene under a torque of slow waves, whose phase may change by only 1e-14 rad.
+    """Return a random scene under a torque of slow sine or cosine terms.
 
-    In half of the scenes the body is initially at rest.
+    Their frequencies are from 1e-12 to 0.1 rad/s, so that a phase may change by only 1e-14 rad in
+    the whole motion. In half of the scenes the body is initially at rest. `source` is the random
+    generator.
     """
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-2.0, 2.0)
@@ -84,7 +96,11 @@ def _slow_waves(source: Random) -> Scene:
 
 
 def _many_speeds(source: Random) -> Scene:
-    """Draw a scene with two to six torque waves, of frequencies from 1e-6 to 600 rad/s."""
+    """Return a random scene with sine and cosine torques of frequencies from 1e-6 to 600 rad/s.
+
+    There are two to six such terms. In a fifth of the scenes the cosines have the amplitudes and
+    frequencies of the sines instead of their own. `source` is the random generator.
+    """
     scene = _plain(source)
     some: list[list[Wave]] = [[], []]
     for _ in range(source.randint(2, 6)):
@@ -101,7 +117,10 @@ def _many_speeds(source: Random) -> Scene:
 
 
 def _far_scale(source: Random) -> Scene:
-    """Draw a scene in other units of time and mass, with omega from 1e-135 to 1e135 rad/s."""
+    """Return a random scene in other units of time and mass, with very large or very small omega.
+
+    Omega is from about 1e-135 to 1e135 rad/s, or 0. `source` is the random generator.
+    """
     exponent = source.choice((-1, 1)) * source.randint(20, 450)
     scene = source.choice((_plain, _from_rest, _slow_waves, _many_speeds))(source)
     if abs(exponent) > 300:
@@ -113,7 +132,11 @@ def _far_scale(source: Random) -> Scene:
 
 
 def _sensitive(source: Random) -> Scene:
-    """Draw a scene near a rotation about the middle axis, with error amplification up to 1e6."""
+    """Return a random scene near a rotation about the middle axis.
+
+    Such a motion is sensitive: its error amplification is up to 1e6. `source` is the random
+    generator.
+    """
     low, middle, high = body = _body(source)
     spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
     rate = abs(spin) * ((high - middle) * (middle - low) / (high * low)) ** 0.5
@@ -131,18 +154,27 @@ def _sensitive(source: Random) -> Scene:
 
 
 def _long(source: Random) -> Scene:
-    """Draw a scene whose body rotates by up to a few hundred radians."""
+    """Return a random scene whose body rotates by up to a few hundred radians.
+
+    `source` is the random generator.
+    """
     scene = _plain(source)
     return replace(scene, step_size=10.0 ** source.uniform(0.5, 1.3) / scene.steps)
 
 
 def _no_body(source: Random) -> Scene:
-    """Draw a scene with coefficients A, B, C of any sign, which no body can have."""
+    """Return a random scene with coefficients A, B, C of any sign, which no body can have.
+
+    They are the coefficients of Euler's equations. `source` is the random generator.
+    """
     return _scene(source, _vector(source, 2.0), None, _vector(source, 1.5))
 
 
 def _extreme(source: Random) -> Scene:
-    """Draw a scene with numbers from the whole range of binary64; most such scenes overflow."""
+    """Return a random scene with numbers from nearly the whole range of binary64.
+
+    Most of these scenes overflow. `source` is the random generator.
+    """
 
     def any_size() -> float:
         if source.random() < 0.1:
@@ -157,20 +189,29 @@ def _extreme(source: Random) -> Scene:
 
 
 def _unsorted_body(source: Random) -> Triple:
-    """Draw moments (kg m2) that a body can have from `source`, not sorted."""
+    """Return random principal moments (kg m2) that a body can have, not sorted.
+
+    `source` is the random generator.
+    """
     low, middle = source.uniform(5.0, 50.0), source.uniform(5.0, 50.0)
     return source.uniform(abs(low - middle), low + middle), low, middle
 
 
 def _pointing(source: Random) -> Scene:
-    """Draw a scene without torque, with a random initial attitude."""
+    """Return a random scene without torque, with a random initial attitude.
+
+    `source` is the random generator.
+    """
     moments, omega = _unsorted_body(source), _vector(source, 3.0)
     w, x, y, z = (source.gauss(0, 1) for _ in range(4))
     return Scene("", omega, moments=moments, attitude=(w, x, y, z))
 
 
 def _driven(source: Random) -> Scene:
-    """Draw a scene with a constant torque, a torque linear in time and one torque wave."""
+    """Return a random scene under the sum of a constant, a linear and a sinusoidal torque.
+
+    `source` is the random generator.
+    """
     moments = _unsorted_body(source)
     constant, rate, sine = (_vector(source, size) for size in (20.0, 5.0, 20.0))
     law = TorqueLaw(constant, rate, ((sine, source.uniform(0.1, 20.0)),))
@@ -190,17 +231,18 @@ NASTY: dict[str, Callable[[Random], Scene]] = {
     "coefficients": _no_body,
     "extreme": _extreme,
 }
-"""The functions that draw scenes which are difficult for numerical methods, by kind."""
+"""The functions that return random scenes which are difficult for numerical methods, by kind."""
 
 KINDS = {"plain": _plain, **NASTY, "pointing": _pointing, "driven": _driven}
-"""The functions that draw random scenes, by kind."""
+"""The functions that return random scenes, by kind."""
 
 
 def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
-    """Draw a torque law from `source` whose components are at most `size` (N m) per term.
+    """Return a random torque law, in which no component of a term exceeds `size`.
 
-    `kinds` is a bit mask of the terms: 1 constant, 2 linear in time, 4 sine, 8 cosine.
-    `frequencies` are the lowest and the highest frequency of a wave (rad/s).
+    The unit of `size` is N m, or N m/s for the term linear in time. `kinds` is a bit mask of the
+    terms: 1 constant, 2 linear in time, 4 sine, 8 cosine. `frequencies` are the lowest and the
+    highest frequency of the sine and the cosine (rad/s). `source` is the random generator.
     """
     low, high = map(math.log10, frequencies)
     constant, rate = _vector(source, size), _vector(source, size)
@@ -220,10 +262,12 @@ def _scene(
     coefficients: Triple | None = None,
     torque: bool = True,
 ) -> Scene:
-    """Draw the torque and the steps of a scene with given omega and body.
+    """Return a scene with the given omega (rad/s) and body, and with random torque and steps.
 
-    The torque is zero, constant, linear in time, or a sine and a cosine; it is zero if `torque` is
-    false. Either `moments` (kg m2) or `coefficients` describe the body, and the other is None.
+    The torque is zero, constant, constant plus linear in time, or a sine plus a cosine. If the
+    argument `torque` is false, it is zero. The body is given by `moments` (kg m2) or by
+    `coefficients` (A, B, C of Euler's equations); one of the two is None. `source` is the random
+    generator.
     """
     size = (max(moments) if moments else 10.0) * source.uniform(0.1, 2.0)
 

@@ -1,4 +1,4 @@
-"""Scenes that differ from a given scene in one perturbed number."""
+"""Copies of a scene in each of which one number is perturbed."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,11 +10,11 @@ from pyharness.model.scene import Scene, TorqueLaw, Triple
 
 
 def perturbed(scene: Scene, part: float) -> Iterator[Scene]:
-    """Yield a copy of the scene for each of its numbers, with only this number perturbed.
+    """Yield a copy of the scene for each of its numbers, in which only this number is perturbed.
 
-    The number is multiplied by 1 + `part`; `part` is thus the relative perturbation. The numbers
-    are the components of body, omega and torque, and the frequencies of the torque waves. A zero
-    component has no copy.
+    The number is multiplied by 1 + `part`, so that `part` is the relative perturbation. The numbers
+    are the moments or coefficients, the components of the initial omega and of the torque terms,
+    and the frequencies of the torque waves. There is no copy for a component that is 0.
     """
     for name in ("moments", "coefficients", "omega"):
         for triple in _triples(getattr(scene, name), part):

@@ -1,4 +1,4 @@
-"""Random scenes, listings and parameters, which a seed and the number of the draw determine."""
+"""Random scenes, listings and parameters for checks, reproducible from a seed and a number."""
 
 import datetime
 from dataclasses import dataclass, replace
@@ -9,16 +9,18 @@ from pyharness.model.scene import Scene
 from pyharness.scenes.kinds import KINDS, NASTY
 
 COARSEST = 1e-3
-# These defects were added later. They are drawn last, so that the draws of a seed did not change.
+# Defects that were added to the project later. They are drawn last, so that the draws of a seed
+# did not change.
 _LATER = ("three-masses",)
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 
 
 @dataclass(frozen=True)
 class Draw:
-    """One draw for the random checks: a random scene, a random listing, and their parameters.
+    """The random inputs of one random check: a scene, a listing, and parameters for both.
 
-    A seed and the number of the draw determine it.
+    The scene is for methods and programs. The listing is a program of the thesis with a random
+    choice of its defects. A seed and the number of the draw determine all inputs.
     """
 
     scene: Scene  # in odd draws a difficult scene, named by its kind in `NASTY`
@@ -31,32 +33,36 @@ class Draw:
 
     @property
     def time(self) -> float:
-        """The end time of the integration by a method (s)."""
+        """The end time (s) of an integration by a method; negative if it is backward in time.
+
+        Its absolute value is the scene's step size times its number of steps.
+        """
         return self.scene.step_size * self.scene.steps * (-1.0 if self.backward else 1.0)
 
     def tolerance(self, finest: float) -> float:
         """Return the relative tolerance of this draw for a method.
 
-        `finest` is the smallest tolerance of the method.
+        `finest` is the smallest tolerance that the method accepts. The result is between 1e-3 and
+        `finest`; the random number `digits` determines where.
         """
         return float(max(finest, COARSEST * (finest / COARSEST) ** self.digits))
 
 
 def weekly_seed(day: datetime.date | None = None) -> str:
-    """Return the week of `day`, as in 2026-W47, for use as a seed that changes every Monday.
+    """Return the week of `day` as text, as in 2026-W47, for a seed that changes every Monday.
 
-    The default is the present week.
+    If `day` is None, it is today.
     """
     year, week, _ = (day or datetime.date.today()).isocalendar()
     return f"{year}-W{week:02d}"
 
 
 def draw(seed: str, number: int) -> Draw:
-    """Return the draw that a seed and the number of the draw determine.
+    """Return the random inputs of check `number`, which `seed` and `number` determine.
 
-    The draw is the same in every version of Python.
+    The result is the same in every version of Python.
     """
-    # Each number has its own generator, so that one draw can be repeated without the others.
+    # Each draw has its own random generator, so that it can be repeated without the other draws.
     source = Random(f"{seed}/{number}")
     scene = KINDS["plain"](source)
     if number % 2 == 1:
@@ -82,8 +88,9 @@ def draw(seed: str, number: int) -> Draw:
 
 
 def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
-    """Return the random scene that `seed` determines, of one kind of `KINDS`.
+    """Return the random scene of one kind that `seed` determines.
 
-    `name` is the name of the scene.
+    `kind` is a key of `pyharness.scenes.kinds.KINDS`, such as ``plain``. `name` is the name of the
+    scene.
     """
     return replace(KINDS[kind](Random(seed)), name=name)

@@ -1,8 +1,9 @@
-"""Rescaled time: scenes and trajectories with omega and time in another unit of time.
+"""Rescaled time: conversion of scenes and trajectories to another unit of time.
 
 Products of two components of omega underflow below 1e-154 rad/s and overflow above 1e154 rad/s,
-although the solution itself is representable. A method that forms such products gets the scene in
-units in which omega is near 1. The factor is a power of two, so that no digit changes.
+although omega itself is representable. Therefore a method that forms such products receives the
+scene in a unit of time in which omega is near 1. The ratio of the units is a power of two, so that
+the conversion does not round any number.
 """
 
 import math
@@ -15,16 +16,16 @@ import numpy as np
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Trajectory
 
-# Far enough from the ends of the range of binary64 that products of components of different size
-# keep their digits.
+# Omegas from the inverse of this value to this value (rad/s) are so far from the limits of
+# binary64 that products of components of different size keep their digits.
 _LARGE = 2.0**300
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
-    """Return the scene with rescaled time, whose solution is factor * omega(factor * t).
+    """Return the scene with rescaled time: omega is multiplied by `factor`, time divided by it.
 
-    omega(t) is the solution of the given scene, with t in seconds. A factor that is a power of 2
-    changes no digit of any quantity.
+    If omega(t) is the solution of the given scene, the solution of the returned scene is
+    factor * omega(factor * t). If `factor` is a power of 2, no number is rounded.
     """
     law = scene.torque
 
@@ -50,15 +51,19 @@ def scaled(scene: Scene, factor: float) -> Scene:
 
 
 def is_ordinary(scene: Scene) -> bool:
-    """Return whether products of components of the initial omega can not over- or underflow."""
+    """Return whether products of components of the initial omega neither overflow nor underflow.
+
+    The test is that the largest component is between 2**-300 and 2**300 rad/s.
+    """
     return 1.0 / _LARGE <= max(map(abs, scene.omega)) <= _LARGE
 
 
 def rescaling_factor(scene: Scene, time: float) -> float:
-    """Return the power of 2 with which `scaled` brings omega near 1 rad/s.
+    """Return the power of 2 with which `scaled` brings the omega of a scene near 1 rad/s.
 
-    `time` is the end of the integration (s), up to which the torque may change omega. The result is
-    1 if the scene needs no rescaling, or if the rescaled scene would overflow.
+    Omega is the larger of the initial omega and the omega that the torque may cause until `time`
+    (s), the end of the integration. The result is 1 if the scene needs no rescaling, or if the
+    rescaled scene would overflow or underflow.
     """
     if is_ordinary(scene):
         return 1.0
@@ -66,7 +71,7 @@ def rescaling_factor(scene: Scene, time: float) -> float:
     largest = max(max(map(abs, scene.omega)), omega_by_torque(scene, time))
     if not (0.0 < largest < math.inf) or 1.0 / _LARGE <= largest <= _LARGE:
         return 1.0
-    # Nearer to the ends of the exponent range the factor itself would overflow or underflow.
+    # With an exponent nearer to the limits of binary64 the factor would overflow or underflow.
     exponent = max(-1000, min(1000, math.frexp(largest)[1]))
     factor = math.ldexp(1.0, -exponent)
     return factor if _fits(scene, time, factor) else 1.0
@@ -75,8 +80,9 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 def omega_by_torque(scene: Scene, time: float) -> float:
     """Return a bound of the components of omega (rad/s) that the torque alone causes.
 
-    The bound holds from 0 to `time` (s), for a body at rest at time 0, if gyroscopic torques are
-    neglected. It is infinite if it is beyond the range of binary64.
+    It applies from 0 to `time` (s) to a body that is at rest at time 0. Gyroscopic torques, the
+    products of components of omega in Euler's equations, are neglected. The bound is infinite if it
+    is beyond the range of binary64.
     """
     law, span = scene.torque, abs(time)
     moments = scene.moments or (1.0, 1.0, 1.0)
@@ -98,10 +104,10 @@ def omega_by_torque(scene: Scene, time: float) -> float:
 
 
 def _fits(scene: Scene, time: float, factor: float) -> bool:
-    """Return whether times and torques of a scene rescaled by `factor` do not overflow.
+    """Return whether times and torques do not overflow if the scene is rescaled by `factor`.
 
-    `time` is the end of the integration (s) in the original scene. Nonzero times must not be
-    subnormal either.
+    `time` is the end of the integration of the given scene (s). The result is also False if a
+    rescaled time is so short that it is subnormal in binary64, and thus has fewer digits.
     """
     law = scene.torque
     waves = law.sines + law.cosines
@@ -115,10 +121,11 @@ def _fits(scene: Scene, time: float, factor: float) -> bool:
 
 
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
-    """Return the trajectory of a scaled scene in the units of the original scene.
+    """Convert the trajectory of a rescaled scene to seconds, the unit of the original scene.
 
     `times` are the requested times of the original scene (s), and `factor` is the factor with which
-    the scene was scaled. If omega overflows in the original units, the result ends before that row.
+    `scaled` rescaled the scene. If omega overflows in the original unit, the returned trajectory
+    ends before the first row with an overflow.
     """
     with np.errstate(over="ignore"):
         omega = trajectory.omega / factor

@@ -1,4 +1,4 @@
-"""Scenes with an equivalent motion: with rotated axes, changed signs, or a later time 0."""
+"""Transformations of a scene to an equivalent one: with other axes or signs, or a later time 0."""
 
 import math
 from collections.abc import Callable
@@ -13,8 +13,9 @@ from pyharness.model.trajectory import Array
 def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
     """Return the scene with the function `turn` applied to omega and to all vectors of the torque.
 
-    If `body` is true, `turn` is also applied to the moments. A torque about the axes of space is
-    unchanged. The attitude is also unchanged, so that the caller has to transform it.
+    `turn` takes and returns three components; for example, it permutes axes or changes signs. If
+    `body` is true, `turn` is also applied to the moments. A torque about the axes of space is
+    unchanged. The attitude is also unchanged, so that the caller must transform it if necessary.
     """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
@@ -36,9 +37,10 @@ def restarted_at(
 ) -> Scene:
     """Return the scene whose time 0 is the time `by` (s) of the given scene.
 
-    `omega` (rad/s) and `attitude` are the values at time `by`, which become the initial values.
-    Without `attitude`, the attitude of the given scene is kept. Raise InputError if the torque is
-    about the axes of space and `attitude` is None.
+    `omega` (rad/s) and `attitude` (a quaternion) are the state at time `by` and become the initial
+    values. If `attitude` is None, the initial attitude of the given scene is used. The torque law
+    is shifted in time. Raise InputError if the torque is about the axes of space and `attitude` is
+    None.
     """
     law = scene.torque
     if law.in_space and attitude is None:

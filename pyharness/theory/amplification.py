@@ -1,13 +1,13 @@
 """Linear stability: the amplification matrix of a step of each program of the thesis.
 
-A perturbation x of a steady rotation obeys a linear equation x' = J x with a constant matrix J. So
-does the translational velocity of a body in steady rotation. Along an eigenvector of J, a step of
-size h multiplies x by a matrix whose elements are polynomials in z, where z is h times the
-eigenvalue. The polynomials are derived here, in fractions, from the algebra of each scheme. The
-same polynomials hold for the matrix hJ in place of z.
+A perturbation x of a steady rotation obeys a linear equation x' = J x with a constant matrix J. The
+translational velocity of a body in steady rotation obeys such an equation too. Along an eigenvector
+of J, a step of size h multiplies x by a matrix whose elements are polynomials in z. Here z is h
+times the eigenvalue. The polynomials are derived in exact fractions from the formulas of each
+program. The same polynomials are valid with the matrix hJ in place of z.
 
-The original Runge-Kutta program keeps two vectors from step to step: the result of the step and
-U(1), at which the first stage is evaluated. Its amplification matrix therefore has two rows.
+The original Runge-Kutta program propagates two vectors from step to step: the result of the step,
+and U(1), at which the first stage is evaluated. Its amplification matrix therefore has two rows.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from pyharness.theory.rational import Exact, Fractions, collocation_matrix, inve
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 _HIGHEST = 5
-# A stability boundary nearer to the origin than this is taken to be the origin.
+# If the stability boundary is nearer to z = 0 than this distance, it is regarded as being at z = 0.
 NEAREST = 2.0**-4
 _NOTHING = 1e-14
 
@@ -33,34 +33,40 @@ _NOTHING = 1e-14
 class Amplification:
     """The matrix by which one step multiplies a perturbation, with polynomials in z as elements.
 
-    z is the step size times an eigenvalue of the Jacobian. The matrix acts on the m vectors that
-    the program keeps from step to step.
+    z is the step size times an eigenvalue of the Jacobian. The matrix has m rows and columns, for
+    the m vectors that the program propagates from step to step.
     """
 
-    # of Fraction, shape (m, m, 5): for element (i, j) the coefficients of 1, z ... z**4; the last
-    # row belongs to the result of the step, the others to vectors such as U(1)
+    # fractions, shape (m, m, 5): for element (i, j) the coefficients of 1, z ... z**4. The last row
+    # belongs to the result of the step, the other rows to vectors such as U(1).
     coefficients: Fractions
 
     @property
     def size(self) -> int:
-        """Return m, the number of vectors that the program keeps from step to step."""
+        """Return m, the number of vectors that the program propagates from step to step."""
         return len(self.coefficients)
 
     def at(self, z: Complex) -> Complex:
-        """Return the amplification matrix for each element of the array `z`, shape (..., m, m)."""
+        """Return the amplification matrix for each element of the array `z`, shape (..., m, m).
+
+        An element of `z` is the step size times an eigenvalue of the Jacobian, and m is `size`.
+        """
         powers = np.stack([z**k for k in range(_HIGHEST)], axis=-1)
         return np.asarray(np.einsum("...k,ijk->...ij", powers, self.coefficients.astype(float)))
 
     def radius(self, z: Complex) -> NDArray[np.float64]:
-        """Return the spectral radius of the amplification matrix for each element of `z`."""
+        """Return the spectral radius of the amplification matrix for each element of `z`.
+
+        An element of `z` is the step size times an eigenvalue of the Jacobian.
+        """
         return np.asarray(np.abs(np.linalg.eigvals(self.at(z))).max(axis=-1))
 
     def moving(self) -> "Amplification":
-        """Return the matrix without the row and column of the step's result, if it has no effect.
+        """Return the matrix without the row and column of the step's result, if that is possible.
 
-        The result has no effect if no other vector depends on it. It then only accumulates the
-        other vectors, with an eigenvalue that does not depend on z. Otherwise return the whole
-        matrix.
+        It is possible if no other vector depends on the result. The result then only accumulates
+        the other vectors, and belongs to an eigenvalue that does not depend on z. If another vector
+        depends on the result, return the whole matrix.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -70,8 +76,9 @@ class Amplification:
     def of(self, matrix: Exact) -> Fractions:
         """Return the exact matrix of a step for a linear system x' = J x of n equations.
 
-        `matrix` is hJ, the step size times J, with n rows and columns. It takes the place of z. The
-        result has m n rows and columns, because each of the m vectors has n components.
+        `matrix` is hJ, the step size times J, with n rows and columns. It is inserted for z in the
+        polynomials. The result has m n rows and columns, because each of the m vectors that a step
+        propagates has n components.
         """
         power = np.eye(len(matrix), dtype=object)
         total = np.kron(self.coefficients[..., 0], power)
@@ -81,7 +88,10 @@ class Amplification:
         return np.asarray(total)
 
     def text(self) -> str:
-        """Return the elements as text: one polynomial in z if m is 1, otherwise row by row."""
+        """Return the elements of the amplification matrix, which are polynomials in z, as text.
+
+        A matrix of one element is a single polynomial. Any other matrix is written row by row.
+        """
         rows = [", ".join(_polynomial_text(each) for each in row) for row in self.coefficients]
         return rows[0] if self.size == 1 else "[" + "; ".join(rows) + "]"
 
@@ -89,10 +99,10 @@ class Amplification:
 def amplification(listing: Listing, step: int = 1) -> Amplification:
     """Return the amplification matrix of a program's step number `step`, counted from 1.
 
-    The number matters only with the defect `dt-accumulates`, which moves the collocation points
-    from step to step. In collocation the first estimate takes the right-hand side z x as constant,
-    so that the estimate is a straight line. The one correction evaluates the right-hand side along
-    that line.
+    `listing` is the program with its active defects. The number of the step has an effect only with
+    the defect `dt-accumulates`, which moves the collocation points from step to step. In
+    collocation the first estimate takes the right-hand side z x as constant, so that the estimate
+    is a straight line. The one correction evaluates the right-hand side along that line.
     """
     if listing.program == "runge-kutta":
         return _runge_kutta(listing)
@@ -108,7 +118,8 @@ def weight_of_squares(listing: Listing, step: int) -> Fraction:
     Here h is the step size, s is the time since the beginning of the step, and `step` is the number
     of the step, from 1. Along the first estimate the right-hand side is F + s J F + s**2 Q(F). F
     and J are the right-hand side and its Jacobian at the beginning of the step, and Q is the
-    quadratic part of the right-hand side. The exact integral is 1/3.
+    quadratic part of the right-hand side. Therefore the integral of s**2 is the weight of Q(F) in
+    the result of the step. The exact value of this integral over h**3 is 1/3.
     """
     points, weights = _quadrature(listing, step)
     found: Fraction = weights @ points**2
@@ -118,8 +129,9 @@ def weight_of_squares(listing: Listing, step: int) -> Fraction:
 def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
     """Return the collocation points and their quadrature weights, both in units of the step size.
 
-    `step` is the number of the step, from 1. With the defect `dt-accumulates` the points of step k
-    are k times those of the first step.
+    `listing` is a collocation program with its active defects, and `step` is the number of the
+    step, from 1. With the defect `dt-accumulates` the points of step k are k times the points of
+    the first step.
     """
     moved = step if listing.has("dt-accumulates") else 1
     points = [part * moved for part in PARTS[listing.program]]
@@ -156,10 +168,10 @@ def _runge_kutta(listing: Listing) -> Amplification:
 
 
 def _one(size: int, place: int) -> Fractions:
-    """Return vector number `place` as a linear combination of all `size` vectors.
+    """Return vector number `place`, from 0, as a linear combination of all `size` vectors.
 
-    The result has the shape (size, powers of z): for each vector the coefficients of a polynomial
-    in z, here 1 for the vector itself and 0 for the others.
+    The factors of the combination are polynomials in z: here 1 for the vector itself and 0 for the
+    others. The result contains their coefficients, in the shape (size, number of powers of z).
     """
     result = np.full((size, _HIGHEST), Fraction(0), dtype=object)
     result[place, 0] = Fraction(1)
@@ -185,9 +197,9 @@ def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
     """Return the distance of the stability boundary from z = 0 along `direction`, and a slope.
 
     `matrix` is an amplification matrix. `direction` is -1 for the negative real axis or 1j for the
-    imaginary axis. Perturbations do not grow up to the distance. The slope is the increase of the
-    spectral radius per unit of distance just beyond it. Return (0, 1) if perturbations grow from
-    z = 0 on.
+    imaginary axis. At smaller distances from z = 0 perturbations do not grow. The slope is the
+    increase of the spectral radius per unit of distance just beyond the boundary. Return (0, 1) if
+    perturbations grow from z = 0 on.
     """
 
     def grows(distance: float) -> bool:

@@ -1,9 +1,9 @@
 """Bounds, by Brouwer's law, of rounding errors over many steps of a torque-free motion.
 
-Brouwer 1937, Astronomical Journal 46: if the rounding error of each step is random, the errors of
-energy and momentum grow like the square root of the number of steps. The error of the phase, which
-is the integral of the frequency, grows like its power 3/2. If rounding is biased, the powers are 1
-and 2.
+The law is that of Brouwer 1937, Astronomical Journal 46. If the rounding error of each step is
+random, the errors of energy and momentum grow like the square root of the number of steps. The
+error of the phase, which is the integral of the frequency, grows like the power 3/2 of this number.
+If rounding is biased, the powers are 1 for energy and momentum, and 2 for the phase.
 """
 
 import math
@@ -30,7 +30,7 @@ _SAMPLES = 256
 class Noise:
     """Bounds of the errors of omega that one step may add, relative to the largest abs(omega)."""
 
-    step: float  # s
+    step: float  # step size, s
     rounding: float  # bound of the rounding error, whose sign is random
     truncation: float  # bound of the truncation error, which may have a bias
     # whether truncation conserves energy and momentum, so that it affects the phase alone
@@ -41,8 +41,8 @@ class Noise:
 class Orbit:
     """One torque-free motion, with the quantities along it from which error bounds follow."""
 
-    # along the motion, shapes (n, 3), (n, 3), (n, 3, 3): omega (rad/s), its derivative (rad/s2),
-    # and the Jacobian of the derivative (1/s)
+    # samples along the motion, shapes (n, 3), (n, 3), (n, 3, 3): omega (rad/s), its time derivative
+    # (rad/s2), and the Jacobian of this derivative with respect to omega (1/s)
     states: Array
     slopes: Array
     jacobians: Array
@@ -56,20 +56,21 @@ class Orbit:
     def limits(self, noise: Noise, steps: float) -> dict[str, float]:
         """Return the bounds on the errors of energy, momentum and phase after `steps` steps.
 
-        `noise` has the bounds for one step. The keys are those of `LAWS`. The errors of energy and
-        momentum are relative, and the error of the phase is in radians.
+        `noise` contains the bounds for one step. The keys of the result are "energy", "momentum"
+        and "phase". The errors of energy and momentum are relative, and the error of the phase is
+        in radians.
         """
         walk = DEVIATIONS * noise.rounding * math.sqrt(steps)
         drift = steps * noise.truncation
-        # The result is rounded once more. A, B, C have two roundings each, which change the
-        # conserved quantities by at most four roundings of the energy, whatever the time.
+        # The result is rounded once more. Each of A, B, C has two rounding errors. At any time they
+        # change the conserved quantities by at most four rounding errors of the energy.
         found = {
             name: (walk + (0.0 if noise.conserves else drift) + ROUNDING) * self.gains[name]
             + 4.0 * ROUNDING
             for name in ("energy", "momentum")
         }
-        # An error of step k shifts the frequency for the n - k steps that follow. The sum of the
-        # squares of n - k is n**3 / 3.
+        # An error made in step k of n shifts the frequency for the n - k steps that follow. The sum
+        # over k of the squares of n - k is near n**3 / 3.
         shear = self.gains["frequency"] * noise.step
         late = walk * steps / math.sqrt(3.0)
         if not noise.conserves:
@@ -93,8 +94,8 @@ def orbit(scene: Scene) -> Orbit:
         weight = moments**power
         total = (weight * states**2).sum(axis=1)
         part = (weight * np.abs(states)).sum(axis=1) * largest / total
-        # A relative error of omega counts twice in the energy, which is a square, and once in the
-        # momentum, which is the root of one.
+        # A relative error of omega counts twice in the energy, which is quadratic in omega, and
+        # once in the momentum, which is the root of a quadratic form.
         gains[name] = float(part.max()) * (2.0 if name == "energy" else 1.0)
     gains["frequency"] = largest * max(_steepness(a, state) for state in states)
     along = jacobians(scene, states)
@@ -113,9 +114,10 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
     Taylor polynomial. `left_out` is the bound of the truncation error, relative to the largest
     omega.
 
-    Taylor term k is a sum of k products, each with at most k + 3 roundings, and propagates the
-    errors of the lower terms. Omega enters without the part that compensated summation retains,
-    half a unit in the last place. The sum of the Taylor terms rounds each of them three times.
+    Taylor term k is a sum of k products of lower terms. Each product has at most k + 3 roundings,
+    and propagates the errors of the lower terms. Omega at the start of the step is used without the
+    remainder that compensated summation retains, at most half a unit in the last place. The sum of
+    the Taylor terms rounds each of them three times.
     """
     a = np.abs(np.array(scene.euler_coefficients))
     terms, errors = _terms(body, scene, step, order), [np.abs(body.states)]
@@ -135,15 +137,15 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     """Return bounds of the errors of a step of Gauss collocation with s = `stages` stages.
 
     `body` is the orbit of the scene, and `step` is the step size h (s). The sum at each node has
-    s + 3 roundings of the rates and one of the state. The iteration propagates them by the inverse
-    of 1 - h A J, where A is the matrix of the Runge-Kutta tableau and J the Jacobian. Quadratic
-    invariants are conserved for any step.
+    s + 3 roundings of the right-hand sides and one of omega. The iteration multiplies these errors
+    by the inverse of 1 - h A J. Here A is the matrix of the Runge-Kutta tableau, and J the Jacobian
+    of the right-hand sides. Gauss collocation conserves quadratic invariants for any step size.
 
-    The truncation error is the integral of the state-transition matrix times the defect, which
-    vanishes at the nodes. Because the nodes are those of an orthogonal polynomial, only the power s
-    of the remaining factor counts. By Leibniz's rule its coefficient is a sum over j. Term j is a
-    multiple of (h J)**j / j!, from the derivatives of the state-transition matrix, times the Taylor
-    term 2s + 1 - j of omega.
+    The truncation error is the integral of the state-transition matrix times the residual of the
+    differential equation, which is zero at the nodes. Because the nodes are the zeros of an
+    orthogonal polynomial, only power s of time in the remaining factor contributes. By Leibniz's
+    rule the coefficient of this power is a sum over j. Term j is a multiple of (h J)**j / j!, from
+    the derivatives of the state-transition matrix, times the Taylor term 2s + 1 - j of omega.
     """
     from pyharness.theory.tableau import tableau
 
@@ -171,8 +173,8 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
 def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
     """Return the Taylor terms 0 to `order` of omega for a step from each state of the orbit `body`.
 
-    Term k is the power k of the step size `step` (s) with its coefficient. Each term has the shape
-    (n, 3), in rad/s.
+    Term k is the Taylor coefficient k times the power k of the step size `step` (s). Each term has
+    the shape (n, 3), in rad/s.
     """
     a = np.array(scene.euler_coefficients)
     terms = [body.states]
@@ -191,8 +193,8 @@ def errors(
 
     `omega` (rad/s) is a computed result at `time` (s), and `body` is the orbit of the scene. Energy
     and momentum are compared with their initial values, and the phase with the exact solution. If
-    `rounded`, the exact solution takes A, B, C rounded to binary64, as a method does, instead of
-    the exact ones.
+    `rounded`, the exact solution is computed with A, B, C rounded to binary64, as a method uses
+    them. Otherwise it is computed with the exact coefficients.
     """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]
@@ -214,10 +216,10 @@ def errors(
 
 
 def root_mean_square(found: Array) -> Array:
-    """Return the root mean square of errors over the initial conditions.
+    """Return the root mean square of errors over the initial conditions, for each number of steps.
 
     The array `found` of errors has a row for each initial condition and a column for each number of
-    steps. An error is NaN where the integration was not continued so far; NaN is left out.
+    steps. An error is NaN if the integration ended before that number of steps. NaN is ignored.
     """
     return np.asarray(np.sqrt(np.nanmean(np.asarray(found) ** 2, axis=0)))
 
@@ -226,16 +228,18 @@ def exponent(steps: Sequence[float] | Array, found: Array) -> float:
     """Return the power of the number of steps with which the root mean square of errors grows.
 
     The array `found` of errors has a row for each initial condition and a column for each of the
-    numbers in `steps`. The power is the slope of a straight line fitted to the logarithms.
+    numbers of steps in `steps`. A straight line is fitted to the logarithm of the root mean square
+    over the logarithm of the number of steps. The power is the slope of this line.
     """
     size = np.log(np.maximum(root_mean_square(found), 1e-300))
     return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
 
 
 def _frequency(a: Array, omega: Array) -> float:
-    """Return 2 pi over the period of omega (rad/s), by the arithmetic-geometric mean.
+    """Return the frequency of omega in torque-free motion (rad/s), which is 2 pi over its period.
 
-    `a` has the Euler coefficients A, B, C, and `omega` is the initial omega (rad/s).
+    `a` contains the Euler coefficients A, B, C, and `omega` is the initial omega (rad/s). The
+    frequency is computed by the arithmetic-geometric mean.
     """
     (odd,) = (i for i in range(3) if a[i] * a[i - 1] < 0.0 and a[i] * a[i - 2] < 0.0)
     squares = [abs(a[i - 1] * a[i - 2]) * omega[i] * omega[i] for i in range(3)]
@@ -247,7 +251,10 @@ def _frequency(a: Array, omega: Array) -> float:
 
 
 def _steepness(a: Array, omega: Array) -> float:
-    """Return the sum of the absolute derivatives of `_frequency` by the components of omega."""
+    """Return the sum of the absolute derivatives of `_frequency` by the components of omega.
+
+    The derivatives are central differences at `omega` (rad/s). `a` contains the Euler coefficients.
+    """
     size = 1e-6 * float(np.abs(omega).max())
     return sum(
         abs(_frequency(a, omega + shift) - _frequency(a, omega - shift)) / (2.0 * size)

@@ -1,7 +1,8 @@
-"""The matrices of collocation (eq. 36), and the accuracy of their solution by LEQT1F.
+"""The collocation matrices (eq. 36), and the accuracy with which LEQT1F solves their systems.
 
-LEQT1F is the linear solver that the collocation programs call. Every float is a fraction, so that
-the exact solution is rational. It is therefore computed here without rounding.
+LEQT1F is the linear solver that the collocation programs call. Every float is exactly a fraction.
+Therefore the exact solution of a linear system of floats consists of fractions, and is computed
+here without rounding.
 """
 
 import math
@@ -23,7 +24,7 @@ from pyharness.theory.rational import (
     norm,
 )
 
-# The collocation points, where the residual is zero, in units of the step.
+# The collocation points of each program, at which the residual is zero, in units of the step size.
 PARTS = {
     "two-term": (Fraction(1, 3), Fraction(2, 3)),
     "four-term": (Fraction(1, 5), Fraction(2, 5), Fraction(3, 5), Fraction(4, 5)),
@@ -34,28 +35,32 @@ PARTS = {
 class Solved:
     """The accuracy of LEQT1F for one collocation matrix with six right-hand sides.
 
-    The solution X of A X = B by LEQT1F is compared with the exact solution.
+    A is the matrix, and B has the right-hand sides as columns. The solution X of A X = B by LEQT1F
+    is compared with the exact solution.
     """
 
-    ier: int  # error code of the compiled solver: 0, or 129 for a singular matrix
-    differing: int  # how many of the numbers X and IER differ in Fortran and in the Python twin
+    ier: int  # IER, the error code of the compiled solver: 0, or 129 for a singular matrix
+    differing: int  # count of elements of X, and IER, in which Fortran and the Python twin differ
     # exact condition numbers in the row-sum norm: of the matrix, and of the matrix with each column
     # divided by its largest element
     condition: float
     scaled_condition: float
-    # norm of abs(L) abs(U) over the norm of the matrix, both with columns divided likewise
+    # norm of abs(L) abs(U) over the norm of the matrix; in both, each column is divided by the
+    # largest element of the matrix in that column
     growth: float = math.nan
     order: tuple[int, ...] = ()  # the rows in the order in which they became pivots
-    # largest shortfall of a chosen pivot from the largest candidate, and the shortfall that
-    # rounding may cause, both relative
+    # largest relative amount by which a chosen pivot is below the largest pivot candidate, and the
+    # largest such amount that rounding may cause
     pivoting: tuple[float, float] = (0.0, 0.0)
-    # errors over their bounds, the largest of all right-hand sides (Higham 2002, theorem 9.4): of
-    # the residual of A X = B, of each element of X, and of the increment of an unknown over a step
+    # ratios of errors to their bounds, the largest of all right-hand sides (Higham 2002, theorem
+    # 9.4): for the residual of A X = B, for the elements of X, and for the increment of an unknown
+    # over a step
     residual: float = math.nan
     forward: float = math.nan
     increment: float = math.nan
-    increment_error: float = math.nan  # increment's error over step times largest right-hand side
-    yardstick: float = math.nan  # `forward` of `numpy.linalg.solve`, for comparison
+    # error of the increment, over the step size times the largest element of the right-hand side
+    increment_error: float = math.nan
+    yardstick: float = math.nan  # `forward` for `numpy.linalg.solve` instead of LEQT1F
 
 
 def points(program: str, step: float) -> list[float]:
@@ -66,9 +71,10 @@ def points(program: str, step: float) -> list[float]:
 
 
 def _right_hand_sides(count: int) -> Array:
-    """Return six right-hand sides: constant, linear, alternating, and three random ones.
+    """Return six right-hand sides of a linear system, shape (6, count).
 
-    Each has `count` elements, so that the shape is (6, count).
+    Their elements are constant, linear in the index, of alternating sign and, in three of them,
+    random. `count` is the number of equations.
     """
     rough = np.random.default_rng(count).normal(size=(3, count))
     places = range(count)
@@ -78,9 +84,10 @@ def _right_hand_sides(count: int) -> Array:
 
 
 def solved(program: str, step: float) -> Solved:
-    """Solve a program's collocation matrix for one step size (s), by LEQT1F and exactly.
+    """Return the accuracy of LEQT1F for the collocation matrix of a program at one step size (s).
 
-    Return the differences of the two solutions as a `Solved`.
+    Linear systems with this matrix and six right-hand sides are solved by LEQT1F and exactly, and
+    the two solutions are compared. `program` is "two-term" or "four-term".
     """
     from pyharness.model.extension import extension
 
@@ -101,11 +108,11 @@ def solved(program: str, step: float) -> Solved:
         return Solved(ier, differing, condition, scaled_condition)
     lower = fractions(np.tril(factors, -1) + np.eye(len(factors)))
     upper = fractions(np.triu(factors))
-    # Find the row of the matrix that each row of L U is.
+    # Find, for each row of L U, the row of the matrix that it equals except for rounding.
     order = tuple(int(abs(exact[:, 1] - row[1]).argmin()) for row in lower @ upper)
     sizes = abs(lower) @ abs(upper)
     growth = float(norm(sizes / columns) / norm(scaled))
-    # The bounds apply to the rows in their order in the matrix.
+    # The bounds need the rows of `sizes` in the order of the matrix.
     sizes = sizes[np.argsort(order)]
 
     def errors(solutions: Array) -> list[float]:
@@ -123,20 +130,21 @@ def solved(program: str, step: float) -> Solved:
 
 
 def _small_step(program: str) -> tuple[Fraction, Fractions]:
-    """Return a step size (s) and its collocation matrix, in which each row's largest element is 1.
+    """Return a small step size (s), and the collocation matrix of a program for this step size.
 
-    Any smaller step size has the same property.
+    The largest element of each row of the matrix is 1, as it is for any smaller step size.
     """
     step = Fraction(1, 1000)
     return step, collocation_matrix([part * step for part in PARTS[program]])
 
 
 def solver_roundings(program: str) -> tuple[float, float]:
-    """Return two bounds on the rounding error that solving for c1, c2, ... adds to a step's result.
+    """Return two bounds on the rounding error that the linear solver adds to the result of a step.
 
-    Both are in units of 2**-53 times step size times rate, where a rate is a right-hand side of
-    Euler's equations. The first bound is for a rate that is the same at all collocation points, so
-    that only c1 is not zero. The second bound is for deviations of the rates at the points from
+    The solver computes the coefficients c1, c2, ... of t, t**2, ... in the polynomial of a step.
+    Both bounds are in units of 2**-53 times step size times rate, where a rate is a right-hand side
+    of Euler's equations. The first bound is for a rate that is the same at all collocation points,
+    so that only c1 is not zero. The second bound is for deviations of the rates at the points from
     this constant rate, and must be multiplied by the relative deviation.
 
     The bounds are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) (Higham 2002, theorem 9.4).
@@ -160,11 +168,11 @@ def solver_roundings(program: str) -> tuple[float, float]:
 def singular_below(program: str, bits: int = 53) -> float:
     """Return the step size (s) at and below which LEQT1F must declare the matrix singular.
 
-    The matrix is the collocation matrix of a program, with N rows. LEQT1F declares it singular if
-    N + pivot equals N. This is the case if the pivot is at most half a unit in the last place of N,
-    because a tie goes to N, which is even. N is a power of 2, and its last place is 2**(1 - bits)
-    of it in an arithmetic of `bits` bits that rounds to nearest. The last scaled pivot is
-    proportional to step**(N-1).
+    The matrix is the collocation matrix of `program`, with N rows. LEQT1F declares it singular if
+    the computed sum N + p equals N, where p is a scaled pivot. The sum equals N if p is at most
+    half a unit in the last place of N. A tie is included, because it is rounded to even N. N is a
+    power of 2, so that this unit is N 2**(1 - bits) in an arithmetic of `bits` bits that rounds to
+    nearest. The last scaled pivot is proportional to step**(N-1), and determines the step size.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -177,7 +185,7 @@ def singular_below(program: str, bits: int = 53) -> float:
 def declared_singular_below(program: str) -> float:
     """Return the largest step size (s) whose matrix the compiled LEQT1F declares singular.
 
-    The matrix is the collocation matrix of a program. The step size is found by bisection.
+    The matrix is the collocation matrix of `program`. The step size is found by bisection.
     """
     from pyharness.model.extension import extension
 
@@ -205,12 +213,13 @@ def _errors(
     found: Array,
     side: Array,
 ) -> tuple[float, ...]:
-    """Return the errors of residual, X and increment over their bounds, and the increment's error.
+    """Return the ratios of three errors of a solution X to their bounds, and a relative error.
 
-    `found` is the computed solution X of `matrix` X = `side`, and the increment is the change of
-    the unknown over the step. `solver` is the exact inverse of the matrix. `sizes` is abs(L) abs(U)
-    for its factors, with the rows in the order of the matrix. The fourth number is the error of the
-    increment relative to the step size times the largest right-hand side.
+    `found` is the computed solution X of the linear system `matrix` X = `side`. The ratios are for
+    the residual, for the elements of X, and for the increment, which is the change of an unknown
+    over the step. The fourth number is the error of the increment, relative to the step size `step`
+    (s) times the largest element of `side`. `solver` is the exact inverse of the matrix. `sizes` is
+    abs(L) abs(U) for the LU factors of the matrix, with the rows in the order of the matrix.
     """
     count = len(matrix)
     x, b = fractions(found), fractions(side)
@@ -221,7 +230,8 @@ def _errors(
     for c in found:
         total, power = total + c * power, power * float(step)
     powers = np.array([step**k for k in range(1, count + 1)], dtype=object)
-    # Up to three roundings in a power, one in its product with c, n in the sum.
+    # There are up to three roundings in a power of the step size, one in its product with the
+    # coefficient c, and n in the sum.
     bound = powers @ (reach + gamma(count + 4) * abs(x))
     missed = abs(Fraction(total) - powers @ truth)
     return (
@@ -239,15 +249,17 @@ def _share(error: Fraction, bound: Fraction) -> float:
 def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:
     """Return the largest relative shortfall of a pivot from the largest candidate, and its bound.
 
-    The pivots are those of an exact elimination of `matrix` whose pivot rows are taken in `order`.
-    The bound is the shortfall that rounding may cause; it follows from `sizes`, abs(L) abs(U).
+    The candidates in a column are the scaled elements of the rows that are not pivot rows yet. The
+    pivots are those of an exact elimination of `matrix` with the pivot rows in `order`. The bound
+    is the shortfall that rounding may cause. It follows from `sizes`, which is abs(L) abs(U) for
+    the LU factors.
     """
     shortfall, allowed = Fraction(0), Fraction(0)
     scale = 1 / abs(matrix).max(axis=1)
     for j, (chosen, candidates, _) in enumerate(_columns(matrix, order)):
         best = max(candidates.values())
         shortfall = max(shortfall, 1 - candidates[chosen] / best)
-        # Two candidates are compared, each with the rounding errors of its sum and its scale.
+        # Two pivot candidates are compared. Each has the rounding errors of its sum and its scale.
         wrong = max(scale[i] * sizes[i, j] for i in candidates) * gamma(len(matrix) + 2)
         allowed = max(allowed, 2 * wrong / best)
     return float(shortfall), float(allowed)
@@ -258,9 +270,10 @@ def _columns(
 ) -> Iterator[tuple[int, dict[int, Fraction], Fractions]]:
     """Eliminate a matrix exactly, and yield the choice of the pivot in each column.
 
-    Yield the index of the pivot row, the scaled pivot candidates by row index, and all rows before
-    this column is eliminated. Rows become pivots in `order` or, without it, by the rule of LEQT1F:
-    the largest scaled candidate.
+    For each column, yield the index of the pivot row, the pivot candidates by row index, and all
+    rows before this column is eliminated. A candidate is the magnitude of an element over the
+    largest magnitude in its row of `matrix`. The pivot rows are taken in `order`. Without `order`
+    the row with the largest candidate is taken, as in LEQT1F.
     """
     rows = matrix.copy()
     scale = 1 / abs(matrix).max(axis=1)

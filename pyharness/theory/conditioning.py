@@ -1,8 +1,8 @@
-"""Error amplification by the flow itself, from which the bounds for all methods follow.
+"""Error amplification by Euler's equations themselves, from which bounds for all methods follow.
 
-An error made at time s reaches time t multiplied by Phi(t, s), the state-transition matrix of the
-equations linearised along the solution. `conditioning` computes it, so that bounds on rounding
-errors and on tolerances are known before a method is run.
+An error of omega at time s is multiplied by the matrix Phi(t, s) until time t. Phi is the
+state-transition matrix of the equations, linearised along the solution. `conditioning` computes the
+amplification, so that bounds on the errors of a method are known before the method is run.
 """
 
 import math
@@ -16,11 +16,15 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
 ROUNDING = 2.0**-53
-# Roundings in a right-hand side: two in each of A, B, C, two products, the sums.
+# Bound of the number of roundings in a right-hand side of Euler's equations: two in each of A, B,
+# C, two in the products, and those of the sums.
 _ROUNDINGS = 8.0
-# Rounding error of an attitude's angle (rad): twice that of each component, some twenty roundings.
+# Rounding error of an attitude (rad). As an angle it is twice the rounding error of a component of
+# the quaternion, which has some twenty roundings.
 ATTITUDE = 40.0 * ROUNDING
-LIVELY = 1e3  # error amplification up to which a method must meet its tolerance unmultiplied
+# Up to this error amplification, the error of a method must be at most its tolerance. Beyond it,
+# the tolerance is multiplied by the error amplification.
+LIVELY = 1e3
 _NODES_PER_RADIAN = 12.0
 _FEWEST_NODES = 50
 _MOST_NODES = 400_000
@@ -28,37 +32,38 @@ _MOST_NODES = 400_000
 
 @dataclass(frozen=True)
 class Conditioning:
-    """The sensitivity of omega at the end of one motion to the errors made during the motion."""
+    """The sensitivity of omega at the end of one motion to errors of omega during the motion."""
 
     # largest factor from an error of omega at any time to the error at the end, at least 1
     amplification: float
     # error at the end over `largest` if every term of the right-hand side, the initial omega and
     # the result are wrong by a few roundings of their own magnitude, in the worst direction
     rounding: float
-    storing: float  # error at the end over `largest`, for each step that rounds omega
-    # sum of the errors in `rounding` without amplification, which bounds those of the invariants
+    storing: float  # error at the end over `largest`, caused by each step that rounds omega
+    # sum of the errors in `rounding` without amplification, which bounds the errors of the
+    # invariants
     unamplified: float
-    largest: float  # largest abs(omega) of any component until the end (rad/s)
+    largest: float  # largest magnitude of any component of omega until the end (rad/s)
 
     def limit(self, made: float, steps: float = 0.0) -> float:
         """Return the largest error of omega that a method may have at the end, over `largest`.
 
         `made` is the sum of the errors of the method's steps, over `largest`, according to its
-        tolerance or its order. It is multiplied by the error amplification. `steps` is the number
-        of steps after which the method rounds omega, or 0 if the method retains its rounding errors
-        by compensated summation. The limit is at most 2. This is no restriction, because components
-        of magnitude up to `largest` differ by at most 2 times `largest`.
+        tolerance or its order. This sum is multiplied by the error amplification. `steps` is the
+        number of steps after which the method rounds omega, or 0 if the method retains its rounding
+        errors by compensated summation. The limit is at most 2. This is no restriction, because
+        components of magnitude up to `largest` differ by at most 2 times `largest`.
         """
         allowed = made * self.amplification + self.rounding + steps * self.storing
-        # NaN allows no error.
+        # If the limit is NaN, no error is allowed.
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
     def angle_limit(self, made: float, time: float) -> float:
         """Return the largest error that an attitude at `time` (s) may have (rad).
 
-        `made` is the error that the method's tolerance allows (rad). The limit adds the rounding
-        error of the attitude, and the angle that results if omega has its rounding error at all
-        times.
+        `made` is the error that the method's tolerance allows (rad). The limit is the sum of three
+        angles: `made`, the rounding error of the attitude, and the angle that results if omega has
+        its largest rounding error at all times.
         """
         turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
         return made + turned + ATTITUDE
@@ -68,7 +73,8 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
     """Return the `Conditioning` of a scene from its linearised flow between 0 and `time` (s).
 
     Raise InputError if the solution grows without bound before `time`, or if `time` is so long that
-    the solution would be needed at too many times.
+    the solution would be needed at too many times. Raise it also if the amplification is beyond the
+    range of binary64.
     """
     times = _nodes(scene, time)
     omega, complete = _path(scene, times)
@@ -80,8 +86,9 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     """Return the `Conditioning` of a scene along a known solution.
 
-    The solution is `omega`, shape (n, 3), at `times` (s), which begin at 0. It must turn by a small
-    angle from each time to the next. Raise InputError if the amplification is beyond binary64.
+    The solution is `omega` (rad/s, shape (n, 3)) at `times` (s), which begin at 0. It must change
+    little from each time to the next. Raise InputError if the amplification is beyond the range of
+    binary64.
     """
     with np.errstate(all="ignore"):
         found = _along(scene, times, omega)
@@ -91,18 +98,21 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 
 
 def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
-    """Return omega at each time (rad/s, shape (n, 3)), and whether it reaches the last time."""
+    """Return omega at each of `times` (rad/s, shape (n, 3)), and whether it reaches the last one.
+
+    The solution ends before the last time if omega grows without bound.
+    """
     from pyharness.methods.problem import closed_form
     from pyharness.methods.solve import solve
 
-    # Near the separatrix a numerical integration would follow another path after a few turns.
+    # Near the separatrix a numerical integration would deviate from the solution after a few turns.
     method = "closed-form" if closed_form(scene) else "taylor"
     path = solve(scene, times[1:].tolist(), method, 1e-13)
     return np.vstack([scene.omega, path.omega]), path.has_all_rows
 
 
 def _nodes(scene: Scene, time: float) -> Array:
-    """Return equally spaced times from 0 to `time` (s), with a small change of omega between them.
+    """Return equally spaced times from 0 to `time` (s), so close that omega changes little between.
 
     Raise InputError if more than `_MOST_NODES` times would be needed.
     """
@@ -136,7 +146,7 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
         arriving = (sizes @ made[:, :, None])[:, :, 0]
         return np.asarray((0.5 * (arriving[1:] + arriving[:-1]) * np.abs(steps)[:, None]).sum(0))
 
-    # The initial omega and the result are rounded once, however short the time.
+    # The initial omega and the result are rounded once each, however short the time is.
     ends = sizes[0] @ np.abs(omega[0]) + np.abs(omega[-1])
     span = abs(float(times[-1])) or 1.0
     unamplified = float((0.5 * (source[1:] + source[:-1]) * np.abs(steps)[:, None]).sum(0).max())
@@ -154,8 +164,9 @@ def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     """Return the sum of the magnitudes of all terms of each right-hand side (1/s2), shape (n, 3).
 
     The right-hand sides are those of Euler's equations for `omega` (rad/s, shape (n, 3)) at `times`
-    (s). A sine or cosine of the torque counts with 1 plus its angle, the product of frequency and
-    time, because this product is rounded in proportion to the angle.
+    (s). The magnitude of a sine or cosine of the torque is multiplied by 1 plus its angle. The
+    reason is that the angle, the product of frequency and time, has a rounding error in proportion
+    to its size.
     """
     products = np.abs(scene.euler_coefficients) * np.abs(
         np.roll(omega, -1, 1) * np.roll(omega, -2, 1)

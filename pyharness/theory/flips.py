@@ -1,4 +1,8 @@
-"""The time between flips of bodies without torque, half the period of omega, in closed form."""
+"""The time between flips of bodies without torque, in closed form.
+
+At a flip, the component of omega about the middle axis changes its sign. The time between flips is
+half the period of omega.
+"""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,33 +12,36 @@ from pyharness.model.trajectory import Array
 # Iterations of the arithmetic-geometric mean, enough for ratios of 1e-300. Each iteration halves
 # the logarithm of the ratio, and doubles the number of digits once the two numbers are close.
 _LEVELS = 16
-_NEAR = 2.0**-27  # relative difference of the two numbers at which their mean is exact
+# Relative difference of the two numbers below which their arithmetic mean equals their
+# arithmetic-geometric mean in binary64.
+_NEAR = 2.0**-27
 
 
 def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
-    """Return the time between changes of sign of the component about the middle axis, s.
+    """Return the time (s) between sign changes of omega about the middle axis, without torque.
 
-    It is half the period of omega without torque, pi over the arithmetic-geometric mean of two
+    This time is half the period of omega, and equals pi over the arithmetic-geometric mean of two
     rates. It is infinite on the separatrix and for a steady rotation.
 
     Parameters
     ----------
     moments : array_like, shape (n, 3) or (3,)
-        Principal moments, kg m2, in any order.
+        Principal moments of inertia of n bodies, kg m2, in any order.
     omega0 : array_like, shape (n, 3) or (3,)
-        Angular velocities, rad/s.
+        Initial angular velocities about the axes of these moments, rad/s.
 
     Returns
     -------
     ndarray, shape (n,)
-        Seconds.
+        The time between flips of each body, s.
     """
     bodies, omega = np.broadcast_arrays(np.atleast_2d(moments), np.atleast_2d(omega0))
     order = np.argsort(bodies, axis=1, kind="stable")
     i1, i2, i3 = np.take_along_axis(bodies, order, axis=1).T
     w1, w2, w3 = np.abs(np.take_along_axis(omega, order, axis=1)).T
     s1, s2, s3 = (i3 - i2) / i1, (i3 - i1) / i2, (i2 - i1) / i3
-    # Omega circles the axis of the larger value. If the values are equal, it never returns.
+    # Omega circles axis 1 or axis 3, whichever has the larger of these two rates. If the rates are
+    # equal, the motion is on the separatrix and never returns.
     about1, about3 = np.sqrt(s2 * s3) * w1, np.sqrt(s1 * s2) * w3
     upper = np.hypot(np.sqrt(s1 * s3) * w2, np.maximum(about1, about3))
     lower = np.sqrt(np.abs(about1 - about3)) * np.sqrt(about1 + about3)

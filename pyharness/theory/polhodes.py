@@ -1,4 +1,9 @@
-"""Polhodes on the momentum sphere, and the growth rates of all bodies, as data for plots."""
+"""Polhodes of a body, and the growth rates of all bodies, as data for plots.
+
+A polhode is the path of omega in a body without torque. It is represented by the path of the
+direction of the angular momentum, on a sphere. A growth rate is that of a perturbation of steady
+rotation about the middle axis.
+"""
 
 import math
 from collections.abc import Iterator
@@ -8,7 +13,8 @@ import numpy as np
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
 
-# Angles between a curve and its axis, where they are largest; on the separatrix it is 90 degrees.
+# Largest angle between each curve and the axis that it encircles (rad). On the separatrix this
+# angle is 90 degrees.
 _ANGLES = tuple(math.radians(degrees) for degrees in (18.0, 36.0, 54.0, 72.0))
 _POINTS = 181
 
@@ -16,11 +22,12 @@ _POINTS = 181
 def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
     """Yield the name and the points of curves that L / abs(L) follows without torque.
 
-    L is the angular momentum about the body's axes. Each curve has the shape (n, 3), and sum L**2
-    and sum L**2 / I are constant along it. The last two curves are in the two planes of the
-    separatrix, L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)). Here j is 1 / I, and axis 2 is the middle
-    one. If two moments are equal, both curves are in the plane across the third axis. A sphere has
-    no curves.
+    L is the angular momentum in components along the body axes, and `moments` are the moments of
+    inertia I (kg m2). Each curve has the shape (n, 3). The sum of L**2 and the sum of L**2 / I over
+    the axes are constant along a curve. The last two curves are in the two planes of the
+    separatrix, L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)). Here j is 1 / I, and axis 2 is the one of
+    the middle moment. If two moments are equal, both curves are in the plane perpendicular to the
+    axis of the third moment. A sphere has no curves.
     """
     high, middle, low = sorted(range(3), key=lambda axis: moments[axis])
     j = min(moments) / np.array(moments)
@@ -50,13 +57,14 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
 def growth_of_bodies(first: Array, third: Array) -> Array:
     """Return the growth rate Re Q about the middle axis, over the spin, for each of many bodies.
 
-    Q is the fastest rate of a perturbation of steady rotation about that axis (eq. 32). A body is
-    described by Smelt's numbers K1 = A, in `first`, and K3 = -C, in `third`, arrays of one shape.
-    All bodies are in the square from -1 to 1.
+    A perturbation of steady rotation about the middle axis grows like exp(Q t), where Q is the
+    fastest rate of equation 32. A body is described by Smelt's numbers K1 = A and K3 = -C, where A
+    and C are Euler coefficients. `first` contains K1 and `third` contains K3 of each body. Both are
+    from -1 to 1 for every body.
     """
     a, c = first, -third
-    # Coefficients of moments satisfy A + B + C + ABC = 0. At two corners of the square, for bodies
-    # without extent, B is arbitrary.
+    # Coefficients that belong to moments satisfy A + B + C + ABC = 0. At two corners of the square
+    # of K1 and K3, which belong to bodies without extent, B is arbitrary.
     with np.errstate(invalid="ignore"):
         b = -(a + c) / (1.0 + a * c)
     b = np.where(np.isfinite(b), b, 0.0)

@@ -1,10 +1,11 @@
-"""Bounds for the errors of the steps of each method, known before it is run.
+"""Bounds on the sum of the errors of a method's steps, known before the method is run.
 
-Nothing here is fitted. For a method with a tolerance, the errors of its steps add up to the
-tolerance. For a method with a fixed step, they follow from the order. If w' is at most `a` times a
-product of two omegas, the k-th derivative is at most k! (a W)**k W, where W is the largest omega.
-The solution of y' = a y**2 has these derivatives, and no other solution has larger ones. The
-method's own series has no larger terms than it has for y' = a y**2.
+No bound is fitted to results. For a method with a tolerance, the bound of the sum is the tolerance.
+For a method with a fixed step, the bound follows from its order and from a bound on derivatives.
+The derivative of omega is at most a number `a` times the product of two components. Therefore the
+k-th derivative is at most k! (a W)**k W, where W is the largest omega. The solution of y' = a y**2
+with y(0) = W attains this limit. Likewise, no term of the method's own power series exceeds the
+term that the method yields for y' = a y**2.
 """
 
 import math
@@ -16,11 +17,12 @@ from pyharness.methods.registry import FIXED_STEP, REGISTRY, SCIPY_METHODS
 
 
 def steps_of(name: str, run_steps: int, evaluations: int) -> float:
-    """Return the number of steps after which a method rounds omega and drops the rounding error.
+    """Return the number of steps of a run after which the method rounds omega to binary64.
 
-    `name` is the method, `run_steps` is the number of steps of the run, and `evaluations` is its
-    number of right-hand sides. The result is 0 for a method that retains its rounding errors by
-    compensated summation. For SciPy's methods it is estimated from `evaluations`.
+    `name` is the method, `run_steps` is the number of steps of the run, and `evaluations` is the
+    number of right-hand sides that it evaluated. The result is 0 for a method that retains the
+    rounding errors of omega by compensated summation. For SciPy's methods the result is estimated
+    from `evaluations`.
     """
     if name in SCIPY_METHODS:
         return evaluations / (1 if name == "lsoda" else 6)
@@ -30,9 +32,9 @@ def steps_of(name: str, run_steps: int, evaluations: int) -> float:
 def fixed_step_sum(name: str, angle: float, steps: int) -> float:
     """Return a bound of the sum of the relative errors of `steps` steps of a fixed-step method.
 
-    The errors are truncation errors relative to the largest omega. `name` is the method. `angle` is
-    the largest Euler coefficient times the largest omega times the step size. The bound is infinite
-    if the angle is 0.5 or more.
+    The errors are truncation errors relative to the largest omega. `name` is the method. `angle`
+    (rad) is the product of the largest Euler coefficient, the largest omega and the step size. The
+    bound is infinite if the angle is 0.5 or more.
     """
     if angle >= 0.5:
         return math.inf
@@ -43,10 +45,10 @@ def fixed_step_sum(name: str, angle: float, steps: int) -> float:
 
 @cache
 def _series(name: str) -> tuple[float, ...]:
-    """Return the coefficients, from power 0 of the step size, of a method's result after one step.
+    """Return the coefficients of the powers of the step size in a method's result after one step.
 
-    The step starts from y(0) = 1 and integrates y' = y**2. The step size is the `angle` of
-    `fixed_step_sum`.
+    The coefficients begin with power 0. The step starts from y(0) = 1 and integrates y' = y**2. The
+    step size is the `angle` of `fixed_step_sum`. `name` is the method.
     """
     if name == "taylor-3":
         return 1.0, 1.0, 1.0

@@ -1,4 +1,4 @@
-"""Linear algebra in fractions, exact where binary64 rounds; matrices are arrays of objects."""
+"""Linear algebra in exact fractions, without rounding; a matrix is an array of fractions."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -34,15 +34,16 @@ def fractions(floats: ArrayLike) -> Fractions:
 
 
 def gamma(count: int) -> Fraction:
-    """Return n u / (1 - n u), the bound of n successive roundings (Higham 2002, lemma 3.1).
+    """Return n u / (1 - n u), the bound of the relative error of n successive roundings.
 
-    Here n is `count`, and u = 2**-53 is the bound of one relative rounding error in binary64.
+    Here n is `count`, and u = 2**-53 is the bound of one relative rounding error in binary64. The
+    bound is that of lemma 3.1 of Higham 2002.
     """
     return count * _UNIT / (1 - count * _UNIT)
 
 
 def norm(matrix: Fractions) -> Fraction:
-    """Return the row-sum norm of a matrix of fractions: the largest sum of absolute elements."""
+    """Return the row-sum norm of a matrix: the largest sum of absolute elements of any row."""
     largest: Fraction = abs(matrix).sum(axis=1).max()
     return largest
 
@@ -50,7 +51,8 @@ def norm(matrix: Fractions) -> Fraction:
 def collocation_matrix(points: Sequence[Fraction]) -> Fractions:
     """Return the collocation matrix of equation 36, with a row for each collocation point t.
 
-    A row has the derivatives of t, t**2, ..., t**n at the point, where n is the number of points.
+    A row contains the derivatives of t, t**2, ..., t**n with respect to t at its point, where n is
+    the number of points.
     """
     rows = [[(j + 1) * point**j for j in range(len(points))] for point in points]
     return np.array(rows, dtype=object)

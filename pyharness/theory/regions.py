@@ -1,4 +1,7 @@
-"""Regions of linear stability, and growth of perturbations for imaginary z, as data for plots."""
+"""Regions of linear stability, and growth of perturbations for imaginary z, as data for plots.
+
+z is the step size times an eigenvalue of the Jacobian of the equations.
+"""
 
 from dataclasses import dataclass
 
@@ -8,47 +11,51 @@ from pyharness.model.listing import corrected, original, subset
 from pyharness.model.trajectory import Array
 from pyharness.theory.amplification import Amplification, amplification
 
-# The part of the plane that contains the boundaries: its limits, and the numbers of samples.
+# Samples of z: smallest value, largest value, and number of values. The rectangle of _REAL and
+# _IMAGINARY contains all stability boundaries. _DISTANCES are distances of imaginary z from 0.
 _REAL = (-4.6, 1.4, 301)
 _IMAGINARY = (-3.6, 3.6, 361)
 _DISTANCES = (1e-3, 4.0, 181)
-_HIDDEN = 1e-13
+_HIDDEN = 1e-13  # largest growth that is regarded as a rounding error
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """The spectral radius of one amplification matrix over the plane of z.
+    """The spectral radius of one amplification matrix on a grid in the plane of complex z.
 
-    z is the step size times an eigenvalue of the Jacobian. The imaginary axis has finer samples.
+    The amplification matrix is the matrix by which one step multiplies a perturbation. z is the
+    step size times an eigenvalue of the Jacobian. The imaginary axis has additional, finer samples.
     """
 
-    name: str  # of the programs and methods that have this matrix
-    # shape (imaginary, real); spectral radius over the plane, without a result that only
-    # accumulates other vectors
+    name: str  # a text that names the programs and methods that have this matrix
+    # shape (imaginary, real); spectral radius on the grid. The vector of the step's result is left
+    # out of the matrix if it only accumulates other vectors.
     radius: Array
-    # spectral radius less 1 on the imaginary axis, at the distances; 0 where it is only rounding
+    # spectral radius minus 1 on the imaginary axis, at `Regions.distances`; 0 if it is only a
+    # rounding error
     growth: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """The stability regions of all programs on the same grids of z.
+    """The stability regions of all programs on the same grid of complex z.
 
-    z is the step size times an eigenvalue of the Jacobian. A region is where the spectral radius of
-    the amplification matrix is at most 1.
+    z is the step size times an eigenvalue of the Jacobian. The stability region of a program is the
+    set of z for which the spectral radius of its amplification matrix is at most 1.
     """
 
-    # real and imaginary parts of z on the grid in the plane
+    # real and imaginary parts of z on the grid in the complex plane
     real: Array
     imaginary: Array
-    distances: Array  # of z from 0, along the imaginary axis
+    distances: Array  # distances of samples of z from 0, along the imaginary axis
     regions: tuple[Region, ...]  # in the order in which they are drawn
 
 
 def matrices() -> dict[str, Amplification]:
-    """Return the different amplification matrices, each under a name.
+    """Return the distinct amplification matrices of the programs and of the method `rk4`, by name.
 
-    The name lists the programs and methods that have this matrix.
+    Two further matrices belong to the Runge-Kutta program with a single defect. Each name lists the
+    programs and methods that have the matrix.
     """
     return {
         "two-term and four-term, original and corrected": amplification(corrected("two-term")),
@@ -64,7 +71,8 @@ def matrices() -> dict[str, Amplification]:
 def regions() -> Regions:
     """Return the stability regions of all programs of the thesis, original and corrected.
 
-    Gauss collocation is not among them: its region is the left half-plane.
+    The Runge-Kutta program is included also with each of two defects alone. Gauss collocation is
+    left out, because its stability region is known: the left half-plane.
     """
     real, imaginary = np.linspace(*_REAL), np.linspace(*_IMAGINARY)
     low, high, count = _DISTANCES

@@ -1,12 +1,13 @@
 """Steady rotations under constant torque, and their linear stability.
 
-The method is Grammel's, equation 32 of the thesis (III.4.a): omega = (a, b, c) + small amplitudes
-times exp(Q t). A, B, C are the coefficients of Euler's equations, N the torque about each axis, and
-I the moments. With M = N / I the rotation (a, b, c) is steady if
+The method is Grammel's, equation 32 of the thesis (III.4.a). It assumes that omega is a steady
+rotation (a, b, c) plus a small perturbation proportional to exp(Q t). A, B, C are the coefficients
+of Euler's equations, N the torque about each axis, and I the moments of inertia. With M = N / I the
+rotation (a, b, c) is steady if
 
     A bc = -M1,    B ca = -M2,    C ab = -M3,
 
-and the rates Q (1/s) are the roots of
+and the rates Q (1/s) of the perturbation are the roots of
 
     Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
 """
@@ -26,10 +27,12 @@ from pyharness.model.trajectory import ROUNDING, Array
 Rates = tuple[complex, complex, complex]
 Places = list[tuple[str, Triple]]  # steady rotations: a description, and omega (rad/s)
 
-# The points that are shown of a hyperbola: one component over the same component at the vertex.
+# The points shown of a hyperbola of steady rotations: the ratio of one component of omega to the
+# same component at the vertex.
 _ALONG = (0.25, 0.5, 1.0, 2.0, 4.0)
 _SHOWN = "shown, of one branch, the vertex and points of 1/4, 1/2, 2 and 4 times its"
-# Error at which the linear approximation is taken to end, relative to the perturbation or in rad.
+# Error at which the linear approximation is regarded as invalid: relative to the perturbation, or
+# as a phase in rad.
 OFF = 0.1
 
 
@@ -37,37 +40,41 @@ OFF = 0.1
 class SteadyRotation:
     """One steady rotation of a scene, and the behaviour of a small perturbation of it."""
 
-    place: str  # an axis, a point of a hyperbola, ...
-    omega: Triple  # rad/s
-    rates: Rates  # Q of equation 32 (1/s), the fastest growth first
-    # whether no small perturbation grows, neither with exp(Q t) nor, where Q is 0, with t
+    place: str  # a description: an axis, a point of a hyperbola, ...
+    omega: Triple  # of the steady rotation, rad/s
+    rates: Rates  # the three Q of equation 32 (1/s), the fastest growth first
+    # whether no small perturbation grows, neither like exp(Q t) nor, if all Q are 0, like t
     stable: bool
-    # s, shortest time between flips of the perturbed motion; None if nothing flips
+    # shortest time (s) between flips of the perturbed motion; None if it does not flip
     flip_interval: float | None
-    # s, earliest time at which the linear approximation is off by a tenth; None if it is unknown
+    # earliest time (s) at which the linear approximation has the error `OFF`; None if it is unknown
     linear_until: float | None
 
     @property
     def doubling_time(self) -> float | None:
         """Return the time in which the fastest-growing perturbation doubles (s).
 
-        It is None if no perturbation grows with exp(Q t).
+        It is None if no perturbation grows like exp(Q t), with the rates Q of equation 32.
         """
         rate = self.rates[0].real
         return math.log(2.0) / rate if rate > 0.0 else None
 
     @property
     def period(self) -> float | None:
-        """Return the period of a perturbation's oscillation (s), or None if nothing oscillates."""
+        """Return the period of a perturbation's oscillation (s), or None if it does not oscillate.
+
+        Of several oscillations, the fastest one determines the period.
+        """
         rate = max(abs(each.imag) for each in self.rates)
         return 2.0 * math.pi / rate if rate > 0.0 else None
 
 
 @dataclass(frozen=True)
 class SteadyRotations:
-    """The steady rotations of a scene, or some members of them where they form a continuous family.
+    """The steady rotations of a scene, each with the analysis of its stability.
 
-    Each is analysed with a perturbation of the same relative magnitude.
+    If the rotations form a continuous family, only some members are included. All rotations are
+    analysed with a perturbation of the same relative magnitude.
     """
 
     told: str  # text: which steady rotations exist, and which of them are shown
@@ -78,7 +85,8 @@ class SteadyRotations:
 def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
     """Return the steady rotations of a scene, each perturbed by `disturbance` times its magnitude.
 
-    Raise InputError if the torque varies, or if a rotation is beyond the range of binary64.
+    Raise InputError if the torque varies with time, or if a rotation or its rates are beyond the
+    range of binary64.
     """
     if scene.body_torque.varies:
         raise InputError(
@@ -98,12 +106,13 @@ def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
 def rates(coefficients: Triple, omega: Triple) -> Rates:
     """Return the three rates Q of a steady rotation (1/s), the largest real part first.
 
-    `coefficients` are A, B and C, and `omega` is the steady rotation (rad/s).
+    A small perturbation of the rotation is a sum of terms proportional to exp(Q t) (eq. 32).
+    `coefficients` are A, B, C of Euler's equations, and `omega` is the steady rotation (rad/s).
     """
     size = max(map(abs, omega))
     if size == 0.0:
         return 0j, 0j, 0j
-    # Products of components near 1 do not overflow.
+    # omega is scaled to components of at most 1, so that their products do not overflow.
     (a, b, c), (x, y, z) = coefficients, (w / size for w in omega)
     terms = (b * c * x * x, c * a * y * y, a * b * z * z)
     slope, half = sum(terms), a * b * c * x * y * z
@@ -117,7 +126,7 @@ def rates(coefficients: Triple, omega: Triple) -> Rates:
 def _roots(slope: float, half: float) -> Rates:
     """Return the three roots of Q**3 - slope Q - 2 half = 0, without loss of digits in small roots.
 
-    They are in no particular order.
+    The roots Q are in no particular order.
     """
     if half == 0.0:
         root = cmath.sqrt(slope)
@@ -151,7 +160,7 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
             "rotations: the rates of a steady rotation overflow; use moments nearer to each "
             "other, or a smaller torque"
         )
-    # The rates add up to 0. If all are 0 and the matrix is not, a perturbation grows with t.
+    # The rates add up to 0. If all are 0, but the Jacobian is not, a perturbation grows like t.
     stable = found[0].real <= 0.0 and (any(found) or not matrix.any())
     flips: float | None = None
     until: float | None = None
@@ -171,12 +180,12 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
 def _growing(
     scene: Scene, omega: Triple, rate: complex, matrix: Array, share: float
 ) -> float | None:
-    """Return the time (s) at which a growing perturbation leaves the range of linear theory.
+    """Return the time (s) up to which linear theory describes a growing perturbation.
 
-    It is the time at which the second-order terms reach a tenth of the perturbation. `rate` is the
-    fastest rate Q (1/s), `matrix` is the Jacobian at the steady rotation `omega`, and `share` is
-    the initial magnitude of the perturbation over that of the rotation. The time is None if it is
-    beyond the range of binary64.
+    It is the time at which the second-order terms reach a tenth of the perturbation. It is infinite
+    if these terms are zero, and None if they are beyond the range of binary64. `rate` is the
+    fastest rate Q (1/s), and `matrix` is the Jacobian (1/s) at the steady rotation `omega` (rad/s).
+    `share` is the initial magnitude of the perturbation over the magnitude of the rotation.
     """
     # The eigenvector of `rate` is the null vector of the matrix less the rate.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
@@ -197,11 +206,12 @@ def _growing(
 def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | None:
     """Return the time (s) at which linear theory has a phase error of 0.1 rad about a stable axis.
 
-    There is no torque. `coefficients` are A, B, C in cyclic order from the axis of the rotation.
-    `rate` is the frequency of the linear oscillation (rad/s), and `share` is the perturbation over
-    the rotation. A tilt d towards another axis changes the rate by a fraction: d**2 / 4 times the
-    first coefficient over the coefficient of the other axis. The time is None if nothing oscillates
-    about the axis, so that only the spin drifts.
+    The body has no torque. `coefficients` are A, B, C in cyclic order from the axis of the
+    rotation. `rate` is the frequency of the linear oscillation (rad/s), and `share` is the
+    magnitude of the perturbation over that of the rotation. A perturbation that tilts the rotation
+    by d (rad) towards another axis changes the frequency by a fraction. This fraction is d**2 / 4
+    times the first coefficient over the coefficient of the other axis. The time is infinite if the
+    first coefficient is 0. It is None if the frequency is 0, because then only the spin drifts.
     """
     spun, *others = map(abs, coefficients)
     if spun == 0.0:
@@ -215,12 +225,13 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | 
 def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> float | None:
     """Return the shortest time (s) between flips of a perturbed rotation about the middle axis.
 
-    `coefficients` are A, B, C in cyclic order from the middle axis, `spin` is the rotation (rad/s),
-    and `share` is the perturbation over the rotation. The time is 2 K / lambda, which is near
+    At a flip, omega about the middle axis changes its sign. `coefficients` are A, B, C in cyclic
+    order from the middle axis. `spin` is the rotation (rad/s), and `share` is the magnitude of the
+    perturbation over that of the rotation. The time is 2 K / lambda, which is near
     (2 / lambda) ln(4 / k') if the perturbation is small. K is the complete elliptic integral with
     the complementary modulus k', and lambda is near the growth rate of the perturbation. The time
-    is shortest if the perturbation points along the axis of the smaller coefficient. It is None if
-    the signs of the coefficients belong to no body.
+    is shortest if the perturbation is along that other axis whose coefficient has the smaller
+    magnitude. It is None if the coefficients have signs that are impossible for a middle axis.
     """
     first, second, third = coefficients
     if first * second >= 0.0 or first * third >= 0.0:
@@ -235,7 +246,10 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
 
 
 def _places(scene: Scene) -> tuple[str, Places]:
-    """Return a text on the steady rotations that exist, and the list of rotations to be shown."""
+    """Return a text about the steady rotations of a scene, and the list of rotations to be shown.
+
+    If the rotations form a continuous family, only some members are shown.
+    """
     coefficients, torque = scene.euler_coefficients, scene.normalized_torque(0.0)
     held = [axis for axis in range(3) if torque[axis] != 0.0]
     if not held:
@@ -244,7 +258,7 @@ def _places(scene: Scene) -> tuple[str, Places]:
         if coefficients[axis] == 0.0:
             told = f"none: {'ABC'[axis]} = 0, so that nothing holds the torque about axis"
             return f"{told} {axis + 1}", []
-    # The products w2 w3, w3 w1 and w1 w2, where they have to balance a torque.
+    # The products w2 w3, w3 w1 and w1 w2 of components of omega that balance the torque.
     products = [-m / k if k else 0.0 for m, k in zip(torque, coefficients, strict=True)]
     if len(held) == 3:
         return _points(products)
@@ -275,10 +289,12 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 
 
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
-    """Return the text and the shown rotations for a torque about one axis, number `held` from 0.
+    """Return a text and the rotations to be shown for a torque about one axis.
 
-    The steady rotations form a hyperbola: omega about the two other axes has the product `product`
-    (rad2/s2). Rotations of one branch are shown; the other branch has their opposites.
+    `held` is the number of this axis, from 0. The steady rotations form a hyperbola, because the
+    product of the two other components of omega is constant and equal to `product` (rad2/s2).
+    Rotations of one branch are shown. The other branch consists of the opposite rotations.
+    `coefficients` are A, B, C of Euler's equations.
     """
     one, other = (held + 1) % 3, (held + 2) % 3
     told = (
@@ -288,7 +304,7 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
     if coefficients[one] == coefficients[other] == 0.0:
         told += f"; to each any w{held + 1} may be added"
     along = dict.fromkeys(_ALONG, "hyperbola")
-    # At the margin C (B a**2 + A b**2), the square of Q, changes its sign.
+    # At the margin of stability the square of Q, which is C (B a**2 + A b**2), changes its sign.
     if coefficients[one] * coefficients[other] < 0.0:
         along[(-coefficients[one] / coefficients[other]) ** 0.25] = "its margin"
         told += ", and the margin of stability"
@@ -303,10 +319,11 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
 
 
 def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
-    """Return the text and the shown rotations for a torque across the axis of symmetry.
+    """Return a text and the rotations to be shown for a torque across the axis of symmetry.
 
-    `axis` is the number of the axis of symmetry, from 0. `products` are the products w2 w3, w3 w1
-    and w1 w2 that balance the torque (rad2/s2). The steady rotations form a hyperbola.
+    The torque is perpendicular to the axis of symmetry, whose number is `axis`, from 0. `products`
+    are the products w2 w3, w3 w1 and w1 w2 of components of omega that balance the torque
+    (rad2/s2). The steady rotations form a hyperbola. Points of one branch are shown.
     """
     one, other = (axis + 1) % 3, (axis + 2) % 3
     # The products w_one w_axis and w_other w_axis.

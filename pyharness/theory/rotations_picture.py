@@ -1,4 +1,9 @@
-"""The picture of `rotations`: polhodes on the momentum sphere, and growth rates of all bodies."""
+"""The picture of the verb `rotations`: polhodes of one body, and growth rates of all bodies.
+
+A polhode is the path of omega in a body without torque. It is drawn as the path of the direction of
+the angular momentum, on a sphere. The growth rate is that of a perturbation of steady rotation
+about the middle axis.
+"""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -15,8 +20,8 @@ from pyharness.theory.rotations import steady_rotations
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Direction to the viewer, in components along the axes of the smallest moment, which points up, of
-# the middle and of the largest one.
+# Direction to the viewer, in components along the axes of the smallest, the middle and the largest
+# moment. The axis of the smallest moment points upwards in the picture.
 _VIEW = np.array([0.36, 0.72, 0.60])
 _GRID = 101
 _HIDDEN = 0.22  # opacity of curves and points behind the sphere
@@ -27,9 +32,11 @@ _MIDDLES = {(0.72, -0.36): 2, (-0.5, 0.5): 2, (0.7, 0.3): 1, (-0.7, -0.3): 1, (0
 
 
 def rotations_picture(scene: Scene) -> Picture:
-    """Draw the polhodes of a scene's body beside the growth rates of all bodies.
+    """Return a picture of the polhodes of a scene's body, beside the growth rates of all bodies.
 
-    The scene must have moments.
+    The left panel shows the polhodes on the sphere of directions of the angular momentum. The right
+    panel shows, for the moments of every possible body, the growth rate about the middle axis over
+    the spin. It also marks the cases of Table 1. The scene must have moments.
     """
     from matplotlib.figure import Figure
 
@@ -77,10 +84,11 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
 
 
 def _seen(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
-    """Return the coordinates of points to the right, up and towards the viewer, shape (n,) each.
+    """Return the coordinates of points in the picture and towards the viewer, shape (n,) each.
 
-    `points` has the shape (n, 3). `toward` is the unit vector to the viewer, and `upward` is a
-    vector that appears vertical in the picture.
+    The three coordinates are measured to the right, upwards, and towards the viewer. `points` has
+    the shape (n, 3). `toward` is the unit vector to the viewer, and `upward` is a vector that
+    appears vertical in the picture.
     """
     right = np.cross(upward, toward)
     right /= np.linalg.norm(right)

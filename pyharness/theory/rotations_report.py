@@ -26,7 +26,10 @@ _SECONDS = digits(".3g")
 
 
 def rotations_report(scene: Scene, found: SteadyRotations) -> Report:
-    """Return the report of the steady rotations of a scene, with a table row for each rotation."""
+    """Return the report of the steady rotations of a scene, with a table row for each rotation.
+
+    `found` contains the rotations, as `steady_rotations` returns them for `scene`.
+    """
     text: list[Section] = [
         [*heading(scene), f"perturbation: {found.disturbance:g} of the rotation"]
     ]
@@ -61,7 +64,10 @@ def _table(rotations: Sequence[SteadyRotation]) -> Table:
 
 
 def _rates(rates: Rates) -> str:
-    """Return a short text of the rates Q of a rotation; opposite or conjugate pairs share +-."""
+    """Return the three rates Q of a steady rotation (1/s) as short text.
+
+    Two rates that are opposite or complex conjugate are written as one number with +-.
+    """
     first, second, third = rates
     if not any(rates):
         return "0"
@@ -100,7 +106,7 @@ def _record(each: SteadyRotation) -> dict[str, Any]:
 
 
 def _picture(scene: Scene) -> Picture:
-    # Imported late, because a table needs no curves.
+    # Imported here, because only the picture needs this module, and the table does not.
     from pyharness.theory.rotations_picture import rotations_picture
 
     return rotations_picture(scene)

@@ -1,8 +1,8 @@
-"""The schemes of the programs and of the fixed-step methods, written a second time for comparison.
+"""The schemes of the programs and fixed-step methods, implemented a second time for comparison.
 
-A scheme computes one step of a method, but shares no code with the method. It runs on numbers and
-on power series in the step size alike. With series, the truncation error of a step results term by
-term, before any method is run. Torques are constant here.
+A scheme computes one step of a method, but shares no code with the method. It computes either with
+numbers or with power series in the step size. With power series, it yields each term of the
+truncation error of a step, before any method is run. The torque is assumed to be constant.
 """
 
 import math
@@ -18,17 +18,21 @@ from pyharness.model.trajectory import Array
 from pyharness.theory.collocation_matrices import PARTS
 from pyharness.theory.rational import collocation_matrix, inverse
 
-# Number of powers of the step in a series.
+# Number of terms of a power series in the step size: powers 0 to TERMS - 1.
 TERMS = 24
 
 
 class Numbers:
-    """The operations of a scheme on numbers, where omega (rad/s) is an array of shape (..., 3)."""
+    """The arithmetic of a scheme that computes with numbers.
+
+    Omega (rad/s) is an array of shape (..., 3).
+    """
 
     def __init__(self, scene: Scene, step: float, sizes: bool = False) -> None:
         """Store the coefficients and the torque of a scene's equations, and a step size (s).
 
-        If `sizes`, store their absolute values, so that results are sums of magnitudes.
+        If `sizes`, the absolute values of coefficients and torque are stored. The results are then
+        sums of magnitudes.
         """
         self._step = step
         size = np.abs if sizes else np.positive
@@ -36,19 +40,19 @@ class Numbers:
         self._torque = size(np.array(scene.normalized_torque(0.0)))
 
     def rate(self, omega: Array) -> Array:
-        """Return the right-hand sides of equations 16-18 for each omega (rad/s2)."""
+        """Return the right-hand sides of Euler's equations 16-18 for each omega (rad/s2)."""
         turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
         return np.asarray(self._torque + self._coefficients * turned * onward)
 
     def times_step(self, x: Array) -> Array:
-        """Return the step size times x."""
+        """Return the step size times the array `x`."""
         return self._step * x
 
 
 class Series:
-    """The operations of a scheme on power series in the step size.
+    """The arithmetic of a scheme that computes with power series in the step size.
 
-    Omega has the shape (TERMS, ..., 3): its element k is the coefficient of power k.
+    Omega is an array of shape (TERMS, ..., 3). Its element k contains the coefficients of power k.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -57,7 +61,10 @@ class Series:
         self._torque = np.array(scene.normalized_torque(0.0))
 
     def rate(self, omega: Array) -> Array:
-        """Return the series of the right-hand sides of equations 16-18, by Cauchy products."""
+        """Return the power series of the right-hand sides of Euler's equations 16-18.
+
+        `omega` is the power series of omega. The products of series are Cauchy products.
+        """
         turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
         result = np.zeros(omega.shape)
         for k in range(TERMS):
@@ -67,11 +74,17 @@ class Series:
         return result
 
     def times_step(self, x: Array) -> Array:
-        """Return the series x times the step size, without the power that is then beyond TERMS."""
+        """Return the power series `x` times the step size.
+
+        The last term of `x` is dropped, because its power would exceed the last one of a series.
+        """
         return np.concatenate([np.zeros_like(x[:1]), x[:-1]])
 
     def solution(self, omega: Array) -> Array:
-        """Return the series of the exact solution that starts at omega (rad/s, shape (..., 3))."""
+        """Return the power series of the exact solution after one step, in the step size.
+
+        The step starts at `omega` (rad/s, shape (..., 3)).
+        """
         result = constant(omega)
         for k in range(TERMS - 1):
             result[k + 1] = self.rate(result)[k] / (k + 1)
@@ -84,23 +97,29 @@ Scheme = Callable[[Arithmetic, Array], Array]
 
 @dataclass(frozen=True)
 class FixedStep:
-    """A program or method with a fixed step, described by its scheme, order and rounding."""
+    """A program or method with a fixed step, described by its scheme, order and rounding error."""
 
     name: str  # of the program or method
-    order: int  # of its global error
+    order: int  # of the global error of the program or method
     scheme: Scheme  # ``scheme(arithmetic, omega)`` returns omega after a step
     roundings: float  # bound of the error of a step's last additions, in units of 2**-53 of omega
 
 
 def constant(omega: Array) -> Array:
-    """Return the series whose term of power 0 is omega, shape (..., 3), and whose others are 0."""
+    """Return the power series of a constant: its term of power 0 is `omega`, the others are 0.
+
+    `omega` has the shape (..., 3).
+    """
     result = np.zeros((TERMS, *omega.shape))
     result[0] = omega
     return result
 
 
 def collocation(program: str) -> Scheme:
-    """Return the scheme of a collocation program: a first estimate and one correction."""
+    """Return the scheme of a collocation program: a first estimate and one correction.
+
+    `program` is "two-term" or "four-term".
+    """
     parts = PARTS[program]
     weights = inverse(collocation_matrix(parts)).sum(axis=0).astype(float)
 
@@ -117,8 +136,9 @@ def collocation(program: str) -> Scheme:
 def collocation_singular(program: str) -> Scheme:
     """Return the scheme of a collocation program whose matrix LEQT1F declares singular.
 
-    LEQT1F, the linear solver, then returns the right-hand sides of the linear system unchanged. The
-    program takes them for c1, c2, ..., the coefficients of t, t**2, ...
+    `program` is "two-term" or "four-term". If the matrix is singular, the linear solver LEQT1F
+    returns the right-hand sides of the linear system unchanged. The program then uses these
+    right-hand sides as c1, c2, ..., the coefficients of t, t**2, ... in the polynomial of a step.
     """
     parts = PARTS[program]
 
@@ -142,7 +162,10 @@ def collocation_singular(program: str) -> Scheme:
 
 
 def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after a step of the classical Runge-Kutta method of order 4 (eq. 31)."""
+    """Return omega after a step of the classical Runge-Kutta method of order 4 (eq. 31).
+
+    `on` is the arithmetic, with the equations of the scene and the step size. `omega` is the start.
+    """
     first = on.times_step(on.rate(omega))
     second = on.times_step(on.rate(omega + 0.5 * first))
     third = on.times_step(on.rate(omega + 0.5 * second))
@@ -151,10 +174,11 @@ def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
 
 
 def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after the first step of the original Runge-Kutta program.
+    """Return omega after the first step of the original Runge-Kutta program, as it was punched.
 
-    Its third stage starts from the point of the second stage, instead of from omega, and its fourth
-    stage from the point of the third stage.
+    Its third stage starts from the point of the second stage, and its fourth stage from the point
+    of the third stage. In the classical method both start from `omega`. `on` is the arithmetic,
+    with the equations of the scene and the step size.
     """
     first = on.times_step(on.rate(omega))
     at = omega + 0.5 * first
@@ -166,7 +190,10 @@ def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
 
 
 def improved_euler(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after a step of the improved Euler method (eq. 29)."""
+    """Return omega after a step of the improved Euler method (eq. 29).
+
+    `on` is the arithmetic, with the equations of the scene and the step size. `omega` is the start.
+    """
     first = on.times_step(on.rate(omega))
     return np.asarray(omega + 0.5 * (first + on.times_step(on.rate(omega + first))))
 
@@ -174,8 +201,9 @@ def improved_euler(on: Arithmetic, omega: Array) -> Array:
 def taylor_3(on: Arithmetic, omega: Array) -> Array:
     """Return omega after a step of the Taylor method with three terms (eq. 30).
 
-    The second derivative of omega is the derivative of the right-hand side F along F. It is half of
-    F(omega + F) - F(omega - F), because F is quadratic.
+    The second derivative of omega is the derivative of the right-hand side F in the direction F. It
+    equals half of F(omega + F) - F(omega - F), because F is quadratic. `on` is the arithmetic, with
+    the equations of the scene and the step size.
     """
     rate = on.rate(omega)
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))
@@ -185,7 +213,7 @@ def taylor_3(on: Arithmetic, omega: Array) -> Array:
 def gauss(stages: int) -> Scheme:
     """Return the scheme of Gauss collocation with `stages` stages, iterated until it converges.
 
-    Its order is twice the number of stages.
+    The order of the scheme is twice the number of stages.
     """
     nodes, weights = legendre.leggauss(stages)
     nodes, weights = 0.5 * (nodes + 1.0), 0.5 * weights
@@ -220,19 +248,22 @@ SCHEMES = {each.name: each for each in _ALL}
 
 
 def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
-    """Return the truncation error of a step from each omega (rad/s, shape (n, 3)), as a series.
+    """Return the truncation error of a step from each omega, as a power series in the step size.
 
-    The series in the step size has the shape (TERMS, n, 3).
+    `omega` (rad/s) has the shape (n, 3). The series has the shape (TERMS, n, 3). Its element k
+    contains the coefficients of power k.
     """
     on = Series(scene)
     return scheme(on, constant(omega)) - on.solution(omega)
 
 
 def spacing(count: int) -> Sequence[Fraction]:
-    """Return the weights of a central first difference with `count` pairs, exact to degree 2 count.
+    """Return the weights of a central difference formula for the first derivative.
 
-    The weight of pair i, from 1, multiplies the difference of the values at i and -i spacings. The
-    sum over all pairs, divided by the spacing, is the first derivative.
+    The formula uses the values of a function at `count` pairs of equally spaced points. It is exact
+    for polynomials of degree 2 count and below. The weight of pair i, from 1, multiplies the
+    difference of the values at i and -i spacings. The sum over all pairs, divided by the spacing,
+    is the derivative.
     """
     middle = math.comb(2 * count, count)
     return [

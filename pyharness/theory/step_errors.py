@@ -1,8 +1,8 @@
 """Prediction of the truncation and rounding errors of fixed steps at the end of a scene.
 
-The truncation error of each step comes from `pyharness.theory.schemes`. The state-transition
-matrices propagate it to the end. The rounding error of each step is propagated likewise. No method
-is run.
+The truncation error of each step follows from the method's scheme (`pyharness.theory.schemes`). The
+truncation and rounding errors of a step are propagated to the end by the state-transition matrix.
+The methods themselves are not run.
 """
 
 import math
@@ -20,10 +20,10 @@ from pyharness.theory.schemes import SCHEMES, TERMS, collocation_singular, local
 
 _NODES_PER_RADIAN = 12.0
 _FEWEST_NODES, _MOST_NODES = 200, 20_000
-# Rounding errors of many steps with independent directions add up like the square root of their
-# number. Their mean is a third of the largest one.
+# Rounding errors of many steps with independent directions add up like the square root of the
+# number of steps. The mean rounding error of a step is taken as a third of the largest one.
 _MEAN_ROUNDING = 1.0 / 3.0
-# Largest ratio of the last term of a series to the sum for which the sum is accepted.
+# Largest ratio of the last term of a power series to its sum for which the sum is accepted.
 _CONVERGED = 1e-3
 
 
@@ -31,13 +31,13 @@ _CONVERGED = 1e-3
 class Path:
     """The solution of one scene, and the state-transition matrices from each time to the end."""
 
-    scene: Scene  # torque constant
+    scene: Scene  # its torque must be constant
     times: Array  # shape (n,), s: from 0 to the end
     omega: Array  # shape (n, 3), rad/s
-    propagators: Array  # shape (n, 3, 3); from each time to the end
-    flow: Conditioning  # of the same scene and time
-    turned: float  # integral over time of the largest row sum of the Jacobian
-    fastest: float  # largest of these row sums (1/s)
+    propagators: Array  # shape (n, 3, 3); state-transition matrices from each time to the end
+    flow: Conditioning  # sensitivity of omega at the end of this solution
+    turned: float  # integral over time of the largest absolute row sum of the Jacobian
+    fastest: float  # largest absolute row sum of the Jacobian at any time (1/s)
 
     @property
     def norms(self) -> Array:
@@ -53,10 +53,11 @@ class Path:
 class Forecast:
     """The predicted errors at the end of a run with a fixed step, relative to the largest omega."""
 
-    truncation: float  # expected truncation error, the largest component
-    bound: float  # of truncation and rounding error; infinite if steps are too large for a bound
+    truncation: float  # expected truncation error of the component with the largest one
+    # bound of truncation and rounding error together; infinite if the steps are too large for it
+    bound: float
     rounding: float  # bound of the rounding error alone
-    wandering: float  # expected rounding error
+    wandering: float  # expected rounding error, if the errors of the steps are independent
 
 
 def path(scene: Scene, time: float) -> Path:
@@ -88,7 +89,7 @@ class Forecaster:
     def __init__(self, along: Path, method: str) -> None:
         """Store the solution `along` and the method, a name in `pyharness.theory.schemes.SCHEMES`.
 
-        Compute the rounding error of one step, which does not depend on the step size.
+        The mean rounding error of one step, which does not depend on the step size, is computed.
         """
         self._path = along
         self.method = SCHEMES[method]
@@ -96,7 +97,7 @@ class Forecaster:
         self._wandering = self._of_one_step()
 
     def at(self, steps: int) -> Forecast:
-        """Return the predicted errors at the end of the path after `steps` equal steps."""
+        """Return the predicted errors at the end of the solution if it has `steps` equal steps."""
         here = self._path
         h = float(here.times[-1]) / steps
         largest = here.flow.largest
@@ -109,8 +110,9 @@ class Forecaster:
         worst = float(here.over_time(here.norms * np.abs(local).max(axis=1))) / h / largest
         last = float(np.abs(terms[-1]).max())
         known = last <= _CONVERGED * float(np.abs(local).max())
-        # With this error the steps are taken off the solution, where local errors and their
-        # amplification are larger. A bound is returned only if they are at most twice as large.
+        # Because of this error, later steps start beside the exact solution, where local errors and
+        # their amplification are larger. A bound is returned only if they are at most twice as
+        # large as on the exact solution.
         off = 2.0 * worst * (here.turned + 2.0 * (order + 2))
         if not (known and off <= math.log(2.0)):
             worst = math.inf
@@ -121,8 +123,8 @@ class Forecaster:
     def crossing(self, smallest: float) -> float:
         """Return the step size (s) below which rounding dominates the predicted error at the end.
 
-        There the predicted truncation error falls below the expected rounding error. The step size
-        is found by bisection between `smallest` (s) and the whole time.
+        At smaller step sizes the predicted truncation error is below the expected rounding error.
+        The step size is found by bisection between `smallest` (s) and the whole time.
         """
         time = float(self._path.times[-1])
         high = max(1, math.floor(time / smallest))
@@ -135,10 +137,10 @@ class Forecaster:
         return time / high
 
     def _of_one_step(self) -> float:
-        """Return the mean effect of one step's rounding error at the end, over the largest omega.
+        """Return the mean error at the end that one step's rounding causes, over the largest omega.
 
-        The rounding error of a component of omega is proportional to the component. It is 0 if the
-        component never changes.
+        The rounding error of a component of omega is assumed to be proportional to the component. A
+        component that never changes has no rounding error.
         """
         here = self._path
         changes = (self._rates() != 0.0).any(axis=0)
@@ -160,7 +162,7 @@ class Forecaster:
             rates = self._rates()
             constant, varying = solver_roundings(self.method.name)
             travelled = float(here.over_time(norms * np.abs(rates).max(axis=1))) / largest
-            # Largest relative change of the rates along a step.
+            # Bound of the relative change of the right-hand sides in a step.
             differing = min(1.0, h * here.fastest)
             total += ROUNDING * travelled * (constant + varying * differing)
         return total
@@ -170,6 +172,7 @@ class Forecaster:
         if singular:
             scheme, order = collocation_singular(self.method.name), 1
         missed = local_error(scheme, self._path.scene, self._path.omega)
-        # These terms are zero by the order of the scheme; their computed values are rounding.
+        # The order of the scheme implies that these terms are zero; their computed values are
+        # rounding errors.
         missed[: order + 1] = 0.0
         return missed

@@ -1,10 +1,11 @@
-"""The corrections of the weighted residual family as Runge-Kutta tableaux, for any step size.
+"""The corrections of weighted residual methods as Runge-Kutta tableaux, for any step size.
 
-The trial function of a step of size h is omega(0) + c1 t + ... + cn t**n. If the right-hand side f
-is known along the step, the weighted residual conditions are linear in c1, ..., cn. They determine
-the derivative of the trial function as a projection of f on the polynomials of degree n - 1. The
-projection is computed once on the unit interval s = t / h, with Legendre polynomials as basis, so
-that it is well conditioned. The coefficients c1, ..., cn themselves are never formed.
+The methods are collocation, subdomain, Galerkin and least squares. The trial function of a step of
+size h is omega(0) + c1 t + ... + cn t**n. If the right-hand side f is known along the step, the
+weighted residual conditions are linear in c1, ..., cn. These conditions determine the derivative of
+the trial function as a projection of f on the polynomials of degree n - 1. The projection is
+computed once on the unit interval s = t / h. It is well conditioned, because its basis is the
+Legendre polynomials. The coefficients c1, ..., cn themselves are never formed.
 """
 
 from dataclasses import dataclass
@@ -22,11 +23,11 @@ from pyharness.model.trajectory import Array
 class Tableau:
     """One correction of the first estimate of a step, in the form of a Runge-Kutta tableau.
 
-    The step is scaled to the unit interval.
+    The tableau is for a step that is scaled to the unit interval. The right-hand side is f.
     """
 
-    # shape (m,); the points at which f is evaluated, in units of the step: the collocation points,
-    # or the nodes of the quadrature of the weighted integrals
+    # shape (m,); the points at which f is evaluated, in units of the step size h: the collocation
+    # points, or the nodes of the quadrature for the weighted integrals
     nodes: Array
     matrix: Array  # shape (m, m); the next estimate at the nodes is omega(0) + h matrix f
     weights: Array  # shape (m,); the result of the step is omega(0) + h weights f
@@ -38,12 +39,14 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
 
     `weighting` is "collocation", "subdomain", "galerkin" or "least-squares". `terms` is n, the
     number of powers of t in the trial function. `points` selects the collocation points, as in
-    `grid`, and matters only for collocation.
+    `grid`, and has an effect only for collocation.
 
-    The quadrature is exact for constant torques. Along a trial function the products of equations
-    13-15 have degree 2n. The weights have degree n (Galerkin), n - 1 (least squares) or, in each
-    subdomain, 0. Gauss-Legendre quadrature with m points is exact to degree 2m - 1. For torques
-    that vary its error is of order 2n + 1 or higher in the step, above every order of the family.
+    The quadrature of the weighted residual is exact for constant torques, for the following reason.
+    Along a trial function the products of two omegas in equations 13-15 have degree 2n. The weight
+    functions have degree n (Galerkin), n - 1 (least squares) or, in each subdomain, 0. The
+    Gauss-Legendre quadrature with m points is exact to degree 2m - 1. For torques that vary with
+    time the error of the quadrature is of order 2n + 1 or higher in the step size. This exceeds the
+    order of each of the methods.
     """
     n = terms
     if weighting == "collocation":
@@ -58,12 +61,13 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
         else:
             degree = 3 * n if weighting == "galerkin" else 3 * n - 1
             nodes, quadrature = _gauss(degree // 2 + 1)
-            # Polynomials that span the same weights as t ... t**n, or 1 ... t**(n-1).
+            # These polynomials span the same space as the weight functions t ... t**n (Galerkin) or
+            # 1 ... t**(n-1) (least squares).
             tests = basis(nodes, n)
             if weighting == "galerkin":
                 tests = tests * nodes[:, None]
     weighted = _exact((tests * quadrature[:, None]).T)
-    # In fractions, because in floats the numbers of the family would depend on the LAPACK in use.
+    # Computed in fractions, because in floats the tableau would depend on the LAPACK in use.
     projection = _solved(_product(weighted, _exact(basis(nodes, n))), weighted)
     matrix = _product(_exact(_integrals(nodes, n)), projection)
     return Tableau(nodes, np.array(matrix, dtype=float), np.array(projection[0], dtype=float))
@@ -79,7 +83,7 @@ def _product(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Frac
 
 
 def _solved(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fraction]]:
-    """Return the exact solution x of a x = b, by elimination; all three are matrices."""
+    """Return the exact solution x of a x = b by elimination, where a, b and x are matrices."""
     rows = [[*left, *right] for left, right in zip(a, b, strict=True)]
     for k in range(len(rows)):
         pivot = next(i for i in range(k, len(rows)) if rows[i][k])
@@ -94,8 +98,8 @@ def _solved(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fract
 def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
     """Return the n collocation points in units of the step size, shape (n,).
 
-    `points` is "gauss" for the nodes of Gauss and Legendre, or "thesis" or None for k / (n + 1). A
-    tuple contains the points themselves.
+    The choice "gauss" of `points` selects the nodes of Gauss-Legendre quadrature. "thesis" or None
+    selects the points k / (n + 1) with k = 1 to n. A tuple contains the points themselves.
     """
     if points == "gauss":
         return _gauss(n)[0]
@@ -108,7 +112,7 @@ def _gauss(m: int) -> tuple[Array, Array]:
     """Return the m nodes and weights of Gauss-Legendre quadrature on the unit interval."""
     nodes, weights = [], []
     for near in legendre.leggauss(m)[0].tolist():
-        # One Newton step removes the error of the eigenvalues.
+        # leggauss computes the nodes as eigenvalues; one Newton step removes their error.
         value, slope = _legendre(m, Fraction(near))
         x = (Fraction(near) - value / slope).limit_denominator(10**36)
         _, slope = _legendre(m, x)
@@ -126,17 +130,18 @@ def _legendre(m: int, x: Fraction) -> tuple[Fraction, Fraction]:
 
 
 def basis(s: Array, n: int) -> Array:
-    """Return the Legendre polynomials 0 ... n - 1 of the unit interval at m points, shape (m, n).
+    """Return the values of the Legendre polynomials of degree 0 to n - 1 at m points, shape (m, n).
 
-    `s` has the points, from 0 to 1.
+    The polynomials are shifted to the unit interval. `s` contains the points, from 0 to 1.
     """
     return np.asarray(legendre.legvander(2.0 * s - 1.0, n - 1), dtype=float)
 
 
 def _integrals(s: Array, n: int) -> Array:
-    """Return the integrals of the n polynomials of `basis` from 0 to m points `s`, shape (m, n).
+    """Return the integrals of the n polynomials of `basis` from 0 to m points, shape (m, n).
 
-    Their integrals from 0 to 1 are 1, 0, 0 ...
+    `s` contains the points, from 0 to 1. The integral from 0 to 1 is 1 for the first polynomial and
+    0 for each of the others.
     """
     antiderivatives = legendre.legint(np.eye(n), lbnd=-1.0, scl=0.5)
     return np.asarray(legendre.legval(2.0 * s - 1.0, antiderivatives).T, dtype=float)

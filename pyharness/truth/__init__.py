@@ -1,1 +1,1 @@
-"""Reference solutions of a scene in arithmetic of many digits, with bounds of their errors."""
+"""Reference solutions of a scene in multiple-precision arithmetic, with bounds of their errors."""

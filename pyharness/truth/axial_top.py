@@ -20,7 +20,8 @@ DIGITS = 50
 def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
     """Return omega (rad/s) at `times` (s) of a body with I1 = I2 and its torque along axis 3.
 
-    There is a row of three decimal numbers for each time. Raise InputError for any other scene.
+    There is a row of three decimal numbers for each time. Raise InputError if the scene has other
+    moments or another torque.
     """
     law, moments = scene.body_torque, scene.moments
     vectors = [law.constant, law.rate, *(a for a, _ in law.sines + law.cosines)]
@@ -59,8 +60,9 @@ def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
 def _arithmetic(*sizes: Sequence[float]) -> "decimal._ContextManager":
     """Return a context manager that sets a decimal precision sufficient for large angles.
 
-    The precision allows for angles up to the product of the largest absolute values of the
-    sequences `sizes`: the times (s), omega (rad/s) and the frequencies of the torque (rad/s).
+    `sizes` are sequences of numbers: the times (s), the initial omega (rad/s) and the frequencies
+    of the torque (rad/s). The precision allows for angles up to the product of the largest absolute
+    value of each sequence.
     """
     context = decimal.Context(Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN)
     largest = [max(map(abs, each), default=1.0) for each in sizes]

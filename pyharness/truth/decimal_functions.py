@@ -8,8 +8,8 @@ from functools import cache
 def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
     """Return the sine and the cosine of any angle (rad).
 
-    The angle is halved eight times, and the formulas of the double angle are applied to the series
-    of the small angle.
+    The angle is reduced modulo 2 pi and halved eight times. Power series yield sine and cosine of
+    this small angle, and the formulas of the double angle are then applied eight times.
     """
     with decimal.localcontext() as context:
         context.prec += 12 + max(0, angle.adjusted())
@@ -18,7 +18,7 @@ def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
         x = angle / 2**halvings
         square = x * x
         sine = _alternating(x, square, 1)
-        # The versine 1 - cos keeps its digits where cos is near 1.
+        # The versine, 1 - cosine, has no loss of digits if the cosine is near 1.
         versine = _alternating(square / 2, square, 2)
         for _ in range(halvings):
             sine, versine = 2 * sine * (1 - versine), 2 * versine * (2 - versine)
@@ -27,9 +27,9 @@ def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
 
 
 def _alternating(term: Decimal, square: Decimal, n: int) -> Decimal:
-    """Return the sum of x**n / n! with alternating signs over every second n.
+    """Return the sum of x**k / k! with alternating signs over k = n, n + 2, n + 4, ...
 
-    `term` is the first term and belongs to the power `n`; `square` is x**2.
+    `term` is the first term of the sum, and `square` is x**2.
     """
     total = term
     while abs(term) > Decimal(1).scaleb(-decimal.getcontext().prec):

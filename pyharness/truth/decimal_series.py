@@ -13,12 +13,12 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.truth.decimal_functions import sine_cosine
 
-_MOST_STEPS = 100_000  # some 30 seconds, more with waves
-# Work limit in steps, some ten seconds, if the caller gives an `effort`, which is a factor on it. A
-# wave of the torque costs a fifth of a step.
+_MOST_STEPS = 100_000  # some 30 seconds, more if the torque has sines or cosines
+# Work limit in steps, some ten seconds, if the caller specifies `effort`, the factor on this limit.
+# A wave of the torque takes a fifth of the work of a step.
 _ORDINARY_STEPS = 20_000
-# After so many steps, a small part of a second, their pace shows whether the end is out of reach.
-# The forecast allows for a motion that becomes slower by the factor _PACE_SLACK.
+# After _FIRST_STEPS steps, a small part of a second, their mean length shows whether the limit will
+# be exceeded. The forecast allows for a motion that becomes slower by the factor _PACE_SLACK.
 _FIRST_STEPS = 100
 _PACE_SLACK = 3.0
 # If the number of steps grows with time to a higher power than this, the forecast uses that power.
@@ -40,11 +40,11 @@ def taylor_series(
 
     There are fewer rows if omega grows without bound before the last time. Omega is in rad/s. The
     translational velocity (m/s) is included if `velocity` is true. The attitude is included if the
-    scene has one; its quaternion keeps the norm of the scene's quaternion. `coefficients` are A, B,
-    C of the scene, and `order` is the degree of the Taylor polynomials. `tolerance` is the local
-    tolerance, relative to omega and to the attitude. `effort` is a factor on a work limit of some
-    ten seconds; if it is None, the limit is 100 000 steps. Raise InputError if the limit is
-    exceeded.
+    scene has one. It is a quaternion, which has the same norm as the scene's quaternion.
+    `coefficients` are the Euler coefficients A, B, C of the scene, and `order` is the degree of the
+    Taylor polynomials. `tolerance` is the local tolerance, relative to omega and to the attitude.
+    `effort` is a factor on a work limit of some ten seconds; if it is None, the limit is 100 000
+    steps. Raise InputError if the limit is exceeded.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
@@ -73,7 +73,7 @@ def taylor_series(
 
 
 class _Limit:
-    """The limit of the number of Taylor steps of an integration, with a forecast of that number."""
+    """The limit on the number of Taylor steps of an integration, and a forecast of this number."""
 
     def __init__(self, scene: Scene, effort: float | None) -> None:
         self._effort = None if effort is None else checked_effort(effort)
@@ -89,7 +89,7 @@ class _Limit:
         the next step (s), and `rest` the time left until the end (s).
         """
         if step == 0:
-            # The first step alone shows only that the end is far out of reach.
+            # The first step alone justifies a refusal only if the limit would be exceeded tenfold.
             if rest > 10 * Decimal(self._most) * abs(length):
                 self._refuse(rest / abs(length))
         elif step >= self._most:
@@ -97,7 +97,8 @@ class _Limit:
         elif self._effort is not None and 2 * step >= self._next:
             if step >= self._next:
                 needed = self._forecast(step, abs(begin), rest)
-                # Steps shrink where omega grows without bound: their mean is then no forecast.
+                # Steps become shorter where omega grows without bound. Their mean length is then
+                # unsuitable for a forecast.
                 shrinks = 10 * abs(length) * step < abs(begin)
                 if needed > Decimal(_PACE_SLACK * self._most) and not shrinks:
                     self._refuse(needed)
@@ -108,9 +109,10 @@ class _Limit:
     def _forecast(self, step: int, begin: Decimal, rest: Decimal) -> Decimal:
         """Return a forecast of the number of steps from time 0 until the end.
 
-        `step` steps have reached the time `begin` (s), and `rest` (s) is left. The forecast assumes
-        as many steps per second as so far. If the number of steps so far grew like a higher power
-        of time, the forecast assumes that power, but at most 3.
+        `step` is the number of steps that were taken until the time `begin` (s), and `rest` is the
+        time left until the end (s). The forecast assumes the same mean length of the steps. If the
+        number of steps so far grew like a higher power of time than the first, the forecast assumes
+        that power, but at most 3.
         """
         step_before, begin_before = self._before
         power = Decimal(1)
@@ -134,10 +136,11 @@ class _Limit:
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
     """Return the length (s) of the step for which the last two Taylor terms are small.
 
-    They are at most `tolerance` times the largest absolute value of the first `leading` unknowns.
-    For a body at rest they are small relative to its first Taylor terms that are not zero.
-    `coefficients` contains the Taylor coefficients of each unknown. The step is not longer than
-    `rest`, the time left until the end (s).
+    The last two terms are at most `tolerance` times the largest absolute value of the first
+    `leading` unknowns. If these unknowns are zero, as for a body at rest, the last terms are small
+    relative to the first Taylor terms that are not zero. `coefficients` contains the Taylor
+    coefficients of each unknown. The step is not longer than `rest`, the time left until the end
+    (s).
     """
     order = len(coefficients[0]) - 1
     begun = next((j for j in range(order - 1) if _size(coefficients, j, leading)), None)
@@ -146,7 +149,7 @@ def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: i
         size = _size(coefficients, k)
         if size and begun is not None:
             lengths = [
-                # The root needs few digits, but the exponent range of Decimal.
+                # The root needs few digits, but an exponent range as large as that of Decimal.
                 ((tolerance * before / size).ln() / (k - j)).exp()
                 for j in range(begun, 1 if begun == 0 else begun + 4)
                 if (before := _size(coefficients, j, leading))
@@ -156,9 +159,10 @@ def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: i
 
 
 def _size(coefficients: list[Row], k: int, unknowns: int | None = None) -> Decimal:
-    """Return the largest absolute value of the Taylor coefficients number k.
+    """Return the largest absolute value of Taylor coefficient number k of several unknowns.
 
-    The maximum is over the first `unknowns` unknowns, or over all if that is None.
+    `coefficients` contains the Taylor coefficients of each unknown. The first `unknowns` unknowns
+    are compared, or all of them if that is None.
     """
     return max(abs(series[k]) for series in coefficients[:unknowns])
 
@@ -171,9 +175,9 @@ def _evaluate(coefficients: list[Row], t: Decimal) -> Row:
 
 
 def divisors(scene: Scene) -> tuple[Fraction, Fraction, Fraction]:
-    """Return the exact numbers by which torques are divided, as fractions.
+    """Return, as exact fractions, the numbers by which the torques of a scene are divided.
 
-    They are the moments (kg m2), or 1 for a body given by coefficients.
+    The numbers are the moments of inertia (kg m2), or 1 for a body specified by coefficients.
     """
     return scene.exact_moments or (Fraction(1), Fraction(1), Fraction(1))
 
@@ -181,9 +185,9 @@ def divisors(scene: Scene) -> tuple[Fraction, Fraction, Fraction]:
 class _Equations:
     """Euler's equations (13-15 of the thesis) of one scene, as recurrences of Taylor coefficients.
 
-    The equation dV/dt = F/m - omega x V of the velocity V under the force F on the mass m is added
-    if `velocity` is true. The equation dq/dt = q (0, omega)/2 of the quaternion q is added if the
-    scene has an attitude.
+    If `velocity` is true, the equation dV/dt = F/m - omega x V of the translational velocity V is
+    added, with the force F on the mass m. If the scene has an attitude, the equation dq/dt = q (0,
+    omega)/2 of its quaternion q is added. `coefficients` are A, B, C of Euler's equations.
     """
 
     def __init__(self, scene: Scene, coefficients: Row, velocity: bool) -> None:
@@ -222,7 +226,7 @@ class _Equations:
     def _torque_series(self, time: Decimal, order: int) -> list[Row]:
         """Return the Taylor coefficients of the torque over moment around `time` (s).
 
-        There are `order` coefficients for each axis.
+        For each axis there are `order` coefficients, numbers 0 to `order` - 1.
         """
         law = self._torque
         series = [
@@ -248,11 +252,12 @@ class _Equations:
 
 
 def _turning(q: list[Row], omega: list[Row]) -> Row:
-    """Return the next Taylor coefficient of q (0, omega)/2, four numbers.
+    """Return Taylor coefficient k of q (0, omega)/2, the derivative of the quaternion q.
 
-    The product is Hamilton's product, in which each product of two components is a Cauchy product.
-    `q` contains the Taylor coefficients of the quaternion. `omega` contains those of the angular
-    velocity in reversed order.
+    The result is four numbers. The product is Hamilton's product, in which each product of two
+    components is a Cauchy product. `q` contains the Taylor coefficients 0 to k of the four
+    components of the quaternion. `omega` contains the coefficients k to 0 of the three components
+    of the angular velocity, in this reversed order.
     """
     (a, b, c, d), (x, y, z) = q, omega
     return [

@@ -1,8 +1,9 @@
 """Torque-free motion in decimal arithmetic by Jacobi's elliptic functions, to check other methods.
 
-Unlike a Taylor series the solution loses no digits with time, so that a time with many flips near
-the separatrix costs no more than a short time. The module shares no code with the closed form that
-it checks. Its arithmetic is different, and it uses Landen's transformation.
+Unlike the solution by Taylor series, this solution loses no digits with time. Therefore a long time
+with many flips near the separatrix takes no more work than a short time. The module shares no code
+with the closed form that it checks. Unlike the closed form it uses decimal arithmetic and Landen's
+transformation.
 """
 
 import decimal
@@ -15,7 +16,7 @@ from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.decimal_series import Row
 from pyharness.truth.reference import exact_coefficients
 
-# Digits of the arithmetic, in addition to those that the squares of small components need.
+# Digits of the arithmetic, in addition to the digits that the squares of small components need.
 _DIGITS = 90
 
 
@@ -38,9 +39,9 @@ def torque_free(scene: Scene, time: float, rounded: bool = False) -> Row:
 
 
 def _decades(values: Row) -> int:
-    """Return the difference of the decimal exponents of the largest and the smallest value.
+    """Return the difference of the decimal exponents of the largest and the smallest magnitude.
 
-    Zeros are ignored.
+    Zeros among `values` are ignored.
     """
     powers = [value.adjusted() for value in values if value]
     return max(powers) - min(powers) if powers else 0
@@ -49,8 +50,8 @@ def _decades(values: Row) -> int:
 def _solution(coefficients: Sequence[Decimal], start: Sequence[Decimal], time: Decimal) -> Row:
     if not any(coefficients):
         return list(start)
-    # Permute the axes so that the coefficient with the odd sign is the second, and negative. To
-    # change the signs of all coefficients, the signs of all omegas are changed.
+    # Permute the axes so that the coefficient whose sign differs from the two others is the second.
+    # Make it negative by changing the signs of all coefficients and of all components of omega.
     for first, sign in itertools.product(range(3), (1, -1)):
         axes = [first, (first + 1) % 3, (first + 2) % 3]
         a = [sign * coefficients[axis] for axis in axes]
@@ -75,9 +76,9 @@ def _solution(coefficients: Sequence[Decimal], start: Sequence[Decimal], time: D
 def _turned(a: Sequence[Decimal], omega: Row, time: Decimal) -> Row:
     """Return omega (rad/s) at `time` (s) of a motion in which the first or third coefficient is 0.
 
-    The component of omega about that axis is constant, and the other two components move on an
-    ellipse. `a` contains the three coefficients, the second one negative, and `omega` the initial
-    components (rad/s).
+    The component of omega about the axis with coefficient 0 is constant, and the two other
+    components move on an ellipse. `a` contains the three Euler coefficients, of which the second
+    one is negative. `omega` contains the initial components (rad/s).
     """
     axis = 0 if not a[0] else 2
     other = 2 - axis
@@ -140,7 +141,7 @@ def jacobi(u: Decimal, comodulus: Decimal) -> tuple[Decimal, Decimal, Decimal]:
         levels.append(k1)
         u = u / (1 + k1)
         complement = 2 * complement.sqrt() / (1 + complement)
-    # The remaining modulus, some 1e-65, has an effect only by its square.
+    # The remaining modulus is so small that its square, which alone has an effect, is negligible.
     sn, cn = sine_cosine(u / (1 + k1))
     dn = Decimal(1)
     levels.append(k1)

@@ -1,9 +1,9 @@
 """Attitude of a torque-free body at any time in decimal arithmetic, to check other methods.
 
 In each period of omega the body rotates about the angular momentum by the same angle. Therefore an
-integration of omega and attitude over one period, by Taylor series, determines all other periods.
-This module shares no code with the closed form that it checks. It uses no theta function, and an
-elliptic integral only for the length of the period.
+integration of omega and attitude over one period, by Taylor series, determines the attitude at any
+time. This module shares no code with the closed form that it checks. It uses no theta function, and
+it uses an elliptic integral only for the length of the period.
 """
 
 import decimal
@@ -15,7 +15,7 @@ from pyharness.truth.decimal_functions import pi, sine_cosine
 from pyharness.truth.decimal_series import Row, taylor_series
 from pyharness.truth.reference import exact_coefficients
 
-# Thirty digits are left after 1e6 periods.
+# Digits of the arithmetic; thirty of them are correct after 1e6 periods.
 _DIGITS = 50
 _ORDER, _TOLERANCE = 44, Decimal("1e-44")
 
@@ -23,10 +23,10 @@ _ORDER, _TOLERANCE = 44, Decimal("1e-44")
 def free_attitude(scene: Scene, time: float) -> Row:
     """Return the attitude of a scene without torque at `time` (s), as a unit quaternion.
 
-    The sign of the quaternion is continuous from time 0 on. The scene must have moments and an
-    attitude. The motion is integrated over at most one period of omega, which is long near the
-    separatrix. On the separatrix there is no period, and the motion is integrated from 0 to `time`.
-    Raise InputError if the integration takes too many steps.
+    The quaternion is a continuous function of time, which determines its sign. The scene must have
+    moments and an attitude. The motion is integrated over at most one period of omega, which is
+    long near the separatrix. On the separatrix omega has no period. There the motion is integrated
+    from 0 to `time`. Raise InputError if the integration takes too many steps.
     """
     assert scene.attitude is not None
     with decimal.localcontext() as context:
@@ -46,13 +46,13 @@ def free_attitude(scene: Scene, time: float) -> Row:
         whole, rest = divmod(abs(end), period)
         period, rest = period.copy_sign(end), rest.copy_sign(end)
         after_rest, after_period = _followed(scene, [rest, period])
-        # The rotation in space by which each period changes the attitude, at any time.
+        # The rotation in space by which one period changes the attitude, whenever it begins.
         turn = product(after_period, conjugate(begin))
         return _unit(product(_power(turn, int(whole)), after_rest))
 
 
 def period_of(scene: Scene) -> Decimal | None:
-    """Return the period of omega (s) of a torque-free scene; None on the separatrix.
+    """Return the period of omega (s) of a torque-free scene, or None on the separatrix.
 
     The period is accurate to nearly all digits of the current decimal arithmetic.
     """
@@ -76,13 +76,13 @@ def period_of(scene: Scene) -> Decimal | None:
 
 
 def is_steady(scene: Scene) -> bool:
-    """Return whether omega of a scene without torque is constant: a steady rotation, or rest."""
+    """Return whether omega of a scene without torque is constant (steady rotation or rest)."""
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     return all((i[a - 1] - i[a - 2]) * w[a - 1] * w[a - 2] == 0 for a in range(3))
 
 
 def product(p: Row, q: Row) -> Row:
-    """Return Hamilton's product p q of two quaternions, scalar first."""
+    """Return Hamilton's product p q of two quaternions, each with the scalar component first."""
     (a, b, c, d), (e, f, g, h) = p, q
     return [
         a * e - b * f - c * g - d * h,
@@ -93,9 +93,9 @@ def product(p: Row, q: Row) -> Row:
 
 
 def conjugate(q: Row) -> Row:
-    """Return the conjugate of a quaternion, scalar first.
+    """Return the conjugate of a quaternion whose scalar component comes first.
 
-    For a unit quaternion the conjugate is the inverse rotation.
+    The conjugate of a unit quaternion represents the inverse rotation.
     """
     return [q[0], -q[1], -q[2], -q[3]]
 

@@ -1,9 +1,9 @@
 """A second reference for the solutions of scenes, by Taylor series in integer arithmetic.
 
 It shares no code with the first reference (`truth/reference.py`). A number is represented by an
-integer over 2**BITS, in units in which the last requested time is 1 and the largest omega is about
-1. The sines and cosines of the torque are unknowns of the Taylor series, as omega is, so that no
-library function is needed.
+integer over 2**BITS. The units are chosen so that the last requested time is 1, and the largest
+omega is about 1. The sines and cosines of the torque are unknowns of the Taylor series, like omega.
+Therefore no library function is needed for them.
 """
 
 from collections.abc import Sequence
@@ -19,14 +19,14 @@ from pyharness.model.trajectory import Array
 
 BITS = 160
 _ORDER = 36
-_LAST = 60  # bits of the last Taylor terms of a step, which are 2**-100 of the unit
+_LAST = 60  # most bits of the last Taylor terms of a step, so that they are below 2**-100 units
 _CLOCK = 64  # steps are multiples of 2**-64 of the last requested time
-_MOST_STEPS = 20_000  # each takes a third of a millisecond
+_MOST_STEPS = 20_000  # the time of a step is a third of a millisecond
 # The unit of omega is guessed. It is accepted if the largest omega is at most 2**_ABOVE and at
 # least 2**-_BELOW units.
 _ABOVE, _BELOW = 8, 24
 _MOST_GUESSES = 16
-_LEAST_POWER = -1200  # below it everything is 0 in binary64
+_LEAST_POWER = -1200  # numbers below 2**_LEAST_POWER are 0 in binary64
 _INSIDE = 24  # nodes in each step at which the path is evaluated
 
 Series = list[int]
@@ -34,7 +34,7 @@ Series = list[int]
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The true solution of one scene at the requested times and at nodes between them."""
+    """The true solution of one scene at the requested times, and at many times between them."""
 
     time: Array  # shape (n,); as requested, s
     omega: Array  # shape (n, 3); rounded to binary64, rad/s
@@ -43,9 +43,9 @@ class Path:
 
 
 class _OtherUnitError(Exception):
-    """An exception which reports that the unit of omega does not fit the size of omega.
+    """An exception which reports that the unit of omega is too small or too large for omega.
 
-    The next integration needs a unit that is 2**power times as large.
+    The integration must be repeated with a unit that is 2**power times as large.
     """
 
     def __init__(self, power: int) -> None:
@@ -57,9 +57,9 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
     """Return the true solution of a scene at `times` (s); the scene's step size is not used.
 
     The times are strictly monotonic in order away from 0, on one side, and none of them is 0.
-    Before rounding, the solution has an error of some 1e-29 of the largest omega, times the error
-    amplification. Raise InputError if omega grows without bound before the last time, or if too
-    many steps would be needed.
+    Before it is rounded to binary64, the solution has an error of some 1e-29 of the largest omega,
+    times the error amplification of the motion. Raise InputError if omega grows without bound
+    before the last time, or if too many steps would be needed.
     """
     power = _power_of(_guess(scene, abs(Fraction(times[-1]))))
     for _ in range(_MOST_GUESSES):
@@ -73,7 +73,8 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
 def _guess(scene: Scene, span: Fraction) -> Fraction:
     """Return a guess of the largest omega (rad/s) from time 0 to `span` (s).
 
-    It is the larger of the initial omega and a bound of the omega that torque alone would give.
+    It is the larger of two numbers: the initial omega, and a bound of the omega that the torque
+    alone would cause.
     """
     law = scene.body_torque
     found = [abs(Fraction(w)) for w in scene.omega]
@@ -91,7 +92,7 @@ def _power_of(size: Fraction) -> int:
 def _march(scene: Scene, times: Sequence[float], power: int) -> Path:
     """Return the solution at `times` (s), integrated with omega in units of 2**power rad/s.
 
-    Raise _OtherUnitError if this unit turns out to be too large or too small.
+    Raise _OtherUnitError if this unit is found to be too large or too small for omega.
     """
     span = Fraction(times[-1])
     wanted = [Fraction(t) / span for t in times]
@@ -159,10 +160,10 @@ def _fixed(value: Fraction) -> int:
 
 @dataclass(frozen=True)
 class _Wave:
-    """The waves of one frequency, represented by two unknowns of the series: a sine and a cosine.
+    """The waves of one frequency in the torque, as two unknowns of the series: a sine and a cosine.
 
     If the angle of the wave at the last time is below 1 rad, the first unknown is the sine divided
-    by this angle, so that a large amplitude keeps all its digits.
+    by this angle. A sine of large amplitude then has its full number of digits.
     """
 
     to_sine: int  # the derivative of the unknown sine is `to_sine` times the cosine
@@ -172,9 +173,9 @@ class _Wave:
 
 
 def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
-    """Return the exact numbers by which torques are divided, and the exact coefficients A, B, C.
+    """Return the exact divisors of torques, and the exact coefficients A, B, C of a scene's body.
 
-    The divisors are the moments (kg m2), or 1 for a body given by coefficients.
+    The divisors are the moments of inertia (kg m2), or 1 for a body specified by coefficients.
     """
     moments = list(scene.exact_moments or (Fraction(1),) * 3)
     if scene.coefficients is not None:
@@ -185,8 +186,7 @@ def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
 class _Equations:
     """Euler's equations (13-15 of the thesis) of one scene, as recurrences of Taylor terms.
 
-    `span` is the unit of time, the last requested time (s), and `unit` is the unit of omega
-    (rad/s).
+    The unit of time is `span`, the last requested time (s). The unit of omega is `unit` (rad/s).
     """
 
     def __init__(self, scene: Scene, span: Fraction, unit: Fraction) -> None:
@@ -220,11 +220,12 @@ class _Equations:
         self.start += [0, 1 << BITS] * len(self._waves)
 
     def expand(self, state: Series, begin: int, length: int) -> list[Series]:
-        """Return the Taylor terms of all unknowns at the end of a step, from the values `state`.
+        """Return the Taylor terms of all unknowns at the end of a step.
 
-        The terms are Taylor coefficients 0 ... order times powers of the step. `begin` is the time
-        at the beginning of the step and `length` is its length, both in units of 2**-64 of the last
-        requested time.
+        `state` contains the values of the unknowns at the beginning of the step. Term k is the
+        Taylor coefficient k times power k of the step, for k from 0 to the order. `begin` is the
+        time at the beginning of the step and `length` is its length, both in units of 2**-64 of the
+        last requested time.
         """
 
         def stepped(x: int) -> int:

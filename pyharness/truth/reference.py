@@ -1,8 +1,9 @@
 """The reference: the true solution of a scene, with a bound of its error.
 
-A sphere and a symmetric body without torque have known solutions. Any other scene is solved by the
-Taylor series of equations 13-15 in decimal arithmetic. The reference shares no code with the
-methods that it checks. Its coefficients are exact, and its arithmetic and its steps are different.
+A sphere, and a symmetric body without torque, have a known solution in closed form. Any other scene
+is solved by the Taylor series of equations 13-15 in decimal arithmetic. The reference shares no
+code with the methods that it checks. Unlike these methods, it uses exact Euler coefficients. Its
+arithmetic and its steps differ from those of the methods.
 """
 
 import decimal
@@ -21,7 +22,7 @@ from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.decimal_series import Row, divisors, taylor_series
 
 DIGITS = 40
-# Order and tolerance (relative to the solution, per step) of the two series that are compared.
+# Order and local tolerance (relative to the solution) of the two Taylor series that are compared.
 _QUICK = ((20, Decimal("1e-19")), (24, Decimal("1e-22")))
 _PRECISE = ((32, Decimal("1e-31")), (37, Decimal("1e-35")))
 _HALF_ULP = 2.0**-53
@@ -31,9 +32,11 @@ _HALF_ULP = 2.0**-53
 class Reference:
     """The true solution of one scene at requested times, rounded to binary64, with its error."""
 
-    time: Array  # shape (n,), s; ends before omega grows without bound
+    time: Array  # shape (n,), s; the requested times, up to the last one with finite omega
     omega: Array  # shape (n, 3), rad/s
-    velocity: Array | None  # shape (n, 3), m/s; from the deck's forces and its first mass
+    # shape (n, 3), m/s; translational velocity under the scene's forces on its first mass; None if
+    # it was not requested
+    velocity: Array | None
     source: str  # a text that states how the solution was computed
     estimate: float  # estimated error of any omega before rounding (rad/s)
     # shape (n, 3); the part of omega (rad/s) that rounding removed. The sum of `omega` and
@@ -65,12 +68,12 @@ def reference(
 
     The times are strictly monotonic in order away from 0, forward or backward; the first may be 0.
     An integration by Taylor series is accurate to more digits than binary64 has. If `precise` is
-    true, it is accurate to 1e-25 before rounding, unless the motion amplifies errors too much. Its
-    error is estimated by the largest difference between two integrations with different order and
-    steps. `effort` is a factor on a work limit of some ten seconds. The pace of the first steps
-    decides whether the whole integration would exceed the limit. If `effort` is None, the limit is
-    100 000 steps. If the scene has an attitude, the result contains attitudes, which always come
-    from the series. `velocity` requests the translational velocity.
+    true, it is accurate to 1e-25 before rounding, unless the motion amplifies errors too much. The
+    error of the series is estimated by the largest difference between two integrations with
+    different order and steps. `effort` is a factor on a work limit of some ten seconds. The pace of
+    the first steps decides whether the whole integration would exceed the limit. If `effort` is
+    None, the limit is 100 000 steps. If the scene has an attitude, the result contains attitudes,
+    which are always computed by the series. `velocity` requests the translational velocity.
 
     Raise InputError if the times are not in order, or if the series needs too many steps.
     """
@@ -113,8 +116,9 @@ def reference(
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
     """Return omega of a sphere, or of a symmetric body without torque, in closed form, else None.
 
-    There is a row (rad/s) for each of `times` (s). The solution has as many decimals as the current
-    decimal arithmetic has digits. A phase of 1e41 radians therefore needs 41 additional digits.
+    The result has a row of omega (rad/s) for each of `times` (s). It has as many digits after the
+    decimal point as the current decimal arithmetic has digits. Therefore an angle of 1e41 rad is
+    computed with some 41 additional digits.
     """
     with decimal.localcontext() as context:
         context.prec += _digits_before_the_point(scene, max(map(abs, times)))
@@ -122,9 +126,9 @@ def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 
 def _digits_before_the_point(scene: Scene, time: Decimal) -> int:
-    """Return a bound of the digits before the decimal point of any number in a known solution.
+    """Return a bound of the number of digits before the decimal point in a known solution.
 
-    The known solution is computed from time 0 to `time` (s).
+    The bound applies to all numbers that occur in the solution from time 0 to `time` (s).
     """
     law = scene.body_torque
     omega = max(Decimal(abs(w)) for w in scene.omega)
@@ -148,7 +152,8 @@ def _known_rows(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
         return None
     for axis in range(3):
         j, k = (axis + 1) % 3, (axis + 2) % 3
-        # The coefficients of the other two axes are opposite: their omegas move on a circle.
+        # The coefficients of the other two axes are opposite numbers. Therefore the components of
+        # omega about these axes move on a circle.
         if coefficients[axis] == 0 and coefficients[j] == -coefficients[k]:
             omega = [Decimal(w) for w in scene.omega]
             rate = coefficients[j] * omega[axis]
@@ -166,7 +171,7 @@ def _known_rows(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 def _sphere(scene: Scene, t: Decimal) -> Row:
     """Return omega (rad/s) of a sphere at time t (s).
 
-    It is omega at time 0 plus the integral of the torque over the moment.
+    It is omega at time 0 plus the time integral of the torque, divided by the moment of inertia.
     """
     torque = scene.body_torque
     row = []

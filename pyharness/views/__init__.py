@@ -1,1 +1,1 @@
-"""Output formats of reports, and files of pictures and their numbers; nothing is computed here."""
+"""Output formats of reports, and files of pictures; this package does not compute any results."""

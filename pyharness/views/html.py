@@ -1,4 +1,4 @@
-"""Sections of a report as HTML, for insertion into web pages."""
+"""Reports as HTML fragments, for insertion into web pages."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
@@ -7,20 +7,23 @@ from pyharness.model.report import Field, Line, Report, Section, Table
 
 
 def write(report: Report) -> str:
-    """Return the text of a report as HTML."""
+    """Return the text of a report as an HTML fragment, without a page around it."""
     return sections(report.text)
 
 
 def sections(text: Sequence[Section]) -> str:
-    """Return the sections of a report as HTML, in their order, with formatted numbers."""
+    """Return the sections of a report as an HTML fragment, in their order.
+
+    `text` contains the sections. The numbers in their tables are formatted as for a terminal.
+    """
     return "\n".join(part for section in text if section for part in _parts(section))
 
 
 def table(given: Table, label: str = "table", links: Mapping[str, str] | None = None) -> str:
     """Return a table as HTML, in a block that scrolls if the table is wider than the page.
 
-    `label` is the name of the table for screen readers. `links` maps the text of a cell to the
-    target of its link.
+    `given` is the table. `label` is its name for screen readers. `links` maps the text of a cell to
+    the address to which the cell links. A cell whose text is not in `links` has no link.
     """
     (head, *rows), columns = given.written(), given.columns
     lines = [
@@ -47,9 +50,11 @@ def _cell(tag: str, text: str, left: bool, link: str | None = None) -> str:
 
 
 def _parts(section: Section) -> Iterator[str]:
-    """Yield the HTML elements of a section.
+    """Yield the HTML elements of a section of a report.
 
-    Successive objects of type Line form one element, and so do successive objects of type Field.
+    Successive lines that must not be wrapped (type Line) form one `pre` element. Successive
+    paragraphs with a label (type Field) form one `dl` element. Each table and each other paragraph
+    is an element.
     """
     lines: list[str] = []
     fields: list[str] = []

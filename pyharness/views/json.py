@@ -1,4 +1,4 @@
-"""The record of a report as strict JSON."""
+"""The data of a report as strict JSON, in which all numbers are finite."""
 
 import json
 import math
@@ -10,14 +10,15 @@ SCHEMA = 1
 
 
 def write(report: Report) -> str:
-    """Return the record of a report as JSON, with the number of the JSON schema."""
+    """Return the data of a report as JSON in one line, with the number of the JSON schema."""
     return json_text({"schema": SCHEMA, **report.record()})
 
 
 def json_text(record: dict[str, Any]) -> str:
-    """Return a record as strict JSON in one line.
+    """Return a dictionary as strict JSON in one line.
 
-    Floats round-trip, and a number that is not finite becomes null.
+    Floats are written so that they can be read back exactly. A number that is not finite becomes
+    null, because strict JSON can't represent it.
     """
     try:
         return json.dumps(record, allow_nan=False) + "\n"

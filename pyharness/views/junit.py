@@ -1,4 +1,4 @@
-"""The checks of a report as JUnit XML, which services for continuous integration read."""
+"""The checks of a report as XML in the JUnit format, for continuous integration services."""
 
 from xml.etree import ElementTree as xml
 
@@ -6,7 +6,10 @@ from pyharness.model.report import Report
 
 
 def write(report: Report) -> str:
-    """Return a JUnit test suite as XML, with a test case for each check of the report."""
+    """Return the checks of a report as a JUnit test suite in XML, with a test case for each check.
+
+    A failed check has the reason and the command that repeats it.
+    """
     suite = xml.Element(
         "testsuite",
         name=report.title,

@@ -1,11 +1,14 @@
-"""A report as Markdown: its page, or its data with numbers in full if it has no page."""
+"""A report as Markdown: the page that it contains, or its table of data if there is no page."""
 
 from pyharness.model.report import Report, Section, Table
 from pyharness.views.table import paragraph
 
 
 def write(report: Report) -> str:
-    """Return the page of a report, or its table of data if it has no page, as Markdown."""
+    """Return the page of a report as Markdown, or its table of data if it has no page.
+
+    The page consists of text and formatted tables. In the table of data, numbers have all digits.
+    """
     if report.page is not None:
         return "\n".join(map(_section, report.page))
     assert report.data is not None

@@ -1,4 +1,4 @@
-"""Files of a picture: an image with identical bytes in every run, and its numbers as CSV."""
+"""Files of a picture: an image with identical bytes in every run, and a CSV file of its numbers."""
 
 import io
 import textwrap
@@ -24,9 +24,9 @@ _MOST_LINES = 4
 
 
 def check_picture(path: str) -> None:
-    """Raise InputError if no picture can be made in the file `path` of --plot.
+    """Raise InputError if no picture can be written to the file `path` of the option --plot.
 
-    The suffix of `path` must be a known picture format, and matplotlib must be installed. This is
+    The suffix of `path` must be .png, .svg or .pdf, and matplotlib must be installed. Both are
     checked before anything is computed for the picture.
     """
     if _form(path) not in FORMATS:
@@ -43,15 +43,19 @@ def check_matplotlib(what: str) -> None:
 
 
 def numbers_beside(path: str) -> str:
-    """Return the path of the CSV file with the numbers of the picture in the file `path`."""
+    """Return the path of the CSV file with the numbers that are drawn in the picture file `path`.
+
+    It differs from `path` only in its suffix.
+    """
     return str(Path(path).with_suffix(".csv"))
 
 
 def saved(picture: Picture, *paths: str) -> dict[str, bytes]:
-    """Return the contents of the files of a picture, by path.
+    """Return the contents of the files of a picture, as a dict from path to bytes.
 
-    Each of `paths` gets the picture in the format of its suffix. The numbers of the picture are in
-    a CSV file beside the first path.
+    For each of `paths` there is the picture in the format of the path's suffix. One more entry is a
+    CSV file of the picture's numbers, with the name of the first path and the suffix .csv. No file
+    is written.
     """
     _set_title(picture)
     content = {path: _image(picture.figure, _form(path)) for path in paths}

@@ -1,4 +1,7 @@
-"""Choice of an output format: a format of `--format` is the module of that name in this package."""
+"""Choice of the output format of a report.
+
+Each format of the option `--format` has a module of the same name in this package.
+"""
 
 from importlib import import_module
 
@@ -6,6 +9,9 @@ from pyharness.model.report import Report
 
 
 def render(report: Report, form: str) -> str:
-    """Return a report in the format `form`: table (text), csv, markdown, json, junit or html."""
+    """Return a report as text in the format `form`.
+
+    `form` is ``table`` (plain text), ``csv``, ``markdown``, ``json``, ``junit`` or ``html``.
+    """
     text: str = import_module(f"pyharness.views.{form}").write(report)
     return text

@@ -1,4 +1,4 @@
-"""A report as plain text of at most 100 columns."""
+"""A report as plain text, with paragraphs wrapped at 100 columns and with aligned tables."""
 
 import textwrap
 
@@ -11,7 +11,7 @@ _END_ROWS = 10
 
 
 def write(report: Report) -> str:
-    """Return the sections of a report as text, with a blank line between them."""
+    """Return the text of a report as plain text, with a blank line between its sections."""
     sections = ["\n".join(_lines(section)) for section in report.text if section]
     return "\n\n".join(sections) + "\n"
 
@@ -24,22 +24,26 @@ def _lines(section: Section) -> list[str]:
 
 
 def paragraph(told: str | Field) -> list[str]:
-    """Return the wrapped lines of a paragraph, at least one line.
+    """Return the lines of a paragraph of a report, wrapped at 100 columns; at least one line.
 
-    A Line is not wrapped, and a Field begins with its label.
+    `told` is the paragraph. If its type is Line, it is not wrapped. If its type is Field, the first
+    line begins with its label.
     """
     if isinstance(told, Line):
         return [told]
     if isinstance(told, Field):
         indent = " " * len(told.label)
         return textwrap.wrap(told.text, _WIDTH, initial_indent=told.label, subsequent_indent=indent)
-    # A name with a hyphen is not broken, because users type it.
+    # A name with a hyphen is not broken, because users may copy or type it.
     lines = textwrap.wrap(told, _WIDTH, subsequent_indent="  ", break_on_hyphens=False)
     return lines or [""]
 
 
 def _aligned(table: Table) -> list[str]:
-    """Return the aligned lines of a table, without the rows in the middle of a long table."""
+    """Return the lines of a table as plain text, with aligned columns.
+
+    If the table has more than 200 rows, only the first ten and the last ten are shown.
+    """
     n = len(table.rows)
     if n > _MOST_ROWS:
         table = table._replace(rows=[*table.rows[:_END_ROWS], *table.rows[-_END_ROWS:]])

@@ -1,4 +1,4 @@
-"""Python twins with one fault: copies of their source in which one place is changed."""
+"""Python twins with one fault: copies of their source in which one piece of code is changed."""
 
 import importlib
 import itertools
@@ -20,9 +20,10 @@ _COUNT = itertools.count()
 
 @dataclass(frozen=True)
 class PlantedTwin(Program):
-    """A program with a faulty Python twin, which is `module`, a changed copy of the twin.
+    """A program of the thesis whose Python twin has a fault.
 
-    If `both`, the faulty twin also runs in place of the compiled program.
+    The faulty twin is `module`, a changed copy of the twin. If `both`, it also runs in place of the
+    compiled program.
     """
 
     module: ModuleType

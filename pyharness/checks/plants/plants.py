@@ -1,7 +1,7 @@
-"""Planted faults: one fault at a time, planted to see which check detects it.
+"""Planted faults: one fault at a time, planted to test which check detects it.
 
 A fault is planted in the running process and removed when its context ends. The compiled programs
-are altered at their entry point, the twins in a copy of their source.
+are altered at their entry point, and the Python twins in a copy of their source.
 """
 
 import itertools
@@ -58,7 +58,7 @@ def instead(target: str, faulty: Callable[..., Any]) -> AbstractContextManager[A
 
 
 def changed(target: str, change: Callable[[Any], Any]) -> AbstractContextManager[Any]:
-    """Return a context manager that applies `change` to the results of a function.
+    """Return a context manager that applies `change` to every result of a function.
 
     `target` is the dotted name of the function.
     """
@@ -74,9 +74,10 @@ def _twin(program: str, file: str, old: str, new: str, both: bool) -> Iterator[N
 
 
 def _method(name: str, faulty: Callable[..., Trajectory]) -> AbstractContextManager[Any]:
-    """Return a context manager that replaces the `solve` of the method `name`.
+    """Return a context manager that replaces the function `solve` of the method `name`.
 
-    A call then becomes ``faulty(right, scene, times, ...)``, where `right` is the original `solve`.
+    A call then becomes ``faulty(right, scene, times, ...)``, where `right` is the original
+    function.
     """
     known = METHODS[name]
     return patch.dict(METHODS, {name: replace(known, solve=partial(faulty, known.solve))})
@@ -111,9 +112,10 @@ def _half_step_label(run: Trajectory) -> Trajectory:
 
 
 def _stale() -> Callable[[Trajectory], Trajectory]:
-    """Return a fault, a function that maps each trajectory to the previous one of as many rows.
+    """Return a fault by which a run gives the result of the run before it with as many rows.
 
-    The first trajectory of each number of rows is returned unchanged.
+    The fault is a function of a trajectory. The first trajectory of each number of rows is returned
+    unchanged.
     """
     before: dict[int, Trajectory] = {}
 
@@ -125,8 +127,8 @@ def _stale() -> Callable[[Trajectory], Trajectory]:
     return change
 
 
-# Results of the kernel of a prepared solver: omega, status, steps, and an array of error and
-# growth.
+# Results of the kernel of a prepared solver: omega, status, number of steps, and an array with the
+# estimated error and the error amplification.
 _Answer = tuple[Array, int, int, Array]
 
 
@@ -143,9 +145,9 @@ def _prepared(change: Callable[[Array, _Answer], _Answer]) -> AbstractContextMan
 
 
 def _stale_solver() -> AbstractContextManager[Any]:
-    """Return a context manager by which every second call of a prepared solver is stale.
+    """Return a context manager by which prepared solvers give a stale result in every second call.
 
-    Such a call returns the result of the call before it.
+    The stale result is the result of the call before.
     """
     calls = itertools.count()
     before: list[_Answer] = []
@@ -168,9 +170,10 @@ _FIXED = [code for name, code in _CODES.items() if name.startswith(("gauss", "rk
 
 
 def _too_large(packed: Array, answer: _Answer) -> _Answer:
-    """Return a kernel's answer, 1 % too large for methods with a fixed step and Gauss collocation.
+    """Return the results of a prepared solver's kernel, with omega 1 % too large for some methods.
 
-    `packed` is the input of the kernel, which contains the method.
+    These are the methods with a fixed step and Gauss collocation. `packed` is the input of the
+    kernel, which contains the method.
     """
     omega, status, steps, found = answer
     return (omega * 1.01 if packed[Places.METHOD] in _FIXED else omega, status, steps, found)
@@ -181,7 +184,10 @@ def _half_step(scene: Scene) -> Scene:
 
 
 def _half_step_compiled(run: Callable[..., Trajectory], scene: Scene, *rest: Any) -> Trajectory:
-    """Call `run`, a compiled program, with half the step size; return the times of whole steps."""
+    """Call `run`, a compiled program, with half the step size; return the times of whole steps.
+
+    The rows of the result then have the omegas after half steps and the times of whole steps.
+    """
     found, labels = run(_half_step(scene), *rest), run(scene, *rest)
     if found.steps != labels.steps:
         return found
@@ -205,9 +211,9 @@ def _label_both(
 def _shifted(
     solve: Callable[..., Trajectory], scene: Scene, times: Sequence[float], *rest: float
 ) -> Trajectory:
-    """Call `solve` for times that are half a step late, and return the requested times with it.
+    """Call `solve` for times that are half a step late, and label the results with `times` (s).
 
-    Energy and momentum are conserved nevertheless.
+    The results still conserve energy and momentum.
     """
     half = 0.5 * scene.step_size if times[-1] >= 0.0 else -0.5 * scene.step_size
     found = solve(scene, [t + half for t in times], *rest)
@@ -216,7 +222,7 @@ def _shifted(
 
 
 def _wrong_card() -> AbstractContextManager[Any]:
-    """Return a context manager that exchanges two flags of the compiled programs.
+    """Return a context manager that exchanges the flags of two defects in the compiled programs.
 
     The programs then correct other cards than those that the listing names.
     """

@@ -20,14 +20,16 @@ _DRAWS = 12
 
 @dataclass(frozen=True)
 class Caught:
-    """The checks that failed with a planted fault, or without any fault as the control.
+    """The checks that failed with a planted fault or, as a control, without any fault.
 
     Attributes
     ----------
+    plant : Plant or None
+        The planted fault; None for the control.
     failed : mapping of str to int
         Number of failed checks by kind.
     example : str
-        The name of one check that failed, not one of the golden record if there is another.
+        The id of one failed check; of the golden record only if no other check failed.
     """
 
     plant: Plant | None
@@ -49,7 +51,7 @@ class Caught:
 
 
 def self_test(seed: str, record: Path) -> Iterator[Caught]:
-    """Yield which checks fail without any fault, and then with each planted fault.
+    """Yield the failed checks, first without any fault, and then with each planted fault.
 
     Without a fault, a few checks of every kind are made. With a fault, only the kinds that can
     detect it are made. `seed` determines the random scenes, and `record` is the folder of the
@@ -86,7 +88,10 @@ def as_check(caught: Caught) -> Check:
 
 
 def self_test_report(title: Sequence[str], found: Sequence[Caught], seed: str) -> Report:
-    """Return the report of each fault, with the numbers of checks of each kind that detected it."""
+    """Return the report of each planted fault, with the number of checks that detected it, by kind.
+
+    `title` has the lines above the report, and `seed` determined the random scenes.
+    """
     told = []
     for caught in found:
         plant = caught.plant or Plant("none", "no fault: nothing may fail", nullcontext, ())

@@ -1,1 +1,1 @@
-"""The trials of `stress`, one module for each."""
+"""The trials of `stress`, one module for each trial."""

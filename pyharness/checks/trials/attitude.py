@@ -42,7 +42,8 @@ from pyharness.theory.conditioning import ATTITUDE, ROUNDING, Conditioning, cond
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
 
-# The closed form does not need the conditioning of a million revolutions.
+# The limits of a closed form do not depend on the conditioning, which would be expensive to compute
+# for a million revolutions.
 _unknown = partial(unknown_flow, 1.0)
 _SERIES = ("taylor", "dop853")
 _TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
@@ -63,8 +64,8 @@ _MOTIONS = {
 class Turn:
     """A rotation of a whole problem, about axes of the body or of space.
 
-    `scene` rotates a scene. `back` applies the inverse rotation to the quaternions of its solution,
-    shape (n, 4).
+    `scene` returns the rotated scene. `back` applies the inverse rotation to the quaternions of the
+    solution, shape (n, 4).
     """
 
     scene: Callable[[Scene], Scene]
@@ -101,7 +102,8 @@ def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> 
     """Return the largest error of the attitude that a method may have at `time` (s), in rad.
 
     A closed form may have rounding errors alone. Other methods may have an error of the tolerance,
-    amplified by the flow if perturbations grow a thousandfold, and amplified rounding errors.
+    plus rounding errors amplified by the flow. If perturbations grow more than a thousandfold, the
+    flow amplifies the tolerance too.
     """
     if method in FORMS:
         return ATTITUDE
@@ -109,9 +111,10 @@ def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> 
 
 
 POLICY = Policy(_limit, refusable)
-"""Policy that grants a closed form its rounding, and other methods tolerance and rounding.
+"""Policy whose limit is rounding for closed forms, and tolerance plus rounding for other methods.
 
-Tolerance and rounding of the other methods are amplified by the flow.
+For the other methods, the flow amplifies the rounding errors and, if perturbations grow more than a
+thousandfold, the tolerance.
 """
 
 
@@ -154,8 +157,8 @@ def _attempts() -> Iterator[Attempt]:
 def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterator[Check]:
     """Yield the checks of a method's attitude at the last time of the true solution `known()`.
 
-    They are the angle from the true attitude, the norm of the quaternion, and for closed forms the
-    drift of the angular momentum in space.
+    The checks are of the angle from the true attitude and of the norm of the quaternion. For a
+    closed form, the drift of the angular momentum in space is checked too.
     """
     scene, truth = scene_of(name), known()
     tried = by_rows(name.subject, tolerance, scene, [truth.end])
@@ -174,7 +177,10 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
 
 
 def _omega_limit(scene: Scene) -> float:
-    """Return the relative error of the angular momentum if omega has an error of 16 roundings."""
+    """Return the relative error of the angular momentum that 16 rounding errors of omega may cause.
+
+    The error is relative to the norm of the angular momentum.
+    """
     momentum = np.array(scene.moments) * scene.omega
     size = float(np.linalg.norm(momentum)) or 1.0
     largest = max(scene.moments or (1.0,)) * max(map(abs, scene.omega))
@@ -192,10 +198,11 @@ def _momentum_drift(scene: Scene, found: Answer) -> float:
 def _montgomery(name: Name) -> Check:
     """Check the rotation about the angular momentum in one period by Montgomery's formula.
 
-    The angle is 2 E T/L less a solid angle, where E is the energy, T the period, and L the norm of
-    the angular momentum. The solid angle is the one that the angular momentum encloses in the body,
-    on the side of the axis on which it keeps its sign. The angle is no conserved quantity. No other
-    check detects a wrong rate of this rotation.
+    The angle of the rotation is 2 E T/L less a solid angle, where E is the energy, T the period,
+    and L the norm of the angular momentum. In the body, the angular momentum describes a closed
+    curve about the axis along which its component keeps its sign. This curve encloses the solid
+    angle. Because the angle is no conserved quantity, no other check detects a wrong rate of this
+    rotation.
     """
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)
@@ -219,8 +226,8 @@ def _montgomery(name: Name) -> Check:
 def _solid_angle(scene: Scene, period: float) -> float:
     """Return the solid angle that the angular momentum encloses in the body in one period (s).
 
-    It is integrated by the trapezoidal rule, because no rule is better for a smooth periodic
-    function. omega comes from the elliptic functions in decimals.
+    It is integrated by the trapezoidal rule, which converges exponentially for an analytic periodic
+    function. The elliptic functions for omega are computed in decimal arithmetic.
     """
     moments = np.array(scene.moments)
     before, count, rows = math.inf, 32, np.empty((0, 3))
@@ -245,7 +252,7 @@ def _solid_angle(scene: Scene, period: float) -> float:
 def _turned(turn: Turn, name: Name) -> Check:
     """Check that the attitude of the rotated problem, rotated back, is the original attitude.
 
-    Each of the two solutions may have the error that the method is allowed.
+    `turn` is the rotation. Each of the two attitudes may have the error that the method is allowed.
     """
     scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
     plain, other = (
@@ -260,7 +267,7 @@ def _turned(turn: Turn, name: Name) -> Check:
 
 
 def _back(name: Name) -> Check:
-    """Check that integrating forward and back gives the initial attitude.
+    """Check that integrating forward and then back to time 0 gives the initial attitude.
 
     The limit is the sum of the errors that both integrations may cause.
     """
@@ -273,7 +280,7 @@ def _back(name: Name) -> Check:
     again = solve(start, [-time], method, tolerance, attitude=True).attitude
     assert again is not None
     forth, back = conditioning(scene, time), conditioning(start, -time)
-    # The error of omega at the end of the first part rotates the body in the second part.
+    # The error of omega after the forward integration rotates the body in the backward integration.
     made = forth.limit(tolerance if method == "taylor" else 16.0 * ROUNDING)
     turns = made * back.amplification * math.sqrt(3.0) * back.largest * time
     limit = _allowed(method, tolerance, forth, time) + _allowed(method, tolerance, back, -time)
@@ -281,9 +288,10 @@ def _back(name: Name) -> Check:
 
 
 def _angles(off: float, name: Name) -> Check:
-    """Check Euler angles near a pole by converting them back with SciPy's rotations.
+    """Check Euler angles near a pole by converting them to quaternions with SciPy's rotations.
 
-    `off` is the distance of the second angle from the pole (rad).
+    The quaternions must agree with those from which the angles were computed. `off` is the distance
+    of the second angle from the pole (rad).
     """
     from scipy.spatial.transform import Rotation
 

@@ -1,8 +1,8 @@
 """Trial of invariance: results must transform with a problem that is rotated or rescaled.
 
-Some methods perform the same operations on the changed problem, in another order of axes, with
-other signs or with other exponents. Their results must then be bit-for-bit identical. The other
-results must agree within the bound.
+Some methods perform the same operations on the transformed problem, in another order of axes, with
+other signs or with other exponents. Their results must then be bit-for-bit identical. The results
+of all other methods must agree within an error bound.
 """
 
 import random
@@ -53,9 +53,9 @@ SCENES = {
 class Symmetry:
     """A transformation of a problem, with its inverse for the result.
 
-    `turn` transforms the scene, whose motion then takes the time divided by `faster`. `back`
-    transforms the resulting omega back. `bitwise` are the methods and programs whose operations
-    change in the same way, so that their results must be bit-for-bit identical.
+    `turn` transforms the scene. A motion that took a time t then takes the time t/`faster`. `back`
+    transforms the resulting omega back. `bitwise` names the methods and programs whose operations
+    are transformed in the same way, so that their results must be bit-for-bit identical.
     """
 
     turn: Callable[[Scene], Scene]
@@ -138,15 +138,19 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
-    """Return omega at `time` (s) by the method `name`; NaN if a prepared solver ends before."""
+    """Return omega at `time` (s) by the method `name`; NaN if a prepared solver ends before `time`.
+
+    `tolerance` is relative to the largest omega.
+    """
     return run_method(name, scene, time, tolerance).omega
 
 
 def _turned(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Check:
     """Check that the result of the transformed problem, transformed back, is the original result.
 
-    The bits must agree for a method in `symmetry.bitwise`. Otherwise, each of the two results may
-    have the error that the method is allowed. A method with a fixed step then has no limit.
+    For a method in `symmetry.bitwise` the bits must agree. Otherwise, each of the two results may
+    have the error that the method is allowed. For any other method with a fixed step, the
+    difference is reported without a limit.
     """
     scene, method = scene_of(name), name.subject
     try:

@@ -25,7 +25,8 @@ from pyharness.theory import brouwer
 from pyharness.theory.brouwer import LAWS, Noise, Orbit
 from pyharness.truth.elliptic import torque_free
 
-# A revolution takes 2 pi over the largest component of omega, as the body's own rotation.
+# Numbers of revolutions. A revolution is the time 2 pi over the largest component of omega, as for
+# a body that rotates about one axis.
 REVOLUTIONS = tuple(10.0 ** (k / 2.0) for k in range(2, 13))
 MOTIONS = {
     # Case 4: fast precession about the axis of the spin.
@@ -33,17 +34,17 @@ MOTIONS = {
     # All three components take part, and the elliptic modulus is large.
     "tumbling": Scene("tumbling", (0.25, 1.0, 0.5), moments=(40.0, 30.0, 20.0)),
 }
-# Number of initial conditions of each motion. With so many, over two decades of steps, a random
-# walk is mistaken for a drift with a probability below one in a thousand.
+# Number of initial conditions of each motion. With so many initial conditions, over two decades of
+# steps, a random walk is mistaken for a drift with a probability below one in a thousand.
 STARTS = 12
 # Below this number of revolutions the rounding of the result itself is not negligible.
 _FIT_FROM = 10**2.5
 # Half the difference between the exponents of random rounding and of biased rounding.
 _HALFWAY = 0.25
-# Beyond this phase error (rad), its linear measure says only that it is large.
+# Beyond this phase error (rad), its linear measure is no longer accurate.
 _LOST = 0.1
 
-# Bound on the last two terms of the series at the finest tolerance, as a fraction of omega.
+# Bound on the last two terms of the Taylor series at the finest tolerance, as a fraction of omega.
 _LEFT_OUT = Series.SLACK * Series.LEAST_LOCAL_TOLERANCE
 # Step of Gauss collocation by number of stages, in radians of the fastest rate. With 8 stages
 # truncation is far below rounding. With 4 stages truncation dominates the phase error and must not
@@ -57,17 +58,19 @@ Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
 
 @dataclass(frozen=True)
 class Marcher:
-    """A method whose growth of errors is measured, with error bounds of its steps.
+    """A method whose growth of errors is measured, with bounds on the errors of its steps.
 
     Attributes
     ----------
     run : callable
-        ``run(scene, times)`` returns omega at the times, shape (n, 3), and the steps until then.
+        ``run(scene, times)`` returns omega at the times, shape (n, 3), and the number of steps
+        until each time.
     noise : callable
         ``noise(orbit, scene, step)`` returns bounds on the errors that a step of the size `step`
         (s) may add.
     revolutions, others : float
-        Revolutions in the longest run from the first initial condition, and from the others.
+        Number of revolutions in the longest run: from the first initial condition, and from each of
+        the other initial conditions.
     preference : bool
         Whether the errors of a step are known to be biased. Errors are then expected to grow like
         the powers 1 (energy, momentum) and 2 (phase) of the number of steps.
@@ -102,9 +105,9 @@ def _gauss(stages: int) -> Runner:
 
 
 def _rate(scene: Scene) -> float:
-    """Return the largest rate of the linearised equations at the initial omega (1/s).
+    """Return an estimate of the fastest rate of the linearised equations of a scene (1/s).
 
-    The value is accurate to a third.
+    It is the largest of |A|, |B|, |C| times the largest component of the initial omega.
     """
     return speed(scene, max(map(abs, scene.omega)))
 
@@ -120,7 +123,8 @@ MARCHERS = {
         10**5.5,
         preference=True,
     ),
-    # Equal steps of a fraction of a radian. A step costs ten times as much as a Taylor step.
+    # Equal steps of at most one radian of the fastest rate. A step takes ten times as long as a
+    # Taylor step.
     "gauss-8": Marcher(_gauss(8), partial(brouwer.gauss_noise, stages=8), 1e6, 1e5),
     "gauss-4": Marcher(_gauss(4), partial(brouwer.gauss_noise, stages=4), 1e5, 10**4.5),
 }
@@ -148,9 +152,9 @@ def _attempts() -> Iterator[Attempt]:
 def hold(marcher: Marcher, name: Name) -> Iterator[Check]:
     """Yield the checks of the growth of a method's errors, against Brouwer's law.
 
-    The errors of energy, momentum and phase after each number of revolutions are compared with
-    their bounds. The power of the number of steps with which they grow is compared with the
-    expected power.
+    After each number of revolutions, the errors of energy, momentum and phase are compared with
+    their bounds. These errors grow like a power of the number of steps. The fitted power is
+    compared with the expected power.
     """
     motion = name.circumstance
     for what, found, steps, limits in measured(marcher, MOTIONS[motion], orbit_of(motion)):
@@ -170,8 +174,9 @@ class Drift:
     """The errors of one quantity of a motion by one method, as a function of the number of steps.
 
     The quantity `what` is energy, momentum or phase. The arrays have an element for each number of
-    revolutions. `steps` is the number of steps, `error` the root mean square of the errors over the
-    initial conditions, and `limits` its bound. `starts` is the number of initial conditions.
+    revolutions. `steps` is the number of steps. `error` is the root mean square of the errors over
+    the initial conditions, and `limits` is the bound on the errors. `starts` is the number of
+    initial conditions.
     """
 
     motion: str
@@ -184,7 +189,7 @@ class Drift:
 
 
 def curves() -> Iterator[Drift]:
-    """Yield the errors of every quantity by every method on every motion, as the trial measures."""
+    """Yield the errors of every quantity by every method on every motion of the trial."""
     for motion, scene in MOTIONS.items():
         for method, marcher in MARCHERS.items():
             for what, found, steps, limits in measured(marcher, scene, orbit_of(motion)):
@@ -198,9 +203,10 @@ def measured(
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
     """Yield a quantity, its errors, the steps to each horizon, and the bounds at each horizon.
 
-    The quantities are energy, momentum and phase. A horizon is a number of revolutions. The errors
-    have a row for each initial condition of `starts` and a column for each horizon, with NaN beyond
-    the end of the run. `body` is the orbit of the scene.
+    `marcher` is the method, and `body` is the orbit of the scene. The quantities are energy,
+    momentum and phase. A horizon is a number of revolutions. The errors have a row for each initial
+    condition of `starts` and a column for each horizon. They are NaN for a horizon after the end of
+    the run.
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * marcher.revolutions]
@@ -222,13 +228,17 @@ def measured(
 
 @cache
 def orbit_of(motion: str) -> Orbit:
-    """Return the `Orbit` of a motion of `MOTIONS`, with the quantities that the bounds need."""
+    """Return the `Orbit` of a motion of `MOTIONS`, from which the error bounds follow.
+
+    It has the factors from errors of omega to errors of energy, momentum and phase.
+    """
     return brouwer.orbit(MOTIONS[motion])
 
 
 def starts(scene: Scene, body: Orbit) -> list[Scene]:
-    """Return the scene with several initial omegas along one motion, to average over the phase.
+    """Return copies of the scene with different initial omegas along one and the same motion.
 
+    The errors are averaged over these scenes, since they depend on the initial phase of the motion.
     `body` is the orbit of the motion.
     """
     times = [0.37 * k / body.frequency for k in range(STARTS)]
@@ -237,9 +247,9 @@ def starts(scene: Scene, body: Orbit) -> list[Scene]:
 
 
 def _prepared(name: Name) -> Check:
-    """Check that a prepared solver gives the same bits as the method's own run.
+    """Check that a prepared solver gives the same bits as the run that the trial judges.
 
-    Both take the same steps, for 1e4 revolutions.
+    Both use the same method and the same steps, for 1e4 revolutions.
     """
     method, scene = name.subject, MOTIONS[name.circumstance]
     time = 1e4 * 2.0 * math.pi / orbit_of(name.circumstance).largest
@@ -268,7 +278,7 @@ def _scipy(name: Name) -> Iterator[Check]:
 
 
 def _program(listing: Listing, name: Name) -> Iterator[Check]:
-    """Report, without a limit, the errors of a program after 10 and after 1e4 revolutions."""
+    """Report, without a limit, the errors of a program of the thesis after 10 and 1e4 turns."""
     scene = scene_of(name)
     found = unstopped(listing).rows(scene)
     for count in (1_000, 1_000_000):

@@ -1,4 +1,4 @@
-"""Trial of the collocation matrices at steps from 1e-10 to 10 s, and of their singularity."""
+"""Trial of the collocation matrices for step sizes from 1e-10 to 10 s, and of their singularity."""
 
 import math
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ from pyharness.theory.collocation_matrices import (
 )
 
 STEPS = tuple(10.0 ** (k / 2.0) for k in range(-20, 3))
-# Step sizes (s) of runs in which the four-term program meets the singularity.
+# Step sizes (s) of runs. With some of them the matrix of the four-term program is singular.
 _RUN_STEPS = (1e-7, 1e-6, 1e-5, 1e-4)
 
 
@@ -64,7 +64,8 @@ def _condition_note(found: Solved) -> str:
 def _threshold(name: Name) -> Check:
     """Compare the step up to which LEQT1F declares the matrix singular with the derived step.
 
-    LEQT1F then returns IER = 129. The derived step follows from the exact last pivot.
+    LEQT1F reports a singular matrix by IER = 129. The derived step follows from the exact last
+    pivot.
     """
     program = name.subject
     wanted = singular_below(program)
@@ -77,9 +78,10 @@ def _threshold(name: Name) -> Check:
 
 
 def _counted(listing: Listing, name: Name) -> Check:
-    """Check the number of steps of a run in which the program prints IER = 129.
+    """Check the number of steps of a run in which the program prints IER = 129 (singular matrix).
 
-    In the original programs the collocation points move in later steps, away from the singularity.
+    In the original programs the defect `dt-accumulates` moves the collocation points in later
+    steps, so that the matrix ceases to be singular.
     """
     scene = scene_of(name)
     ier = compiled.run(scene, listing, velocity=False).ier

@@ -1,4 +1,4 @@
-"""Trial of nearly symmetric and symmetric bodies, and of near-spheres and spheres."""
+"""Trial of bodies with two or three moments of inertia that are equal or nearly equal."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -9,7 +9,8 @@ from pyharness.checks.judge import unknown_flow
 from pyharness.checks.stress import Trial
 from pyharness.scenes.extreme import LONG, SYMMETRIC_START
 
-# The closed form is the only method that needs no bound on the error amplification.
+# The long time is tried only with closed forms, because their limits need no bound on the error
+# amplification.
 _UNKNOWN = unknown_flow(max(map(abs, SYMMETRIC_START)))
 
 

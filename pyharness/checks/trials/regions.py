@@ -1,4 +1,4 @@
-"""Trial of linear stability: each program's own steps against its amplification matrix.
+"""Trial of linear stability: each program's steps against the program's amplification matrix.
 
 The matrix is derived from the scheme, and the steps are made by running the program.
 """
@@ -48,7 +48,7 @@ _DIRECTIONS = {"real": -1.0 + 0.0j, "imaginary": 1.0j}
 def _attempts() -> Iterator[Attempt]:
     """Yield deferred checks that compare the steps of every program with its amplification matrix.
 
-    The Runge-Kutta program is also tried with each of two defects alone.
+    The Runge-Kutta program is also tried with only one of its defects, for each of two defects.
     """
     halves = [subset("runge-kutta", keep=[name]) for name in ("stage-base", "base-not-restored")]
     for listing in (*LISTINGS, *halves):
@@ -116,9 +116,10 @@ def _polynomial(listing: Listing, name: Name) -> Check:
 
 
 def _spin(listing: Listing, name: Name) -> Check:
-    """Report, without a limit, the growth per step of the wobble of a case's spin about axis 3.
+    """Report, without a limit, by how much a wobble about axis 3 grows per step in a case.
 
-    The growth is the spectral radius of the amplification matrix less 1.
+    The growth is the spectral radius of the amplification matrix less 1. The case of Table 1 is the
+    scene in `name`, and its spin about axis 3 is the steady rotation.
     """
     scene = scene_of(name)
     z = eigenvalues(replace(scene, omega=(0.0, 0.0, scene.omega[2])))

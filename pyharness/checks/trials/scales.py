@@ -28,10 +28,11 @@ _DRIVEN_TWOS = (-320, -100, 100, 320)
 
 
 def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
-    """Yield deferred checks that a scaled motion by one of our methods has the same digits.
+    """Yield deferred checks that scaling a motion by a power of two changes no digit of its result.
 
-    `powers` are the exponents of the powers of two by which omega is multiplied and the time
-    divided. `kind` is the first part of the circumstance's name.
+    The motion is computed by `method`, one of our own. `powers` has the exponents of the powers of
+    two by which omega is multiplied and the time divided. `kind` is the first part of the
+    circumstance's name.
     """
     time = scene.step_size * scene.steps
     plain = cache(lambda: _tried(method, scene, time))
@@ -52,7 +53,7 @@ def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) ->
 
 
 def _beyond(name: Name) -> Check:
-    """Check that a method reports an omega beyond the range of binary64, instead of a result."""
+    """Check that a method reports a failure if omega leaves the range of binary64."""
     run = _tried(name.subject, scene_of(name), 1e300)
     silent = run.has_result
     note = "a silent wrong number" if silent else run.ended
@@ -74,8 +75,8 @@ def _flow() -> Conditioning:
 def _truth(scene: Scene, time: float) -> Truth:
     """Return the true omega of a scaled motion at `time` (s), with a known conditioning.
 
-    A scaled motion has the same error amplification as the motion itself. The conditioning is
-    therefore computed once, for the unscaled motion.
+    A scaled motion has the same error amplification as the unscaled motion. The conditioning is
+    therefore computed only once, for the unscaled motion.
     """
     size = max(map(abs, scene.omega)) / max(map(abs, ORDINARY.omega))
     return truth_of(scene, time, replace(_flow(), largest=_flow().largest * size))

@@ -1,4 +1,4 @@
-"""Trial of spin about the middle axis over several flips, with perturbations down to 0."""
+"""Trial of spin about the middle axis over several flips, with perturbations from .1 down to 0."""
 
 from collections.abc import Iterator
 
@@ -18,8 +18,8 @@ _STAYS = 50.0  # s
 def _undisturbed() -> Iterator[Attempt]:
     """Yield deferred checks that a rotation about the middle axis stays constant.
 
-    Without a perturbation this is the exact solution. Every method must return it exactly, except
-    that `quick` may have one rounding error.
+    Without a perturbation the constant rotation is the exact solution. Every method must return it
+    exactly, except that `quick` may have one rounding error.
     """
     scene = in_steps(
         Scene("middle axis, undisturbed", (0.0, 1.0, 0.0), moments=MIDDLE_AXIS), _STAYS

@@ -29,9 +29,10 @@ from pyharness.truth.reference import reference
 CASES = (2, 3, 4, 5, 6)
 TIME = 1.0
 SMALLEST = 1e-6
-# Half a decade apart.
+# Numbers of steps in `TIME`, half a decade apart.
 COUNTS = tuple(round(10.0 ** (k / 2.0)) for k in range(13))
-# Divergence is searched for over a long time, down to a step with which no run should diverge.
+# Divergence is also searched for over a long time (s), down to a step size (s) with which no run
+# should diverge.
 _LONG, _SMALLEST_LONG = 100.0, 2e-3
 _SPINNING = (2, 3, 4)
 
@@ -45,10 +46,11 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attempt]:
-    """Yield deferred checks of a method's errors and divergence in a case.
+    """Yield deferred checks of a method's errors and divergence in a case of Table 1.
 
-    The error at the end is checked for every step size, and so is the step size at which truncation
-    and rounding errors are equal. `listing` is None for a method that is no program of the thesis.
+    The error at the end is checked for every step size. The step size at which truncation and
+    rounding errors are equal is checked too. `listing` is the version of a program of the thesis,
+    or None for any other method.
     """
     before = listing is not None and listing.label == "original"
     label = listing.label if listing else ""
@@ -80,10 +82,11 @@ def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attemp
 
 
 def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
-    """Compare the smallest step at which truncation dominates with the prediction.
+    """Compare the smallest step at which truncation dominates with the predicted one.
 
-    `error` returns the relative error of omega for a number of steps. Truncation dominates if this
-    error equals the predicted truncation error within a factor of 2.
+    `case` is the number of a case of Table 1. `error` returns the relative error of omega for a
+    number of steps. Truncation dominates if this error equals the predicted truncation error within
+    a factor of 2.
     """
     forecaster = _forecaster(case, method)
     smallest = SMALLEST
@@ -111,8 +114,8 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
     """Return the relative error of omega at the end of a run, and a note on the run.
 
-    The error is relative to the largest omega. It is infinite or NaN if the run does not reach the
-    end.
+    The error is relative to the largest omega of the motion. It is infinite or NaN if the run does
+    not reach the end.
     """
     largest = _path(case).flow.largest
     note = ""
@@ -147,7 +150,7 @@ def _rows(name: str, scene: Scene) -> Trajectory:
 def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
     """Compare the smallest step for which a run diverges with the prediction of linear stability.
 
-    Without a prediction the step is only reported.
+    If linear stability makes no prediction for the case and the listing, the step is only reported.
     """
     scene, method = case_scene(case), name.subject
     if listing is None:

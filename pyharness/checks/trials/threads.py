@@ -48,7 +48,10 @@ SCENES = (
 
 @dataclass(frozen=True)
 class Job:
-    """A call of a method or program that must always give bit-for-bit identical results."""
+    """A call of a method or program that must always give bit-for-bit identical results.
+
+    `subject` is the name of the method or program, and `call` returns the bits of the results.
+    """
 
     subject: str
     scene: Scene
@@ -59,7 +62,7 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
     """Yield, for each method, the check that its calls give the same bits in many threads as alone.
 
     Each call is made alone first, and then `_REPEATS` times by `THREADS` threads in mixed order.
-    The value of a check is the number of calls that gave other bits, and the limit is 0.
+    The value of a check is the number of calls in threads whose bits differ, and the limit is 0.
     """
     asked = [job for job in jobs() if may_hold(f"threads/{job.subject}", only)]
     differing = different(asked)
@@ -72,9 +75,10 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
 
 
 def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEATS) -> list[Job]:
-    """Return the jobs that gave other bits in many threads than in a call alone.
+    """Return the jobs that give other bits when called from many threads than when called alone.
 
-    Each job is called `repeats` times, and is returned once for each call with other bits.
+    Each job is called `repeats` times from a pool of `threads` threads. It is returned once for
+    each call with other bits.
     """
     alone = [bits(job) for job in jobs]
     order = [index for index in range(len(jobs)) for _ in range(repeats)]
@@ -90,7 +94,10 @@ def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEA
 
 
 def bits(job: Job) -> bytes:
-    """Make the call of a job and return its bits; for a refusal, return its message."""
+    """Make the call of a job and return the bits of its results.
+
+    If the call is refused by an InputError, return the message of the refusal.
+    """
     try:
         return job.call()
     except InputError as refusal:
@@ -98,9 +105,9 @@ def bits(job: Job) -> bytes:
 
 
 def jobs() -> list[Job]:
-    """Return the calls of every method, prepared solver, program and twin in all scenes.
+    """Return the calls of every method, prepared solver, compiled program and twin in all scenes.
 
-    Calls that are refused, and calls of the linear solver, are among them.
+    Calls that are refused, and calls of the linear solver LEQT1F, are among them.
     """
     found = []
     for scene in SCENES:

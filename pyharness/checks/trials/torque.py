@@ -1,4 +1,7 @@
-"""Trial of torques: waves too fast for the step, huge and tiny torques, precession resonance."""
+"""Trial of torques: waves too fast for the step, huge and tiny torques, precession resonance.
+
+A wave is a sine or cosine term of the torque.
+"""
 
 import math
 from collections.abc import Callable, Iterator
@@ -41,10 +44,10 @@ _START = (0.3, 1.0, 2.0)
 
 @dataclass(frozen=True, eq=False)
 class Circumstance:
-    """A scene that is tried until a time (s), with the methods that can take it.
+    """A scene that is tried until `time` (s), with the methods that can solve it.
 
-    `truth` computes the true solution. If `programs` is set, the programs are also run over the
-    scene's steps.
+    `truth` computes the true solution. If `programs` is set, the programs of the thesis are also
+    run over the scene's steps.
     """
 
     scene: Scene
@@ -57,9 +60,10 @@ class Circumstance:
 def axial(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a symmetric body whose torque acts along its axis.
 
-    The rounding error of a wave's angle, frequency times t, is random from one evaluation to the
-    next. `conditioning` counts n such errors in full, with n evaluations, at least one per period.
-    Only 4 sqrt(n) of them are counted here (Hoeffding 1963).
+    The phase of a wave of the torque, frequency times t, has a rounding error that is random from
+    one evaluation to the next. `conditioning` adds up n such errors in full, where n is the number
+    of evaluations, at least one per period. Here only 4 sqrt(n) of the errors are counted
+    (Hoeffding 1963).
     """
     flow = conditioning(scene, time)
     waves = scene.torque.sines + scene.torque.cosines
@@ -71,9 +75,10 @@ def axial(scene: Scene, time: float) -> Truth:
 
 
 def averaged(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) without the waves of the torque.
+    """Return the true omega at `time` (s) of a scene whose torque has very fast waves.
 
-    The waves are too fast to matter. A bound on their effect is added to the error of the solution.
+    The waves are left out of the solution, because they change omega little. A bound on this change
+    is added to the error of the solution.
     """
     moments = np.array(scene.moments)
     waves = scene.torque.sines + scene.torque.cosines
@@ -83,10 +88,10 @@ def averaged(scene: Scene, time: float) -> Truth:
 
 
 def summed(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) of a sphere, for a limit of a few rounding errors.
+    """Return the true omega at `time` (s) of a sphere, with a conditioning of few rounding errors.
 
-    The closed form has the angle of a wave in double-double, so that this angle has no rounding
-    error. Only the rounding of the terms of one sum is left.
+    The closed form computes the phase of a wave in double-double, so that the phase has no rounding
+    error. Only the rounding errors of the terms of one sum remain.
     """
     known = reference(scene, [time])
     largest = float(np.abs([known.omega[-1], scene.omega]).max())
@@ -118,7 +123,7 @@ def _spun(frequency: float, time: float, programs: bool) -> Circumstance:
 
 
 def _huge(size: float, start: Triple = _START) -> Circumstance:
-    """Return a scene with a constant torque, for some fifty radians of the motion it causes.
+    """Return a scene with a constant torque that turns the body by some fifty radians in all.
 
     `size` is the largest component of the torque (N m), and `start` is the initial omega (rad/s).
     """
@@ -134,7 +139,10 @@ def _tiny(size: float) -> Circumstance:
 
 
 def _resonant(moments: Triple) -> Circumstance:
-    """Return a scene with a transverse torque that rotates at the precession of Case 2, 5 rad/s."""
+    """Return a scene whose transverse torque rotates at the precession rate of Case 2, 5 rad/s.
+
+    `moments` are the moments of inertia of the body.
+    """
     law = TorqueLaw(sines=(((0.0, -40.0, 0.0), 5.0),), cosines=(((40.0, 0.0, 0.0), 5.0),))
     scene = Scene("resonance", (0.0, 1.0, 10.0), moments=moments, torque=law, steps=2000)
     return Circumstance(scene, 20.0, programs=True)
@@ -201,7 +209,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
 def _describe_axial(name: Name) -> Iterator[Attempt]:
     """Yield deferred checks that report, without a limit, the errors of runs with too large steps.
 
-    A step of the scene takes a hundred radians of the torque's wave, or more.
+    In one step of the scene, the phase of the torque's wave changes by a hundred radians or more.
     """
     scene = scene_of(name)
     truth = cache(lambda: brouwer.floats(axial_top(scene, scene.times())))

@@ -1,1 +1,1 @@
-"""The verbs of the command line, one module for each."""
+"""The verbs (subcommands) of the command line, one module for each verb."""

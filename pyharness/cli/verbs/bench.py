@@ -1,4 +1,4 @@
-"""`bench`: run time against error of our methods, the programs and third-party packages."""
+"""The verb `bench`: measure run time against error of our and of third-party solvers."""
 
 import argparse
 import shlex
@@ -18,21 +18,32 @@ from pyharness.model.scene_file import case_numbers
 from pyharness.scenes.random_scenes import weekly_seed
 
 _Named = TypeVar("_Named", bound=Contender)
-# s; beyond this time the reference, in decimal arithmetic, takes too long.
+# Longest horizon, s; beyond it the reference solution, in decimal arithmetic, takes too long.
 _LONGEST = 1e3
 _BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
 OPTIONS = {
-    "--case N": "Measure one case of Table 1 (default: Cases 2 to 7).",
-    "--horizon T": "Integrate from 0 to this time, s (default: 3; Cases 3 and 4 also to 100).",
-    "--random N": "Measure N random scenes of all kinds in place of the cases.",
-    "--ensemble": "Measure many bodies in one call: rates, their change with the number, memory.",
-    "--bodies N": f"Number of bodies of --ensemble (default {_BODIES}).",
-    "--seed S": "Seed of the random scenes or bodies (default: year and week).",
-    "--attitude": "Measure omega and attitude together.",
-    "--methods A,B": "Measure these of our methods alone; none measures none of them.",
-    "--peers X,Y": "Measure these third-party packages alone; none measures none of them.",
-    "--plan": "Measure what each computation would cost that `pyharness plan` leaves out.",
-    "--growth": "Measure the error of the Taylor method up to 1e5 s in Cases 3 and 4.",
+    "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: Cases 2 to 7, "
+    "with --attitude also Case 1).",
+    "--horizon T": "End time of each integration, s, up to 1000 (default 3, and also 100 for Cases "
+    "3 and 4 or, with --attitude, for all cases but 6).",
+    "--random N": "Measure N random scenes, 1 to 10000, with all kinds of torque and body, instead "
+    "of the cases of the thesis.",
+    "--ensemble": "Measure calls that solve many bodies at once: bodies per second, time per body "
+    "against the number of bodies, and memory.",
+    "--bodies N": f"Number of bodies that --ensemble solves, 1 to {_MOST_BODIES} "
+    f"(default {_BODIES}).",
+    "--seed S": "Text that seeds the random scenes or bodies, so that a run can be repeated "
+    "(default: the present year and week, as in 2026-W47).",
+    "--attitude": "Compute and measure the attitude (orientation) of the body together with its "
+    "angular velocity.",
+    "--methods A,B": "Measure only these of our methods and programs, by name (default: all); none "
+    "measures none of them.",
+    "--peers X,Y": "Measure only these third-party solvers, by name or package (default: all that "
+    "are installed); none measures none of them.",
+    "--plan": "Measure the time saved by each part of a computation that `pyharness plan` leaves "
+    "out, instead of the solvers.",
+    "--growth": "Measure how the error of the Taylor method grows with the integration time, up to "
+    "1e5 s, in Cases 3 and 4.",
     **shared.outputs(),
 }
 EXAMPLE = "bench --case 5 --peers none"
@@ -88,9 +99,9 @@ def _present(
 ) -> tuple[list[_Named], list[_Named]]:
     """Return the solvers to measure, and the third-party solvers that are not installed.
 
-    `methods` are our solvers, and `others` the third-party ones. Raise InputError if nothing is
-    left to measure. If `named`, because the user listed the third-party solvers, also raise it if
-    one of these is not installed.
+    `methods` are our solvers, and `others` the third-party solvers. `named` tells whether the user
+    listed the third-party solvers in --peers. Raise InputError if no solver can be measured, or if
+    a third-party solver that the user listed is not installed.
     """
     missing = [each for each in others if not each.is_installed]
     if missing and named:
@@ -111,9 +122,9 @@ def _absent() -> str:
 
 
 def _count(options: argparse.Namespace) -> int:
-    """Return the number of random scenes that --random gives, or 0 without --random.
+    """Return the number of random scenes that --random requests, or 0 without --random.
 
-    With --random, a missing seed in `options` is set to the present week.
+    With --random but without --seed, the seed in `options` is set to the present year and week.
     """
     if options.random is None:
         if options.seed is not None:
@@ -134,12 +145,13 @@ def chosen(
     where: str,
     attitude: bool = False,
 ) -> list[SceneContender]:
-    """Return the solvers for single scenes that the value `text` of an option lists.
+    """Return the solvers for single scenes that the option `where` selects from `contenders`.
 
-    The value lists solvers by name or by package. `what` is the noun for a solver in a message, and
-    `where` the option. With `attitude`, a listed solver must be able to compute the attitude;
-    without it, omega alone. Otherwise InputError is raised. If `text` is None, the result is all
-    of `contenders` with `attitude`, and without it those that can compute omega alone.
+    `text` is the value of the option, which lists solvers by name or by package, and `what` the
+    noun for a solver in a message. Raise InputError if a listed solver can't compute the attitude
+    although `attitude` requests it, or can't compute omega alone although `attitude` is false. If
+    `text` is None, return all of `contenders` with `attitude`; without it, return those that can
+    compute omega alone.
     """
     if text is None:
         return [each for each in contenders if attitude or each.velocity]
@@ -155,7 +167,7 @@ def chosen(
 
 
 def _again(options: argparse.Namespace) -> str:
-    """Return the command that measures the same again and prints the report as Markdown."""
+    """Return the command that repeats this measurement and prints its report as Markdown."""
     command = "pyharness bench" + (" --ensemble" if options.ensemble else "")
     for name in ("case", "horizon", "random", "bodies", "seed", "methods", "peers"):
         value = getattr(options, name)
@@ -202,7 +214,7 @@ def _ensemble(options: argparse.Namespace) -> int:
     loads = draw(options.seed, n)
     rates = measure_ensembles(loads, contenders, options.seed, shared.progress)
     rates.refused.extend(("", each.name, _absent()) for each in missing)
-    # Run times up to a hundred times as many bodies, and the memory of ten times as many.
+    # Run times are measured with up to 100 times as many bodies, and memory with 10 times as many.
     growth = sizes(options.seed, min(100 * n, _MOST_GROWN), shared.progress)
     found = ensembles.Ensembles(rates, growth, memory(min(10 * n, _MOST_BODIES)))
     shared.end_progress()
@@ -212,10 +224,11 @@ def _ensemble(options: argparse.Namespace) -> int:
 
 
 def named(contenders: Sequence[_Named], text: str | None, what: str, where: str) -> list[_Named]:
-    """Return the solvers that the value `text` of an option lists, by name or package.
+    """Return the solvers among `contenders` that the option `where` lists, by name or package.
 
-    If `text` is None, the result is all of `contenders`; for "none" it is empty. `what` is the noun
-    for a solver in a message, and `where` the option. Raise InputError for an unknown name.
+    `text` is the value of the option, and `what` the noun for a solver in a message. If `text` is
+    None, return all of `contenders`; if it is "none", return an empty list. Raise InputError for an
+    unknown name.
     """
     names: list[str] = shared.names(text)
     if names == ["none"]:

@@ -1,6 +1,7 @@
-"""`cards`: the text of the edition, card by card, beside the scan, the port and the twin.
+"""The verb `cards`: show the programs of the thesis card by card, with the scan and our versions.
 
-The port is the Fortran program of this edition, and the twin its Python counterpart.
+Our versions of a program are the port, which is in modern Fortran, and the twin, its Python
+counterpart.
 """
 
 import argparse
@@ -18,24 +19,30 @@ from pyharness.original.deck_collation import faults, rows
 _LARGEST_SCAN = 1 << 24  # bytes
 FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
-    "cards CARDS": "Show these cards: two-term, 1660, 1040-1090 or two-term:1660 (default: all).",
-    "--classes": "Count, by class, the differences between the text of the scan and our reading.",
-    "--collate": "Compare the three decks with each other and with sections II to V of the thesis.",
-    "--scan FILE": "Compare our reading with the text of this scan, character by character.",
+    "cards CARDS": "Show these cards, by program, number or range, as in two-term, 1660, "
+    "1040-1090 or two-term:1660 (default: all cards of the three programs).",
+    "--classes": "Count, by kind, the entries of the apparatus (defects, readings and others), the "
+    "cards that they name, and the deviations of the scan that they explain.",
+    "--collate": "Compare the card decks of the three programs, operation by operation, with each "
+    "other and with sections II to V of the thesis.",
+    "--scan FILE": "Compare our text of the cards, character by character, with the text of a scan "
+    "of the thesis in this file.",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "cards runge-kutta:860"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the requested cards, or a comparison of the scan or the decks with our reading.
+    """Print the requested cards, or one of the comparisons that an option requests.
 
-    Return exit status 1 if a difference in a scan or in a deck is unexplained, otherwise 0.
+    With --scan, our text of the cards is compared with a scan; with --collate, the three decks are
+    compared with each other. Return exit status 1 if one of these comparisons finds a difference
+    that the apparatus does not explain, otherwise 0.
     """
     if options.format == "tei":
         from pyharness.history.tei import tei_document
 
-        # Only the whole edition has a header and an apparatus.
+        # A TEI document has a header and an apparatus, which only the whole edition has.
         shared.refuse(options, "--format tei", ("classes", "collate", "scan"))
         _no_card(options, "--format tei")
         shared.check_outputs(options)

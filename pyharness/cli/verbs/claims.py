@@ -1,4 +1,4 @@
-"""`claims`: the statements of the thesis, each with a verdict whether it is reproduced."""
+"""The verb `claims`: judge whether our programs reproduce the statements of the thesis."""
 
 import argparse
 
@@ -9,15 +9,19 @@ from pyharness.model.errors import InputError
 from pyharness.original.programs import BINARY64, WORD_NAMES
 
 OPTIONS = {
-    "--explain ID": "Explain the verdict on this claim with its numbers.",
-    "--assignments": "Show with which initial conditions of the cases all claims hold.",
-    "--word W": "Judge the programs in this arithmetic: "
+    "--explain ID": "Explain the verdict on the claim with this identifier, as in "
+    "abstract-superior, with the numbers behind it.",
+    "--assignments": "Show, for each case whose initial angular velocity the thesis omits, with "
+    "which assumed values all claims hold.",
+    "--word W": "Floating-point arithmetic in which the programs run for the verdicts: "
     f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
-    "--evidence": "Score every combination of initial conditions, readings, conjectures and steps.",
-    "--atlas STORE": "Report for which initial conditions the claims hold, from this store of a "
-    "sweep; needs --sweep.",
-    "--sweep FILE.toml": "The sweep file that made the store of --atlas.",
-    **shared.outputs(plot="With --evidence or --atlas, draw the claims with differing verdicts"),
+    "--evidence": "Score every combination of initial conditions, readings, conjectures and "
+    "numbers of steps by the claims that hold with it.",
+    "--atlas STORE": "Report for which initial angular velocities the claims hold, from the "
+    "results of a sweep in this folder; needs --sweep.",
+    "--sweep FILE.toml": "Sweep file (TOML) from which `pyharness sweep` made the folder of "
+    "--atlas.",
+    **shared.outputs(plot="the verdicts, with --evidence or --atlas,"),
 }
 EXAMPLE = "claims --explain abstract-superior"
 

@@ -1,4 +1,4 @@
-"""`compare`: original and corrected programs, in Fortran and Python, against the reference."""
+"""The verb `compare`: compare original and corrected programs with the reference solution."""
 
 import argparse
 from collections.abc import Sequence
@@ -16,11 +16,14 @@ OPTIONS = {
     **shared.SCENE,
     **shared.LISTING,
     "--program P": f"Compare this program alone: {', '.join(PROGRAMS)} (default: all three).",
-    "--word W": "Run the programs in this arithmetic: "
+    "--word W": "Run the programs in this floating-point arithmetic: "
     f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
-    "--tolerance E": "Relative tolerance of every method of solve_ivp (default: the method's own).",
-    "--attitude": "Compare the attitude too; its error is an angle in rad.",
-    "--ablate": "Run every subset of a program's defects and sort the subsets by their effect.",
+    "--tolerance E": "Relative tolerance of each method of SciPy's solve_ivp, at most 1 (default: "
+    "the method's own).",
+    "--attitude": "Compare the attitude (orientation) of the body too, with its error as an angle "
+    "in rad.",
+    "--ablate": "Run every subset of each program's defects, and list the subsets by their error, "
+    "largest first.",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(),
@@ -31,8 +34,8 @@ EXAMPLE = "compare --case 3 --listing original --plot case-3.png"
 def run(options: argparse.Namespace) -> int:
     """Compare the programs on a scene, and print the comparison.
 
-    Return exit status 1 if a result is unexpected, or with --strict if the scene is sensitive, that
-    is, if amplified rounding errors exceed the tolerance. Otherwise return 0.
+    Return exit status 1 if a result is unexpected. With --strict, also return it if the scene is
+    sensitive, that is, if amplified rounding errors exceed the tolerance. Otherwise return 0.
     """
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)

@@ -1,4 +1,4 @@
-"""`deck`: a program as a deck of cards, in fixed-form FORTRAN."""
+"""The verb `deck`: write a program of the thesis as a deck of cards in fixed-form FORTRAN."""
 
 import argparse
 
@@ -12,15 +12,18 @@ from pyharness.original.decks import DIALECTS, SYSTEMS, deck_text, job_text
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "--program P": f"Write the deck of this program: {', '.join(PROGRAMS)}.",
-    "--case N": "Use the data cards of this case, 1 to 7 (default: the case that was printed).",
+    "--program P": f"Write the deck of this program: {', '.join(PROGRAMS)} (required).",
+    "--case N": "Set the data of this case of Table 1 of the thesis, 1 to 7, on the cards "
+    "(default: the case on the published cards).",
     **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},
-    "--dialect D": f"Write for this compiler: {', '.join(DIALECTS)} (default {DIALECTS[0]}); ftn "
-    "writes a batch job for the CDC's compiler.",
-    "--system S": "Operating system of the batch job, with --dialect ftn: "
+    "--dialect D": f"Form of the deck: {', '.join(DIALECTS)} (default {DIALECTS[0]}, as printed). "
+    "The form gfortran suits that compiler; ftn is a batch job for the CDC's compiler FTN.",
+    "--system S": "Operating system of the CDC computer that runs the job of --dialect ftn: "
     f"{' or '.join(SYSTEMS)} (default nos).",
-    "--round": "Compile with rounded arithmetic, with --dialect ftn.",
-    "--terms N": "Make a model of 3 or 5 terms from the four-term deck; it is a conjecture.",
+    "--round": "Set the option of the compiler FTN that rounds results instead of truncating them; "
+    "needs --dialect ftn.",
+    "--terms N": "Derive a collocation deck with N terms, 3 or 5, from the four-term deck; the "
+    "result is a conjecture, because the thesis prints no such deck.",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "deck --program runge-kutta --dialect gfortran --out runge-kutta.f"

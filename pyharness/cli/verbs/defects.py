@@ -1,4 +1,4 @@
-"""`defects`: the entries of the apparatus (defects, readings, ...) and their effects."""
+"""The verb `defects`: show the defects, readings and conjectures, with evidence and effects."""
 
 import argparse
 
@@ -8,9 +8,10 @@ from pyharness.history.apparatus_report import apparatus_report, entry_report
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "name NAME": "Show this entry and its effect in every case: a name from the list, or a card "
-    "as in 1660 or two-term:1660 (default: list all entries).",
-    "--kind K": "List the entries of this kind alone, as defect, reading or conjecture.",
+    "name NAME": "Show this defect, reading or other entry, and its effect in every case, by name "
+    "or by card, as in 1660 or two-term:1660 (default: list all entries).",
+    "--kind K": "List only the entries of this kind, such as defect, reading or conjecture "
+    "(default: all kinds).",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "defects stage-base"
@@ -19,7 +20,7 @@ EXAMPLE = "defects stage-base"
 def run(options: argparse.Namespace) -> int:
     """Print all entries of the apparatus, or one entry with its effect in every case of Table 1.
 
-    Return exit status 0.
+    The apparatus is the list of all defects, readings and conjectures. Return exit status 0.
     """
     listed = entries(options.kind)
     if options.name is None:
@@ -37,9 +38,9 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _card(options: argparse.Namespace) -> int:
-    """Print a card and the entries of the apparatus that name it, with their effects in all cases.
+    """Print the card that the option `name` gives, and the defects and readings that affect it.
 
-    Return exit status 0.
+    Each such entry of the apparatus is printed with its effect in all cases. Return exit status 0.
     """
     from pyharness.history.cards_report import cards_report
     from pyharness.original.cards import chosen

@@ -1,4 +1,4 @@
-"""`doctor`: the build of this installation, its compiler and flags, and what is missing."""
+"""The verb `doctor`: report how this installation was built, and which packages it lacks."""
 
 import argparse
 

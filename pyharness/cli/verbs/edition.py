@@ -1,4 +1,4 @@
-"""`edition`: the whole edition of the three programs as a static web site."""
+"""The verb `edition`: write the edition of the three programs as a static web site."""
 
 import argparse
 
@@ -7,15 +7,17 @@ from pyharness.model.errors import InputError
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "--out DIR": "Write the pages to this folder, which is made if missing; start at index.html.",
-    "--docs DIR": "Folder of the documents (default: docs of the checkout).",
-    "--format F": "Print the list of what was written as a table (default) or as json.",
+    "--out DIR": "Write the web pages to this folder, which is created if missing; the first "
+    "page is index.html.",
+    "--docs DIR": "Folder of the documents from which the pages are made (default: the folder docs "
+    "of the source checkout).",
+    "--format F": "Output format of the list of written files: table (default) or json.",
 }
 EXAMPLE = "edition --out pages"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Make all pages of the web site, write them, and print a list of the written files.
+    """Make all pages of the web site, write them to a folder, and print a list of the files.
 
     Return exit status 0.
     """

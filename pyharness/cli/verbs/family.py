@@ -1,4 +1,4 @@
-"""`family`: orders of convergence of the weighted residual methods, derived and measured."""
+"""The verb `family`: derive and measure the orders of the weighted residual methods."""
 
 import argparse
 
@@ -12,14 +12,18 @@ _OF_A_MEMBER = ("weighting", "terms", "points", "corrections")
 _DEFAULT_CASE = "5"
 OPTIONS = {
     **shared.SCENE,
-    "--weighting W": "Measure the order and the error of one method, with this weighting of its "
-    f"residual: {', '.join(WEIGHTINGS)}.",
-    "--terms N": "Number of terms of the method's trial solution (default 2).",
-    "--points P": "Collocation points, with --weighting collocation: thesis, gauss, or fractions "
-    "of the step as in 0.3,0.6.",
-    "--corrections K": "Number of corrections of the method in each step (default 1).",
-    "--lost": "Rank the mistakes that may have made the three programs of section IV.2 fail.",
-    "--word W": "Arithmetic of the programs that --lost runs: "
+    "--weighting W": "Measure one method, with this weighting of its residual: "
+    f"{', '.join(WEIGHTINGS)} (default: several methods; with --terms, --points or --corrections "
+    "collocation).",
+    "--terms N": "Number of terms of the trial solution of the one method that is measured, 1 to "
+    "12 (default 2).",
+    "--points P": "Collocation points of the one method that is measured: thesis (equally spaced, "
+    "default), gauss, or fractions of the step as in 0.3,0.6.",
+    "--corrections K": "Number of times that the one method that is measured corrects its estimate "
+    "in each step, 0 to 100 (default 1).",
+    "--lost": "Rank conjectured mistakes by how many of the three unpublished programs of section "
+    "IV.2 of the thesis they make fail.",
+    "--word W": "Floating-point arithmetic of the programs that --lost runs: "
     f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
     **shared.outputs(plot=""),
 }
@@ -27,9 +31,9 @@ EXAMPLE = "family --case 5 --weighting galerkin --terms 3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure the orders of the methods on a scene and print them beside the derived orders.
+    """Measure the methods' orders of convergence on a scene, and print them beside the theory.
 
-    Return exit status 1 if a measured order is below the derived order, otherwise 0.
+    Return exit status 1 if a measured order is below the theoretically derived order, otherwise 0.
     """
     if options.lost:
         return _lost(options)

@@ -1,4 +1,4 @@
-"""`figures`: Figures 6 to 12 of the thesis, original and corrected."""
+"""The verb `figures`: redraw Figures 6 to 12 of the thesis, original and corrected."""
 
 import argparse
 
@@ -8,8 +8,9 @@ from pyharness.model.errors import InputError
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "--out DIR": "Write the SVG, PNG and CSV files to this folder, which is made if missing.",
-    "--format F": "Print the list of what was drawn as a table (default) or as json.",
+    "--out DIR": "Write the SVG, PNG and CSV files of the figures to this folder, which is created "
+    "if missing.",
+    "--format F": "Output format of the list of drawn figures: table (default) or json.",
 }
 EXAMPLE = "figures --out figures"
 
@@ -38,6 +39,6 @@ def run(options: argparse.Namespace) -> int:
         drawn.append(finding)
     shared.end_progress()
     write_folder(options.out, content, "--out")
-    # --out names the folder of the files; the list goes to the terminal.
+    # The list is printed to the standard output, because --out names the folder of the files.
     shared.emit(render(room.figures_report(drawn), options.format or "table"), None)
     return 0

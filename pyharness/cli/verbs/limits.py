@@ -1,4 +1,4 @@
-"""`limits`: the limits of the original programs as the step size tends to zero."""
+"""The verb `limits`: show what the original programs tend to as the step size goes to zero."""
 
 import argparse
 
@@ -9,8 +9,9 @@ from pyharness.model.listing import PROGRAMS
 
 OPTIONS = {
     **shared.SCENE,
-    "--program P": f"Halve the step of this program alone: {', '.join(PROGRAMS)} (default: all).",
-    "--halvings K": "How many times the step is halved (default 6).",
+    "--program P": f"Run only this program with ever smaller steps: {', '.join(PROGRAMS)} "
+    "(default: all three).",
+    "--halvings K": "Number of times that the step size is halved, 1 to 12 (default 6).",
     **shared.EFFORT,
     **shared.outputs(plot=""),
 }
@@ -20,7 +21,8 @@ EXAMPLE = "limits --case 5 --program runge-kutta"
 def run(options: argparse.Namespace) -> int:
     """Compare the original programs with their limits and with the true solution.
 
-    Print the distances for each step size, and return exit status 0.
+    A limit is the solution to which a program tends as its step size goes to zero. Print the
+    distances from both for each step size, and return exit status 0.
     """
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)

@@ -1,4 +1,4 @@
-"""`plan`: the computations that a scene requires, the computations left out, and the reasons."""
+"""The verb `plan`: show which computations a scene requires, which are left out, and why."""
 
 import argparse
 
@@ -9,10 +9,13 @@ from pyharness.methods.solver import PREPARED
 
 OPTIONS = {
     **shared.SCENE,
-    "--method M": "Plan for this method, as in docs/reference/methods.md (default auto).",
-    "--tolerance E": "Relative tolerance (default: the method's own, 1e-12 for auto).",
-    "--velocity": "Plan for the translational velocity too.",
-    "--rows": "Plan for intermediate output too, as `run --times` requests it.",
+    "--method M": "Plan a solution by this method: auto (default) or another method of "
+    "docs/reference/methods.md.",
+    "--tolerance E": "Relative tolerance of the angular velocity, at most 1 (default: the method's "
+    "own, 1e-12 for auto).",
+    "--velocity": "Plan to compute the translational velocity in addition to the angular velocity.",
+    "--rows": "Plan to compute results at intermediate times too, as `pyharness run --times` "
+    "requests them.",
     **shared.outputs(plot=""),
 }
 EXAMPLE = "plan --case 5 --tolerance 1e-9"

@@ -1,4 +1,4 @@
-"""`rotations`: the steady rotations of a scene, and the effect of a perturbation on each."""
+"""The verb `rotations`: find the steady rotations of a scene, and perturb each of them."""
 
 import argparse
 
@@ -9,14 +9,15 @@ from pyharness.theory.rotations_report import rotations_report
 
 OPTIONS = {
     **shared.SCENE,
-    "--disturbance D": "Size of the perturbation, relative to the rotation (default 0.001).",
-    **shared.outputs(plot="Draw the polhodes, and the growth of a perturbation over all bodies"),
+    "--disturbance D": "Magnitude of the perturbation of each steady rotation, as a fraction of "
+    "the rotation's magnitude, above 0 and below 1 (default 0.001).",
+    **shared.outputs(plot="the polhodes, and of growth rates of perturbations for all moments,"),
 }
 EXAMPLE = "rotations --case 4 --disturbance 1e-3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Find the steady rotations of a scene and print them; return exit status 0."""
+    """Print the steady rotations of a scene and their stability; return exit status 0."""
     scene = shared.chosen_scene(options)
     disturbance = shared.positive(options.disturbance, "--disturbance", 1e-3)
     if disturbance >= 1.0:

@@ -1,4 +1,4 @@
-"""`run`: one trajectory, computed by a program of the appendix or by a method."""
+"""The verb `run`: compute one trajectory with a program of the appendix or with a method."""
 
 import argparse
 import sys
@@ -20,24 +20,28 @@ from pyharness.original.programs import (
     run_program,
 )
 
-# Formats that exist for programs alone: the printer page and the tape.
+# Output formats of programs only: the page of the line printer, and the binary file TAPE5.
 PROGRAM_FORMATS = ("printer", "tape5")
 FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
 OPTIONS = {
     **shared.SCENE,
-    "--program P": f"Run this program of the appendix: {', '.join(PROGRAMS)}.",
-    "--implementation I": "Run the program in fortran (default) or in python.",
+    "--program P": f"Run this program of the thesis's appendix: {', '.join(PROGRAMS)} (needed "
+    "unless --method is given).",
+    "--implementation I": "Language of the program that runs: fortran or python (default fortran, "
+    "but python with --word other than binary64).",
     "--word W": f"Run the program in this arithmetic: {', '.join(WORD_NAMES)} (default "
     f"{WORD_NAMES[0]}). Fortran has {', '.join(COMPILED_WORDS)}; the others run in Python.",
-    "--method M": "Run this method in place of a program: auto, taylor, closed-form, dop853 and "
-    "others (docs/reference/methods.md).",
+    "--method M": "Solve the scene by this method instead of a program: auto, taylor, closed-form, "
+    "dop853 and others (docs/reference/methods.md).",
     **shared.LISTING,
-    "--times T1,T2,...": "Times of the results of a method, s; strictly monotonic, of either sign.",
-    "--attitude FORM": "Compute the attitude too, with a method, and print it in this form: "
-    f"{', '.join(FORMS)}.",
-    "--animate FILE": "Write an animation of the rotating body (.gif or .html); needs --attitude.",
-    "--tolerance E": "Largest error of omega at these times, relative to the largest |omega| "
-    "(default: the method's own, 1e-12 for auto).",
+    "--times T1,T2,...": "Times of the results of --method, s, of either sign, in increasing or "
+    "decreasing order (default: the ends of the scene's steps).",
+    "--attitude FORM": "Compute the attitude (orientation) of the body too, and print it as "
+    f"{', '.join(FORMS)} (the numbers name axes of Euler angles).",
+    "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); needs "
+    "--method and --attitude.",
+    "--tolerance E": "Largest allowed error of the angular velocity from --method, relative to its "
+    "largest component (default: the method's own, 1e-12 for auto).",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(FORMATS),
@@ -87,9 +91,9 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) -> None:
-    """Raise InputError if the run can not be written in `form`, which is "printer" or "tape5".
+    """Raise InputError if the result can't be written in `form`, which is "printer" or "tape5".
 
-    Only a program has a printer page and a tape. A tape is binary, and is not written to a
+    Only a program has a printer page and a TAPE5. TAPE5 is binary, and is not written to a
     terminal.
     """
     if options.program is None:
@@ -144,7 +148,7 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
 
 
 def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajectory]:
-    # A run of a program does not import these modules.
+    # These modules are imported here, because a run of a program does not need them.
     from pyharness.methods.registry import METHODS
     from pyharness.methods.solve import solve
 

@@ -1,4 +1,4 @@
-"""`stress`: trials of numerical stability, each with a bound that was derived beforehand."""
+"""The verb `stress`: test the numerical stability of every method against derived bounds."""
 
 import argparse
 
@@ -11,18 +11,19 @@ from pyharness.model.errors import InputError, unknown
 FORMATS = ("table", "json", "junit")
 _FOLDER = "worst"
 OPTIONS = {
-    "--only ID,...": f"Run these trials, or checks with ids that begin so: {', '.join(TRIALS)}.",
-    "--save DIR": "Save the worst scene of every method as a scene file in this folder (default: "
-    "failures alone, in worst/).",
-    **shared.outputs(FORMATS, plot="Draw one trial"),
+    "--only ID,...": f"Run only these trials: {', '.join(TRIALS)}; or only the checks whose ids "
+    "begin with this text, as in shapes/auto.",
+    "--save DIR": "Save the scene with the worst result of each method in each trial as a scene "
+    "file (TOML) in this folder (default: failures only, in the folder worst).",
+    **shared.outputs(FORMATS, plot="the one trial that --only names"),
 }
 EXAMPLE = "stress --only separatrix --plot separatrix.png"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the requested trials and print their results.
+    """Run the requested trials, which are groups of checks, and print their results.
 
-    Return exit status 1 if a result exceeds its bound, otherwise 0.
+    Return exit status 1 if the error of a check exceeds its bound, otherwise 0.
     """
     only = shared.chosen_names(options.only, "trial", tuple(TRIALS))
     if options.plot is not None and len(_chosen(only)) != 1:
@@ -44,7 +45,8 @@ def run(options: argparse.Namespace) -> int:
     failed = [check for check in checks if not check.passed]
     if options.save is not None:
         _save(options.save, checks)
-    # A check that is requested by its id is a replay; its input was saved before.
+    # The scene of a check that is requested by its id is not saved, because an earlier run that
+    # failed has saved it.
     elif not any("/" in each for each in only):
         try:
             _save(_FOLDER, failed)

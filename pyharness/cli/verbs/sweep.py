@@ -1,6 +1,6 @@
-"""`sweep`: a grid of scenes, solved chunk by chunk, with the results in a store.
+"""The verb `sweep`: solve a grid of scenes chunk by chunk, and store the results in a folder.
 
-A later run completes the store of an interrupted run.
+If a run is interrupted, a later run with the same arguments computes the missing chunks.
 """
 
 import argparse
@@ -16,27 +16,32 @@ from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.history.claims import over_starts
 from pyharness.model.errors import InputError
 
-# The functions that judge a claim over many initial conditions, by the claim's name.
+# The name of the function that judges a claim for many initial conditions, by the claim's
+# identifier.
 CLAIMS = over_starts.FUNCTIONS
 _MOST_WORKERS = 1024
 OPTIONS = {
-    "file FILE.toml": "The sweep file: a scene, axes, solvers and reductions.",
-    "--out STORE": "Keep the results in this folder, a Zarr store; continue an incomplete one.",
-    "--repair": "Compute damaged chunks of the store again, and write its metadata again.",
-    "--executor E": f"Where to compute: {', '.join(EXECUTORS)} "
-    f"(default {EXECUTORS[0]}: in this process).",
-    "--workers N": "Number of processes of the executors processes and dask (default: one for each "
-    "processor).",
-    "--scheduler ADDRESS": "Scheduler of a Dask cluster, as in tcp://host:8786 (default: a local "
-    "cluster).",
-    "--quantity NAME": "The reduction that --plot draws (default: the first).",
+    "file FILE.toml": "Sweep file (TOML): a scene, the axes of a parameter grid, a solver, and the "
+    "quantities (reductions) to store for each scene.",
+    "--out STORE": "Store the results in this folder, in the Zarr format; if an earlier run of the "
+    "sweep was interrupted, compute only what is missing.",
+    "--repair": "Compute damaged chunks (blocks of the grid) of the store again, and write damaged "
+    "metadata again.",
+    "--executor E": f"Place of the computation: {', '.join(EXECUTORS)} (default "
+    f"{EXECUTORS[0]}), that is, this process, several processes, or a Dask cluster.",
+    "--workers N": "Number of processes of the executors processes and dask, "
+    f"1 to {_MOST_WORKERS} (default: one for each processor).",
+    "--scheduler ADDRESS": "Address of the scheduler of a Dask cluster, as in tcp://host:8786 "
+    "(default: start a cluster on this machine); needs --executor dask.",
+    "--quantity NAME": "Name of the stored quantity that --plot draws (default: the first with "
+    "numerical values).",
     **{key: help for key, help in shared.outputs().items() if key != "--out FILE"},
 }
 EXAMPLE = "sweep docs/tumbling.toml --out store"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute the missing chunks of the store, and print a report of its contents.
+    """Compute the chunks that the store of the sweep lacks, and print a report of its contents.
 
     Return exit status 0.
     """
@@ -54,7 +59,8 @@ def run(options: argparse.Namespace) -> int:
     workers = _workers(options, executor)
     sweep = read_sweep(options.file, CLAIMS)
     quantity = None
-    # `show` gets no --out, which names the store; the report goes to the terminal.
+    # The option --out is removed for `show`, because it names the store. The report is printed to
+    # the standard output.
     shown = argparse.Namespace(**{**vars(options), "out": None})
     if options.plot is not None:
         from pyharness.ensembles.picture import chosen_quantity

@@ -1,4 +1,4 @@
-"""`verify`: bit-for-bit comparisons of programs, errors against references, the golden record."""
+"""The verb `verify`: check programs and methods against each other and against the truth."""
 
 import argparse
 from pathlib import Path
@@ -16,23 +16,33 @@ from pyharness.model.scene_file import case_numbers
 from pyharness.original.decks import compiler
 
 FORMATS = ("table", "json", "junit")
-# Options that apply to one kind of check alone.
+# Options that apply to only one kind of check, by the name of the kind.
 _OF_ONE_KIND = {"random": ("seed", "draws"), "golden": ("record",)}
 _OF_THE_CHECKS = ("only", "seed", "draws", "external", "self_test", "update", "record")
 OPTIONS = {
-    "--only ID,...": "Run the checks of these kinds, or with ids that begin so: "
-    f"{', '.join(KINDS)}.",
-    "--seed S": "Seed of the random draws (default: year and week).",
-    "--draws N": f"Number of random draws (default {DRAWS}).",
-    "--external FILE": "Check the published numbers in this file alone.",
-    "--listing-output FILE": "Find the arithmetic in which a program printed this page.",
-    "--port COMMAND": "Check a port in any language against the twins (docs/how-to/ports.md).",
-    "--program P": "Program of the page or port to check (default: any).",
-    "--case N": "Case of the page or port to check, 1 to 7 (default: any).",
-    "--cell NAME,...": "Check these cells of the port, as in two-term/case-3 (default: all).",
-    "--self-test": "Plant faults one by one, and report which check finds which fault.",
-    "--update": "Write the golden record anew, and report what changed.",
-    "--record DIR": "Folder of the golden record (default: that of the checkout).",
+    "--only ID,...": f"Run only checks of these kinds: {', '.join(KINDS)}; or only those whose "
+    "ids begin with this text, as in cells/two-term.",
+    "--seed S": "Text that seeds the random scenes, so that a run can be repeated (default: the "
+    "present year and week, as in 2026-W47).",
+    "--draws N": f"Number of random scenes in which methods are checked (default {DRAWS}).",
+    "--external FILE": "Check our methods only against the published results in this file "
+    "(docs/how-to/external.md describes its format).",
+    "--listing-output FILE": "Find the floating-point arithmetic in which a program on any machine "
+    "printed the page in this file.",
+    "--port COMMAND": "Compare a port of the programs to another language, started by this "
+    "command, bit for bit with our Python versions (docs/how-to/ports.md).",
+    "--program P": "Consider only this program, two-term, four-term or runge-kutta, with "
+    "--listing-output or --port (default: all three).",
+    "--case N": "Consider only this case of Table 1, 1 to 7, with --listing-output or --port "
+    "(default: all cases).",
+    "--cell NAME,...": "Compare the port only in these combinations of program, case and listing, "
+    "as in two-term/case-3 (default: all).",
+    "--self-test": "Introduce known faults into the software one by one, and report which checks "
+    "detect each fault.",
+    "--update": "Compute and write the golden record (stored trajectories for comparison) again, "
+    "and report what changed.",
+    "--record DIR": "Folder of the golden record, the stored trajectories for comparison (default: "
+    "tests/golden of the source checkout).",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "verify --only cells,methods"
@@ -167,9 +177,9 @@ def _title(chosen: Selection) -> list[str]:
 
 
 def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
-    """Return a line about decks or published numbers that no check could judge, or no line.
+    """Return a line that reports decks or published numbers that could not be checked, if any.
 
-    The line is needed because such a check does not fail.
+    A check that can't be made is omitted or counts as passed, so that only this line reports it.
     """
     if chosen.may_ask("decks") and compiler() is None:
         return ["decks: not run, as there is no gfortran on the PATH"]

@@ -1,7 +1,8 @@
-"""`words`: the programs with words of any length and rounding, and test vectors of the CDC.
+"""The verb `words`: run the programs in floating-point formats of other lengths and roundings.
 
-A word is a floating-point format, with a precision in bits and a rounding rule. A test vector is an
-instruction of the CDC with its operands and its result.
+A word is a floating-point format with a precision in bits and a rounding rule. The verb also checks
+our emulation of the CDC's arithmetic by test vectors, which are instructions of the CDC computer
+with their operands and results.
 """
 
 import argparse
@@ -18,19 +19,22 @@ from pyharness.original.vectors import Answer, answers
 
 FORMATS = ("table", "json", "csv", "markdown")
 OPTIONS = {
-    "--case N": "Run this case alone, 1 to 7 (default: all).",
-    "--program P": f"Run this program alone: {', '.join(PROGRAMS)} (default: all three).",
-    "--all": f"Run every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits; takes twelve minutes.",
-    "--vectors FILE": "Check our arithmetic of the CDC against the operations in a JSON file.",
-    **shared.outputs(FORMATS, plot="Draw the error against the precision (needs --case)"),
+    "--case N": "Run only this case of Table 1 of the thesis, 1 to 7 (default: all cases).",
+    "--program P": f"Run only this program: {', '.join(PROGRAMS)} (default: all three).",
+    "--all": f"Run the programs with every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits, and "
+    "not only with selected ones; this takes about twelve minutes.",
+    "--vectors FILE": "Check our emulation of the CDC's arithmetic against the operations and "
+    "results in this JSON file.",
+    **shared.outputs(FORMATS, plot="the error against the precision, for one --case,"),
 }
 EXAMPLE = "words --case 2 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the programs with every word, or check our arithmetic of the CDC by test vectors.
+    """Run the programs in several floating-point formats, and print their errors.
 
-    Return exit status 1 if our result of a test vector differs from its result, otherwise 0.
+    With --vectors, instead check our emulation of the CDC's arithmetic by test vectors. Return exit
+    status 1 if one of our results differs from the result in its test vector, otherwise 0.
     """
     if options.vectors is not None:
         shared.refuse(options, "--vectors", ("case", "program", "all", "plot"))

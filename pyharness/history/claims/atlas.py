@@ -1,8 +1,9 @@
 """The atlas of claims: which claims of the thesis hold from which initial omega.
 
-The starts, values of omega(0), cover the sphere of directions at several magnitudes. A verdict has
-points as in `evidence`: 1 if the claim is reproduced, 1/2 if in part, 0 otherwise, without weights.
-A verdict code is one of the integers FAILS, HOLDS and IN_PART.
+The starts, which are values of omega(0), cover the sphere of directions at several magnitudes. The
+verdict on a claim has points as in `evidence`: 1 if the claim is reproduced, 1/2 if it is
+reproduced in part, and 0 otherwise. The claims have no weights. A verdict code is one of the
+integers FAILS, HOLDS and IN_PART of `over_starts`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,8 +41,9 @@ Codes = NDArray[np.int8]
 class Atlas:
     """The verdict codes of each claim over a grid of readings, numbers of steps and starts.
 
-    `codes` has an array for each claim. Its axes are reading, number of steps, magnitude of
-    omega(0) (rad/s), height (omega3 divided by the magnitude) and longitude (rad).
+    A start is an initial omega. `codes` has an array for each claim. Its axes are reading, number
+    of steps, magnitude of omega(0) (rad/s), height (omega3 divided by the magnitude) and longitude
+    (rad). The other fields have the values along these axes, in the same order.
     """
 
     codes: Mapping[str, Codes]
@@ -53,7 +55,7 @@ class Atlas:
 
     @property
     def n_starts(self) -> int:
-        """Return the number of starts for each choice of reading and steps."""
+        """Return the number of starts (initial omegas) for each choice of reading and steps."""
         return len(self.magnitudes) * len(self.heights) * len(self.longitudes)
 
     def choices(self) -> list[tuple[str, int]]:
@@ -61,23 +63,25 @@ class Atlas:
         return list(product(self.readings, self.steps))
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return for each start the sum of the points of all claims.
+        """Return for each start (initial omega) the sum of the points of all claims.
 
-        `reading` and `steps` are indices into `readings` and `self.steps`. The shape is that of the
-        starts, (magnitude, height, longitude).
+        A claim has 1 point if it is reproduced, and 1/2 if in part. `reading` and `steps` are
+        indices into `readings` and `self.steps`. The shape of the result is (magnitudes, heights,
+        longitudes).
         """
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
         """Return for each start whether every claim is reproduced, at least in part.
 
-        The arguments and the shape are as in `score`.
+        A start is an initial omega. `reading` and `steps` are indices into `readings` and
+        `self.steps`. The shape of the result is (magnitudes, heights, longitudes).
         """
         held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
         return np.asarray(np.all(held, axis=0))
 
     def start(self, at: Sequence[int] | NDArray[Any]) -> Triple:
-        """Return omega(0) (rad/s) at the grid indices `at` of magnitude, height and longitude."""
+        """Return omega(0) (rad/s) at the three indices `at` of magnitude, height and longitude."""
         size, height = self.magnitudes[at[0]], self.heights[at[1]]
         across, longitude = np.sqrt(1.0 - height * height), self.longitudes[at[2]]
         found = size * np.array([across * np.cos(longitude), across * np.sin(longitude), height])
@@ -109,7 +113,11 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
-    """Return the sum of the points of several claims' verdicts, with the shape of each array."""
+    """Return the sum of the points of several claims' verdicts.
+
+    `codes` has one array of verdict codes for each claim, all of the same shape, which is also the
+    shape of the result. A claim has 1 point if it is reproduced, and 1/2 if in part.
+    """
     values = np.zeros(len(_CODES) + 1)
     for code, points in _POINTS.items():
         values[code] = points
@@ -119,7 +127,7 @@ def sum_of_points(codes: Sequence[Codes]) -> Array:
 def shares(codes: Codes) -> tuple[float, float, float]:
     """Return the fractions of starts from which a claim is reproduced, in part, and not at all.
 
-    `codes` are the verdict codes of the claim, one for each start.
+    A start is an initial omega. `codes` are the verdict codes of the claim, one for each start.
     """
     whole, part, not_at_all = (float((codes == each).mean()) for each in (HOLDS, IN_PART, FAILS))
     return whole, part, not_at_all
@@ -128,8 +136,9 @@ def shares(codes: Codes) -> tuple[float, float, float]:
 def bits(codes: Codes) -> float:
     """Return the entropy of a claim's verdict over the starts, in bits.
 
-    `codes` are the verdict codes of the claim, one for each start. The entropy is 0 if the verdict
-    is the same from every start, and 1 if each of two verdicts comes from half of the starts.
+    A start is an initial omega. `codes` are the verdict codes of the claim, one for each start. The
+    entropy is 0 if the verdict is the same from every start, and 1 if each of two verdicts is given
+    from half of the starts.
     """
     parts = np.array([(codes == code).mean() for code in _CODES])
     parts = parts[parts > 0.0]
@@ -137,7 +146,11 @@ def bits(codes: Codes) -> float:
 
 
 def about(names: Sequence[str]) -> dict[int, list[str]]:
-    """Return, by case, the identifiers of the claims in `names` that are about this case alone."""
+    """Return, by case, those of the claims `names` that are about this case alone.
+
+    `names` are identifiers of claims, and so are the results. A claim about several cases is left
+    out.
+    """
     found: dict[int, list[str]] = {}
     for name in names:
         case = claim(name)["parameters"].get("case")
@@ -147,9 +160,10 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return, by start and claim, the verdict codes of the claims `names` from a few starts.
+    """Return the verdict codes of the claims `names` from a few starts, by start and claim.
 
-    The starts are the initial omegas that the thesis shows, and our own (`laboratory.starts`).
+    The starts are the initial omegas that the thesis shows, and one of our own
+    (`laboratory.starts`). The verdicts are for the original programs.
     """
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))

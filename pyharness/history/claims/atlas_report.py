@@ -1,4 +1,4 @@
-"""The report of `claims --atlas`: discriminating claims, likely initial omegas, and a picture."""
+"""The report of `claims --atlas`: how the verdicts on claims depend on the initial omega."""
 
 import math
 from collections.abc import Sequence
@@ -32,7 +32,8 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 def atlas_report(atlas: Atlas) -> Report:
     """Return the report of `claims --atlas`: how the verdicts depend on the initial omega.
 
-    Unless a table compares them, the tables are for the first reading and number of steps.
+    The tables are for the first reading and the first number of steps of the atlas, except the
+    tables that compare readings and numbers of steps.
     """
     claims = _claims(atlas)
     score = atlas.score()
@@ -159,8 +160,8 @@ def _by_choice(atlas: Atlas) -> Table:
 def _turned(atlas: Atlas) -> Table:
     """Return a table, by claim, of the fraction of starts whose verdict another choice changes.
 
-    The other choice is a reading or a number of steps other than the first; only one of the two is
-    changed at a time.
+    A start is an initial omega. The other choice is a reading or a number of steps other than the
+    first; only one of the two is changed at a time.
     """
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]
@@ -176,8 +177,8 @@ def _turned(atlas: Atlas) -> Table:
 def atlas_picture(atlas: Atlas) -> Picture:
     """Draw maps of the sum of the claims' points over the sphere of directions of omega(0).
 
-    Beside the maps, which are for some magnitudes of omega(0), a diagram shows the mean points of
-    each claim at every magnitude.
+    A claim has 1 point if it is reproduced, and 1/2 if in part. Each map is for one magnitude of
+    omega(0). Beside the maps, a diagram shows the mean points of each claim at every magnitude.
     """
     from matplotlib.figure import Figure
 
@@ -212,7 +213,7 @@ def atlas_picture(atlas: Atlas) -> Picture:
 def _draw_maps(figure: "Figure", atlas: Atlas, score: Any) -> None:
     import matplotlib as mpl
 
-    # Leave out the first and last magnitude, whose maps look like the maps beside them.
+    # Leave out the first and last magnitude, whose maps look like the maps of their neighbours.
     count = len(atlas.magnitudes)
     inside = np.linspace(0, count - 1, _MAPS + 2)[1:-1].round()
     chosen = np.unique(inside) if count > _MAPS else np.arange(count)

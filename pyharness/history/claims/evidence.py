@@ -1,10 +1,10 @@
 """Evidence on the choices that the thesis leaves open: a score for every combination of them.
 
 A combination fixes omega(0), the readings, the conjectures and the number of steps. Its omega(0) is
-either one value for all cases without a given start, or the values that we adopt. The score is the
-sum of the points of the claims about the original programs. A claim has one point if it is
-reproduced, half a point if it is reproduced in part, and otherwise none. Claims that are not
-testable do not count. There are no weights and no tuned parameters.
+either one value for all cases in which the thesis gives none, or for each case the value that we
+adopt. The score is the sum of the points of the claims about the original programs. A claim has one
+point if it is reproduced, half a point if it is reproduced in part, and otherwise none. Claims that
+are not testable do not count. There are no weights and no tuned parameters.
 """
 
 from collections.abc import Iterator
@@ -28,7 +28,8 @@ KINDS = ("result", "design")
 class Combination:
     """One combination of the choices that the thesis leaves open, with the verdicts under it.
 
-    `verdicts` are on all testable claims about the original programs, by the claim's identifier.
+    `verdicts` has the verdicts for the original programs on all testable claims about programs, by
+    the claim's identifier.
     """
 
     assumptions: Assumptions
@@ -45,9 +46,9 @@ class Combination:
         return sum(each in POINTS for each in self.verdicts.values())
 
     def choices(self) -> dict[str, str]:
-        """Return, by axis, the value that this combination chooses, as text.
+        """Return, by name of the choice, the value that this combination takes, as text.
 
-        The axes are omega(0), each reading, each conjecture, and the number of steps.
+        The choices are omega(0), each reading, each conjecture, and the number of steps.
         """
         given = self.assumptions
         start = given.start or ()
@@ -63,7 +64,10 @@ class Combination:
 
 
 def evidence() -> Iterator[Combination]:
-    """Compute and yield every combination of the open choices with its verdicts, one by one."""
+    """Compute and yield every combination of the open choices with its verdicts, one by one.
+
+    The open choices are omega(0), the readings, the conjectures and the number of steps.
+    """
     for assumptions in combinations():
         verdicts = {}
         for entry in claims():
@@ -76,7 +80,7 @@ def evidence() -> Iterator[Combination]:
 
 
 def evidence_rule() -> str:
-    """Return the text that tells readers of the report how a combination of choices is scored."""
+    """Return the text that describes, in the report, how a combination of choices is scored."""
     return (
         "Every combination of starts (one for all cases in which none is given, or those adopted), "
         "readings, conjectures and steps, scored by the claims about results and design of the "
@@ -86,7 +90,10 @@ def evidence_rule() -> str:
 
 
 def combinations() -> list[Assumptions]:
-    """Return every combination of starts, readings, conjectures and numbers of steps."""
+    """Return every combination of starts, readings, conjectures and numbers of steps.
+
+    A start is an initial omega; None takes the adopted value of each case.
+    """
     return [
         Assumptions(start, frozenset(readings), steps, frozenset(conjectures))
         for start, readings, conjectures, steps in product(
@@ -96,7 +103,10 @@ def combinations() -> list[Assumptions]:
 
 
 def discriminating(found: list[Combination]) -> list[str]:
-    """Return the identifiers of the claims whose verdict differs between combinations."""
+    """Return the identifiers of the claims whose verdict differs between combinations.
+
+    `found` has the combinations of the open choices.
+    """
     every = dict.fromkeys(name for each in found for name in each.verdicts)
     return [
         name for name in every if len({each.verdicts.get(name, NOT_TESTABLE) for each in found}) > 1
@@ -104,9 +114,9 @@ def discriminating(found: list[Combination]) -> list[str]:
 
 
 def undecided(found: list[Combination]) -> dict[str, list[str]]:
-    """Return, by axis, the choices that occur among the combinations of the highest score.
+    """Return the values of each choice that occur among the combinations with the highest score.
 
-    The axes are omega(0), each reading, each conjecture, and the number of steps.
+    The choices are omega(0), each reading, each conjecture, and the number of steps.
     """
     best = max(each.score for each in found)
     choices = [each.choices() for each in found if each.score == best]
@@ -114,10 +124,10 @@ def undecided(found: list[Combination]) -> dict[str, list[str]]:
 
 
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
-    """Return the assumptions with the chosen values on which a claim depends.
+    """Return the chosen assumptions on which a claim depends, with adopted values for all others.
 
-    `entry` is the claim, as in `data/claims.toml`. Assumptions on which the claim does not depend
-    have their adopted values, so that equal tests are run only once.
+    `entry` is the claim, as in `data/claims.toml`. The adopted values avoid that equal tests are
+    run more than once.
     """
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)

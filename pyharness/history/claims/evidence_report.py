@@ -1,4 +1,4 @@
-"""The report of `claims --evidence`: combinations by score, and the claims that discriminate."""
+"""The report of `claims --evidence`: how well the claims agree with each combination of choices."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -36,8 +36,9 @@ _SHORT = {
 def evidence_report(found: Sequence[Combination]) -> Report:
     """Return the report of the evidence on the choices that the thesis leaves open.
 
-    It shows the combinations of choices with the highest and lowest scores, the claims whose
-    verdict differs between combinations, and the choices that the highest score leaves open.
+    It shows three results: the combinations of choices with the highest and lowest scores, the
+    claims whose verdict differs between combinations, and the choices that remain open with the
+    highest score.
     """
     ordered = sorted(found, key=lambda each: -each.score)
     axes = list(ordered[0].choices())

@@ -1,4 +1,4 @@
-"""The laboratory that tests claims: programs under stated assumptions, each run only once."""
+"""The laboratory that tests claims: it runs the programs under given assumptions, each run once."""
 
 import math
 from collections.abc import Sequence
@@ -25,10 +25,10 @@ class Assumptions:
     """One value for each choice that the thesis leaves open.
 
     `start` is omega(0) (rad/s) of the cases in which the thesis gives none; None takes the values
-    in `cases.toml`. `readings` are names of readings of a card that the edition does not adopt, but
-    that are used here. `steps` is the number of steps of every run. `conjectures` are the
-    assumptions where no card exists; None takes those of the original listing. `word` is the name
-    of the arithmetic of the programs.
+    in `cases.toml`. `readings` are the names of interpretations of doubtful cards that the edition
+    does not adopt, but that are used here. `steps` is the number of steps of every run.
+    `conjectures` are the names of assumptions about statements for which no card exists; None takes
+    those of the original listing. `word` is the name of the arithmetic of the programs.
     """
 
     start: Triple | None = None
@@ -42,7 +42,7 @@ class Assumptions:
 class Laboratory:
     """The three programs, original or corrected, which run the cases under given assumptions.
 
-    The original programs have all their defects but those in `fixed`.
+    The original programs have all their defects except those named in `fixed`.
     """
 
     is_original: bool
@@ -50,7 +50,11 @@ class Laboratory:
     fixed: frozenset[str] = frozenset()
 
     def listing(self, program: str) -> Listing:
-        """Return the program's listing; the corrected listing depends on no assumption."""
+        """Return the listing of a program, original or corrected.
+
+        The original listing has the assumed readings and conjectures. The corrected listing depends
+        on no assumption.
+        """
         if not self.is_original:
             return corrected(program)
         readings = self.assumptions.readings & set(names_of("reading", program))
@@ -59,14 +63,17 @@ class Laboratory:
         return subset(program, "original", fixed, readings=readings, conjectures=assumed)
 
     def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return the scene of a case under the assumptions, its step size divided by `parts`."""
+        """Return the scene of a case under the assumptions, its step size divided by `parts`.
+
+        The end time of the scene does not depend on `parts`.
+        """
         scene = _scene(case, self.assumptions.start, self.assumptions.steps)
         return replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
 
     def run(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Trajectory:
-        """Run a program on a case; without `may_stop` the stop test is skipped.
+        """Run a program on a case, with its step size divided by `parts`.
 
-        The step size is divided by `parts`.
+        Without `may_stop` the stop test of the Runge-Kutta program is skipped.
         """
         return self.run_on(self.scene(case, parts), self.listing(program), may_stop)
 
@@ -84,7 +91,7 @@ class Laboratory:
         return _truth(self.scene(case))
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program as `run` does, and return the arrays that `rules` need.
+        """Run a program as the method `run` does, and return the arrays that `rules` needs.
 
         Omega has the rows at the steps of the case only, and is NaN after the end of the run.
         """
@@ -102,15 +109,17 @@ class Laboratory:
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> float:
         """Return the largest error of any omega component (rad/s) at the steps of the case.
 
-        It is infinite after an overflow. The arguments are as in `run`.
+        The error is against the reference solution, and infinite after an overflow. The arguments
+        are as in `run`.
         """
         return float(largest_error(self, program, case, may_stop, parts))
 
     def models(self, case: int, terms: int) -> Array:
         """Return omega (rad/s) of the collocation model with n = `terms` terms, shape (steps, 3).
 
-        Its collocation points are at k/(n+1) of the step, k = 1 ... n. In the original programs the
-        points move out of the step; the torque must then be constant.
+        Its collocation points are at k/(n+1) of the interval length DT, k = 1 ... n. In the
+        corrected programs DT is the step size. In the original programs DT grows by the step size
+        in every step, so that the points move out of the step; the torque must then be constant.
         """
         accumulates = self.is_original and "dt-accumulates" not in self.fixed
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
@@ -118,8 +127,8 @@ class Laboratory:
     def required_constant(self, case: int) -> float:
         """Return the least Lipschitz constant (1/s) with which every step passes the stop test.
 
-        The stop test is that of the Runge-Kutta program. The constant is infinite if no constant
-        is large enough.
+        The stop test is that of the Runge-Kutta program, run on the case `case`. The result is
+        infinite if no constant is large enough.
         """
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
@@ -136,7 +145,7 @@ class Laboratory:
 def starts() -> list[Triple]:
     """Return the initial omegas (rad/s) that the thesis shows anywhere, and one of our own.
 
-    They are tried in the cases for which the thesis gives no initial omega.
+    They are used in the cases for which the thesis gives no initial omega.
     """
     return [
         (float(a), float(b), float(c)) for a, b, c in (s["omega"] for s in facts("claims")["start"])
@@ -146,7 +155,7 @@ def starts() -> list[Triple]:
 def distance(first: Array, second: Array) -> float:
     """Return the largest difference of any omega component over the common rows (rad/s).
 
-    The arrays have the shape (rows, 3); the longer one is cut to the rows of the shorter one.
+    The arrays have the shape (rows, 3); rows that only the longer one has do not count.
     """
     n = min(len(first), len(second))
     with np.errstate(all="ignore"):
@@ -206,9 +215,10 @@ def _model(scene: Scene, terms: int, accumulates: bool, word: str) -> Array:
 
 
 LITERALS = ("DT=", "T=", "DT+")
-"""The places where the collocation decks have the step size as a literal number.
+"""The statements in which the collocation decks have the step size as a literal number.
 
-They are DT before the loop, the end of the interval, and the growth of DT in every step.
+``DT=`` sets the interval length DT before the loop, ``T=`` sets the end of the interval, and
+``DT+`` adds to DT in every step.
 """
 
 
@@ -218,10 +228,11 @@ def by_literals(
 ) -> Array:
     """Run an original collocation deck with some of its step literals divided by `parts`.
 
-    `terms` is 2 for the two-term deck and 4 for the four-term deck. `changed` has the names in
-    `LITERALS` of the literals that are divided. All scenes run at once and must have constant
-    torque. Return omega (rad/s) of every scene at the steps of the unchanged deck, shape (scenes,
-    steps, 3); NaN from an overflow on. It agrees with the decks but for rounding error.
+    A step literal is a place on the cards where the step size is a literal number. `changed` has
+    the names, from `LITERALS`, of those that are divided. `terms` is 2 for the two-term deck and 4
+    for the four-term deck. All scenes run at once and must have constant torque. Return omega
+    (rad/s) of every scene at the steps of the unchanged deck, shape (scenes, steps, 3); NaN from an
+    overflow on. It agrees with the decks but for rounding error.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
@@ -239,11 +250,12 @@ def march_models(
 ) -> Array:  # fmt: skip
     """Integrate collocation models of constant torque from n initial omegas at once.
 
-    `omega`, shape (n, 3), has the initial omegas (rad/s). `coefficients` are A, B and C of Euler's
-    equations, and `torque` is the constant torque divided by the moments (rad/s2). `terms` is the
-    number of terms of the trial functions. The collocation points are in (0, dt), where dt (s)
-    grows by `growth` (s) with every step; each step is `end` (s) long. Return omega, shape (n,
-    steps, 3), which agrees with the programs but for rounding error; NaN from an overflow on.
+    `omega`, shape (n, 3), has the initial omegas (rad/s). `coefficients` has A, B and C of Euler's
+    equations in its last axis, and `torque` is the constant torque divided by the moments (rad/s2).
+    `terms` is the number of terms of the trial functions. The collocation points divide the
+    interval (0, dt) evenly, where dt (s) grows by `growth` (s) with every step. Each of the `steps`
+    steps is `end` (s) long. Return omega (rad/s), shape (n, steps, 3), which agrees with the
+    programs but for rounding error; NaN from an overflow on.
     """
     a, b, c = coefficients.T
 

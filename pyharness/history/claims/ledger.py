@@ -1,4 +1,4 @@
-"""The claims of the thesis, with verdicts computed for the original and corrected programs."""
+"""The claims of the thesis, and the verdicts computed for the original and corrected programs."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -21,7 +21,9 @@ _ROOMS = (verdicts, methods, theory)
 class Survival:
     """The verdicts on one claim, original and corrected, with one assumption changed.
 
-    `survives` is true if both verdicts are the same as with the adopted assumptions.
+    `assumption` describes the change. `original` and `corrected` are the verdicts for the original
+    and for the corrected programs. `survives` is true if both are the same as with the adopted
+    assumptions.
     """
 
     assumption: str
@@ -47,9 +49,9 @@ class Judgement:
 class Assignment:
     """An initial omega for a case in which the thesis gives none, and the verdicts on its claims.
 
-    `start` is the initial omega (rad/s). The verdicts, by claim, are on the original programs.
-    `holds` is true if all claims about the case are reproduced, at least in part; claims that fail
-    with every start do not count.
+    `start` is the initial omega (rad/s). `verdicts` has, by claim, the verdict for the original
+    programs. `holds` is true if all claims about the case are reproduced, at least in part. Claims
+    that fail with every start do not count.
     """
 
     case: int
@@ -95,17 +97,18 @@ def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
 
 @cache
 def judgement(identity: str, word: str = BINARY64) -> Judgement:
-    """Return the verdicts of `judge` on the claim with an identifier, computed once in a process.
+    """Return the verdicts of `judge` on the claim with the identifier `identity`.
 
-    `word` is the name of the arithmetic in which the programs run.
+    The result is cached. `word` is the name of the arithmetic in which the programs run.
     """
     return judge(claim(identity), word)
 
 
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
-    """Return the verdict on a claim, by its test, with the programs that a laboratory runs.
+    """Return the verdict on one claim, with the programs that the laboratory runs.
 
-    `entry` is the claim, as in `data/claims.toml`.
+    `entry` is the claim, as in `data/claims.toml`; it names the test function that gives the
+    verdict.
     """
     (test,) = (vars(room)[entry["test"]] for room in _ROOMS if entry["test"] in vars(room))
     judged: Judged = test(laboratory, **entry.get("parameters", {}))
@@ -132,9 +135,9 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 def assignments() -> list[Assignment]:
     """Return one assignment for each start and each case in which the thesis gives no omega(0).
 
-    The starts are those of `starts`. The claims about a case do not depend on the start of another
-    case. All claims therefore hold at once if every case has a start with which its own claims
-    hold. Claims that fail with every start do not count.
+    The starts are the initial omegas from the function `starts`. The claims about a case do not
+    depend on the start of another case. All claims therefore hold at once if every case has a start
+    with which its own claims hold. Claims that fail with every start do not count.
     """
     found = []
     for case in facts("claims")["assumed"]["cases"]:

@@ -1,8 +1,10 @@
-"""Tests of the claims about programs and methods over several cases.
+"""Tests of the thesis's claims about programs and methods over several cases.
 
 Each function is the `test` of one or more claims in `data/claims.toml`, with arguments, errors and
-verdicts as in `verdicts`. `cases` are numbers of cases of Table 1. A test of weighted residual
-methods that the thesis does not list has the verdict "not testable" for the original programs.
+verdicts as in `verdicts`. `lab` is a laboratory, which runs the programs under the chosen
+assumptions, and `cases` are numbers of cases of Table 1. The thesis lists no programs for some
+weighted residual methods. A test of these methods has the verdict "not testable" for the original
+programs.
 """
 
 import math
@@ -41,11 +43,13 @@ _OTHERS = WEIGHTINGS[1:]
 
 
 def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
-    """Judge the claim that collocation is superior to Runge-Kutta, at the steps that all ran.
+    """Judge the claim that collocation is superior to Runge-Kutta.
 
-    A case counts if both collocation errors are below the Runge-Kutta error. Reproduced if all
-    `cases` count, in part if some do, otherwise false. The error ratios of the cases in `shown`
-    are reported too, but do not affect the verdict.
+    `lab` runs the programs; only the steps that all three programs ran are compared. A case counts
+    if both collocation errors are below the Runge-Kutta error. The verdict is "reproduced" if all
+    `cases` count, "reproduced in part" if some do, otherwise "false". The error ratios of the cases
+    in `shown` are reported too, but do not affect the verdict. An error is the largest error of any
+    omega component against the reference solution.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):
@@ -63,10 +67,11 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge the claim that eq. 19, the Lipschitz condition, is what ends unbounded runs.
 
-    The program's stop test forms a quotient, the change of the slopes over the change of omega. By
-    eq. 19 it is at most the norm of the Jacobian. The ratio of the largest quotient to the largest
-    norm along the solution and the run is computed in each case. Reproduced if no ratio exceeds
-    1.05, in part if none exceeds 2, otherwise false.
+    The stop test of the Runge-Kutta program, which `lab` runs, forms a quotient: the change of the
+    slopes over the change of omega. By eq. 19 the quotient is at most the norm of the Jacobian. In
+    each case the largest quotient is divided by the largest norm along the solution and the run.
+    The verdict is "reproduced" if no ratio exceeds 1.05, "reproduced in part" if none exceeds 2,
+    otherwise "false".
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -91,8 +96,10 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
 def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
     """Judge the claim that collocation models of more than four terms improve little on four.
 
-    `terms` are the numbers of terms above four. The error of four terms is divided by the error of
-    each of these models. Reproduced if no ratio exceeds 2, in part if none exceeds 10.
+    `lab` computes the models, and `terms` are their numbers of terms above four. The error of the
+    model of four terms is divided by the error of each model of more terms. The verdict is
+    "reproduced" if no ratio exceeds 2, and "reproduced in part" if none exceeds 10. An error is the
+    largest error of any omega component against the reference solution.
     """
     numbers = {}
     for case in cases:
@@ -109,7 +116,9 @@ def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
 def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge the claim that some case needs a Lipschitz constant above that of the deck.
 
-    The numbers are the smallest constants (1/s) with which every step passes the stop test.
+    The numbers are, for each of the `cases` in `lab`, the smallest constant (1/s) with which every
+    step of the Runge-Kutta program passes the stop test. The verdict is "reproduced" if one of them
+    exceeds the constant on the program's cards.
     """
     numbers = {f"case {n}: constant needed (1/s)": lab.required_constant(n) for n in cases}
     return graded(numbers, max(numbers.values()) > facts("cases")["deck"]["lipschitz"])
@@ -118,10 +127,11 @@ def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
 def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
     """Judge the claim that the stop test ends the runs that are unbounded, and no others.
 
-    A Runge-Kutta run without the test counts as unbounded if omega overflows, or exceeds `bounded`
-    times the largest omega of the solution. Reproduced if the test ends all unbounded runs and no
-    bounded run, in part if it ends some unbounded run, otherwise false. Not testable if no run is
-    unbounded, and no bounded run is ended.
+    `lab` runs the Runge-Kutta program with and without the test. A run without the test counts as
+    unbounded if omega overflows, or exceeds `bounded` times the largest omega of the reference
+    solution. The verdict is "reproduced" if the test ends all unbounded runs and no bounded run. It
+    is "reproduced in part" if the test ends some unbounded run, otherwise "false". It is "not
+    testable" if no run is unbounded, and no bounded run is ended.
     """
     alarms = unbounded = caught = 0
     for case in cases:
@@ -151,8 +161,10 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge the claim that collocation improves with a tenth of the step, by `rules.small_step`.
 
-    The exception is the two-term program in the case `exception`. For the original programs the
-    numbers also show the effect of changing each literal of the step on the cards.
+    `lab` runs the programs. The exception is the two-term program in the case `exception`. The step
+    size is on the original cards as several literals. For the original programs, the numbers also
+    show the effect of changing only some of these literals. They count the cases of constant torque
+    in which the error falls to half.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
@@ -164,7 +176,9 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
     """Count the cases whose error falls to half when literals of the step are divided by ten.
 
-    Return the counts for each collocation program and each subset of `LITERALS`, by description.
+    The cards have the step size as several literals, `LITERALS`. Return, by description, the counts
+    for each original collocation program and each subset of the literals. The error is the largest
+    one of any omega component; a run that no longer overflows also counts.
     """
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
@@ -184,7 +198,7 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
 def small_step_runge_kutta(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge the claim that Runge-Kutta does not improve with a tenth of the step.
 
-    The rule is `rules.small_step_runge_kutta`; the runs are without the stop test.
+    The rule is `rules.small_step_runge_kutta`. `lab` runs the program without the stop test.
     """
     return judged(rules.small_step_runge_kutta(lab, cases))
 
@@ -194,9 +208,11 @@ def suffices(
 ) -> Judged:
     """Judge the claim that a three- or four-term model suffices for most problems.
 
-    A case counts if the errors of the four-term program and of the model with `terms[0]` terms are
-    at most the fraction `share` of the largest omega. Reproduced if at least `enough` cases count,
-    in part if at least three do. The original model is left out if the torque varies.
+    A case counts if two errors are at most the fraction `share` of the largest omega: the error of
+    the four-term program in `lab`, and the error of the collocation model with `terms[0]` terms.
+    The model is left out for the original programs if the torque varies. The verdict is
+    "reproduced" if at least `enough` cases count, and "reproduced in part" if at least three do. An
+    error is the largest error of any omega component against the reference solution.
     """
     numbers, good = {}, 0
     for case in cases:
@@ -214,9 +230,11 @@ def suffices(
 def execution_time(lab: Laboratory, low: float, high: float) -> Judged:
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
-    The time is measured by the floating-point operations of one step on the cards and in our own
-    LEQT1F, counted as written and with common terms once. Reproduced if the ratio to Runge-Kutta is
-    from `low` to `high` for both programs and both counts, in part if for some.
+    The time is measured by the floating-point operations of one step, on the cards of the programs
+    in `lab` and in our own LEQT1F. One count takes the operations as written, and the other takes
+    each common term once. The operations of a collocation program are divided by those of
+    Runge-Kutta, which gives four ratios for two programs and two counts. The verdict is
+    "reproduced" if all ratios are from `low` to `high`, and "reproduced in part" if some are.
     """
     counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
     numbers, inside = {}, []
@@ -232,9 +250,10 @@ def execution_time(lab: Laboratory, low: float, high: float) -> Judged:
 
 
 def seconds(lab: Laboratory) -> Judged:
-    """Count the floating-point operations of 100 steps of each program; not testable.
+    """Count the floating-point operations of 100 steps of each program in `lab`.
 
-    The claim is about seconds, and run times today say nothing about the original machine.
+    The claim is about seconds, and run times today say nothing about the original machine. The
+    verdict is therefore always "not testable".
     """
     counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
     numbers = {
@@ -247,10 +266,11 @@ def seconds(lab: Laboratory) -> Judged:
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Judge the claim that the programs are about equally long, by the number of their cards.
 
-    The cards of each collocation deck are divided by those of Runge-Kutta, without LEQT1F and with
-    our own LEQT1F. `factors` are two thresholds for the largest ratio. Reproduced if every ratio is
-    at most both thresholds. Not reproduced if the largest ratio exceeds both thresholds, and every
-    ratio the lower one. Otherwise undecided.
+    The number of cards of each collocation deck is divided by that of the Runge-Kutta deck, without
+    and with our own version of LEQT1F. The decks are those of the programs in `lab`. `factors` are
+    two thresholds. The verdict is "reproduced" if every ratio is at most the lower threshold. It is
+    "not reproduced" if every ratio exceeds the lower threshold, and the largest ratio exceeds the
+    higher one. Otherwise it is "undecided".
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -271,9 +291,11 @@ def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
 def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
     """Judge the claim that the weightings other than collocation failed, in `cases`.
 
-    These are the cases with a known solution, and `terms` the numbers of terms that are tried.
-    Reproduced if some error exceeds the largest omega, in part if some error exceeds ten times the
-    error of collocation.
+    The solution is known in these cases. `terms` are the numbers of terms that are tried. The
+    verdict is "reproduced" if some error exceeds the largest omega, and "reproduced in part" if
+    some error exceeds ten times the error of collocation. An error is the largest error of any
+    omega component against the reference solution. For the original programs, which lack these
+    methods, the verdict is "not testable".
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -296,10 +318,12 @@ def computer_error(
 ) -> Judged:
     """Judge the claim that rounding error makes the weightings other than collocation fail.
 
-    The numbers are the errors in Case 1, which every method solves exactly but for rounding, at
-    ever smaller steps. They are also the differences between binary64 and the arithmetics named in
-    `words`, for the methods as IV.2 describes them, in `cases`. Reproduced if the largest number
-    reaches `limit` (rad/s), otherwise false.
+    Two sets of differences of omega (rad/s) are computed. The first set has the errors in Case 1,
+    which every method solves exactly but for rounding, at ever smaller steps. The second set has
+    the differences between binary64 and the arithmetics named in `words`, for the methods as IV.2
+    describes them, in `cases`. The verdict is "reproduced" if the largest number of both sets
+    reaches `limit` (rad/s), otherwise "false". For the original programs, which lack these methods,
+    the verdict is "not testable".
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -310,7 +334,7 @@ def computer_error(
             found = run(scene, Member(weighting, 4)).omega[parts - 1 :: parts]
             error = distance(found, lab.truth(1).omega)
             numbers[f"{weighting}, step {scene.step_size:g}: rounding error (rad/s)"] = error
-    # With products written out, runs in the machine's own words differ by rounding alone.
+    # With products written out, runs in different arithmetics differ by rounding alone.
     for weighting in _OTHERS:
         floats = {case: march(lab.scene(case), weighting) for case in cases}
         for word in words:
@@ -324,9 +348,11 @@ def computer_error(
 def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
     """Judge the claim that of the four weightings only collocation succeeds.
 
-    The largest error of each other weighting is divided by the error of collocation, in `cases`
-    and with the numbers of terms in `terms`. Reproduced if every ratio exceeds 10, in part if some
-    ratio does, otherwise false.
+    The error of each other weighting is divided by the error of collocation with the same number of
+    terms. The largest ratio over all `cases` and all numbers in `terms` counts. The verdict is
+    "reproduced" if this ratio exceeds 10 for every weighting, "reproduced in part" if for some,
+    otherwise "false". An error is the largest error of any omega component against the reference
+    solution. For the original programs, which lack these methods, the verdict is "not testable".
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -346,9 +372,11 @@ def all_succeed(
 ) -> Judged:
     """Judge the claim that the weighted residual methods integrate the rigid body problem.
 
-    Reproduced if the error of every weighting, in all `cases` and with all numbers of terms in
-    `terms`, is at most the fraction `share` of the largest omega. In part if the error of some
-    weighting is, otherwise false.
+    A weighting succeeds if its error is at most the fraction `share` of the largest omega, in all
+    `cases` and with all numbers of terms in `terms`. The verdict is "reproduced" if every weighting
+    succeeds, "reproduced in part" if some weighting does, otherwise "false". An error is the
+    largest error of any omega component against the reference solution. For the original programs,
+    which lack these methods, the verdict is "not testable".
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -367,8 +395,9 @@ def all_succeed(
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Compare the corrected programs with collocation by a first estimate and one correction.
 
-    The numbers also show the error of four-term collocation with zero to three corrections. The
-    claim is a recommendation, so the verdict is always "not testable".
+    The numbers are the largest differences of their omegas (rad/s) in `cases`, under the
+    assumptions of `lab`. They are also the errors of four-term collocation with zero to three
+    corrections. The claim is a recommendation, so the verdict is always "not testable".
     """
     best = Laboratory(False, lab.assumptions)
     numbers = {}

@@ -1,8 +1,9 @@
 """Verdicts on claims from many initial omegas at once, by the functions in `rules` on arrays.
 
 A sweep supplies the starts (values of omega(0)), the listing with its readings, and the number of
-steps. Each start is used in all cases in which the thesis gives none. A sweep calls the attribute
-of this module with the name of a claim in `JUDGED`; `__getattr__` returns the function.
+steps. Each start is used in all cases in which the thesis gives none. A sweep calls one function
+for each claim in `JUDGED`: the attribute of this module with the claim's name, which `__getattr__`
+returns.
 """
 
 from collections.abc import Callable
@@ -30,14 +31,15 @@ from pyharness.scenes.rotated import restarted_at
 FAILS, HOLDS, SILENT, IN_PART = 0, 1, 2, 3
 # Arrays of a batch that would replace values of the cases in Table 1.
 _OF_CASES = {"moments", "coefficients", "torque_constant", "torque_rate"}
-_EFFORT = 1e9  # work limit, in effect none: a sweep reports its expected time beforehand
+_EFFORT = 1e9  # in effect no work limit, because a sweep reports its expected time beforehand
 
 
 class Starts:
     """A bench (see `rules`) with n starts for the cases in which the thesis gives no omega(0).
 
-    Programs, cases and assumptions are those of the laboratory `one`. The reference solution is
-    integrated by Taylor series from row to row, each row to a relative tolerance of 1e-12.
+    A start is an initial omega. Programs, cases and assumptions are those of the laboratory `one`.
+    The reference solution is integrated by Taylor series from each step of the case to the next, to
+    a relative tolerance of 1e-12.
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
@@ -51,20 +53,27 @@ class Starts:
     def scene(self, case: int, parts: int = 1) -> Scene:
         """Return the scene of a case, its step size divided by `parts`.
 
-        Its omega(0) is not a start of the bench where the thesis gives none.
+        If the thesis gives no omega(0) for the case, the omega(0) of the scene is not one of the n
+        starts.
         """
         return self._one.scene(case, parts)
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
         """Run a program on a case from every start, with arguments as in `rules.Bench`.
 
-        The shape of omega is (n, steps, 3), or (steps, 3) if the thesis gives the case's omega(0).
+        A start is an initial omega. The shape of the resulting omega is (n, steps, 3), or (steps,
+        3) if the thesis gives the case's omega(0).
         """
-        # Runs with smaller steps are requested once, for their error, which is cached.
+        # Only runs with the full step size are cached. Others are requested once, for their error,
+        # which is itself cached.
         return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
 
     def solution(self, case: int) -> Array:
-        """Return the reference omega (rad/s) of a case at its steps, with shapes as in `runs`."""
+        """Return the reference omega (rad/s) of a case at its steps.
+
+        The shape is (n, steps, 3) for n starts, or (steps, 3) if the thesis gives the case's
+        omega(0).
+        """
         return self._solution(case)
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Any:
@@ -77,7 +86,8 @@ class Starts:
     def models(self, case: int, terms: int) -> Array:
         """Return omega (rad/s) of the collocation models whose trial functions have `terms` terms.
 
-        From the same start it equals `Laboratory.models` but for rounding error.
+        There is a model for each start, with shapes as in `runs`. It equals the result of
+        `Laboratory.models` from the same start but for rounding error.
         """
         return self._models(case, terms)
 
@@ -139,9 +149,10 @@ def __getattr__(name: str) -> Callable[[Batch], NDArray[np.int8]]:
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
     """Return the verdict code of a claim about the programs for each start in a batch of a sweep.
 
-    The code is FAILS, HOLDS, IN_PART or SILENT, shape (n,). It is SILENT if the sweep's scene is no
-    case of Table 1, or if the sweep varies more than starts, readings and steps. The claim itself
-    determines which cases are run, whatever the case of the sweep.
+    `identity` is the claim's identifier. The code is FAILS, HOLDS, IN_PART or SILENT, shape (n,).
+    It is SILENT if the sweep's scene is no case of Table 1, or if the sweep varies more than
+    starts, readings and steps. The claim itself determines which cases are run, whatever the case
+    of the sweep.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
@@ -156,7 +167,8 @@ def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
 def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
     """Return the verdict codes of a claim from the n starts of a bench, shape (n,).
 
-    `entry` is the claim, as in `data/claims.toml`. A code is FAILS, HOLDS or IN_PART.
+    A start is an initial omega. `entry` is the claim, as in `data/claims.toml`. A code is FAILS,
+    HOLDS or IN_PART.
     """
     grade = vars(rules)[entry["test"]](bench, **entry["parameters"])
     found = np.where(grade.whole, HOLDS, np.where(grade.part, IN_PART, FAILS))
@@ -165,16 +177,17 @@ def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
 
 @lru_cache(maxsize=2)
 def _bench(one: Laboratory, batch: Batch) -> Starts:
-    # Two benches: with the requested steps, and for claims that do not depend on the steps.
+    # Two benches are cached: with the requested number of steps, and with 100 steps for claims
+    # that do not depend on this number.
     return Starts(one, batch.omega0)
 
 
 def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
-    """Return the laboratory that runs the programs of a sweep under the assumptions.
+    """Return the laboratory that runs the programs of a sweep under the assumptions, or None.
 
-    Return None if the claims do not apply to the sweep, because its program is neither the original
-    nor the corrected one, its scene is no case of Table 1, it varies body or torque, or its stop
-    test is not the deck's.
+    None means that the claims do not apply to the sweep, for one of four reasons. Its program is
+    neither the original nor the corrected one. Its scene is no case of Table 1. It varies body or
+    torque. Its stop test is not that of the program's cards.
     """
     if batch.listing is None or batch.arrays.keys() & _OF_CASES:
         return None

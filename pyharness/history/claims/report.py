@@ -1,4 +1,4 @@
-"""The reports of `claims`: all verdicts, one claim in detail, and initial omegas."""
+"""The reports of the verb `claims`: all verdicts, one claim in detail, and the initial omegas."""
 
 import math
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from typing import Any
 from pyharness.history.claims.ledger import Assignment, Judgement
 from pyharness.model.report import Column, Field, Line, Report, Section, Table, short, words
 
-# How a verdict is written in the ledger, and in the legend below the ledger.
+# How a verdict is written in the table of all claims, and in the legend above the table.
 _VERDICTS = {
     "reproduced": ("yes", "reproduced (yes)"),
     "reproduced in part": ("in part", "in part"),
@@ -40,7 +40,10 @@ KINDS = {
 
 
 def claims_report(judgements: Sequence[Judgement]) -> Report:
-    """Return the report of all claims with their verdicts, one line for each claim."""
+    """Return the report of all claims with their verdicts, one line for each claim.
+
+    `judgements` has the claims with their verdicts.
+    """
     rows = [
         [
             each.claim["id"], each.claim["kind"], each.claim["where"], each.original.verdict,
@@ -68,7 +71,8 @@ def claims_report(judgements: Sequence[Judgement]) -> Report:
 def kinds_table(judgements: Sequence[Judgement]) -> Table:
     """Return a table of the number of claims with each verdict, one row for each kind of claim.
 
-    A cell has two numbers: for the original programs and, after a slash, for the corrected ones.
+    There is a column for each verdict. Its entry has two numbers: for the original programs and,
+    after a slash, for the corrected programs.
     """
     columns = [*words("kind"), Column("claims"), *map(Column, _VERDICTS)]
     rows = []
@@ -113,8 +117,8 @@ def explanation(judgement: Judgement) -> Report:
 def assignments_report(assignments: Sequence[Assignment]) -> Report:
     """Return the report on the initial omegas with which the claims about each case hold.
 
-    The verdicts are on the original programs. An assignment is one initial omega for one case in
-    which the thesis gives none.
+    An assignment is one initial omega for one case in which the thesis gives none. The verdicts on
+    the claims are for the original programs.
     """
     text: list[Section] = [
         [
@@ -158,7 +162,7 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def _hangs_on(judgement: Judgement) -> list[str]:
-    """Return, each once, the assumptions whose change alters a verdict on a claim."""
+    """Return, each once, the assumptions whose change alters a verdict on the judged claim."""
     turning = (
         each.assumption.replace("conjecture ", "").replace("reading ", "")
         for each in judgement.survivals
@@ -168,7 +172,10 @@ def _hangs_on(judgement: Judgement) -> list[str]:
 
 
 def written(x: float) -> str:
-    """Return a number behind a verdict as text: a whole number in full, else three digits."""
+    """Return a number that supports a verdict as text.
+
+    A whole number below a million has all its digits, any other number three significant digits.
+    """
     if not math.isfinite(x):
         return short(x)
     return f"{x:.0f}" if x == int(x) and abs(x) < 1e6 else f"{x:.3g}"

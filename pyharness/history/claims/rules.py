@@ -1,10 +1,10 @@
 """Rules of the claims that depend on the initial omega (the start), for one start or many.
 
-A bench supplies runs and solutions: `Laboratory` for one start, `Starts` for n starts. Their arrays
-have the shape (..., steps, 3), where ... is the shape of the starts, () or (n,). A rule returns
-numbers of the shape ..., and flags that say from which starts the claim is reproduced as a whole,
-or in part. Unless a docstring says otherwise, an error is the largest error of any component of
-omega over the steps that the program ran, against the reference solution.
+A bench supplies runs and solutions: it is a `Laboratory` for one start, or `Starts` for n starts.
+Its arrays have the shape (..., steps, 3), where ... is the shape of the starts, () or (n,). A rule
+returns a `Grade`: numbers of the shape ..., and flags that say from which starts the claim is
+reproduced as a whole, or in part. Unless a docstring says otherwise, an error is the largest error
+of any component of omega over the steps that the program ran, against the reference solution.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,8 +24,9 @@ Flags = NDArray[np.bool_]
 class Runs(NamedTuple):
     """The runs of a program on one case, from one start or many.
 
-    `omega` (rad/s), shape (..., steps, 3), is NaN where a run has no row. `steps` is the number of
-    rows of each run. `complete` and `overflow` say of each run whether it ended in this way.
+    A start is an initial omega; ... is the shape of the starts, () or (n,). `omega` (rad/s), shape
+    (..., steps, 3), is NaN where a run has no row. `steps` is the number of rows of each run.
+    `complete` and `overflow` say of each run whether it ended in this way.
     """
 
     omega: Array
@@ -35,7 +36,7 @@ class Runs(NamedTuple):
 
 
 class Grade(NamedTuple):
-    """The result of a rule for one claim, from one start or many.
+    """The result of a rule for one claim, from one start (an initial omega) or many.
 
     `numbers` has the computed numbers by description. The flags `whole` and `part` say from which
     starts the claim is reproduced as a whole, and from which in part.
@@ -49,36 +50,46 @@ class Grade(NamedTuple):
 class Bench(Protocol):
     """The interface through which a rule obtains the runs and reference solutions of its starts.
 
-    A step size is divided by the factor `parts`; the rows of omega are still at the steps of the
-    case. Without `may_stop` the stop test of the Runge-Kutta program is skipped.
+    A start is an initial omega. The step size of a run is divided by the factor `parts`; the rows
+    of omega are still at the steps of the case. Without `may_stop` the stop test of the Runge-Kutta
+    program is skipped.
     """
 
     def scene(self, case: int, parts: int = 1) -> Scene:
         """Return the scene of a case, with its step size divided by `parts`.
 
-        The omega(0) of the scene need not be a start of the bench.
+        The omega(0) of the scene need not be a start of the bench, which is an initial omega of its
+        runs.
         """
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program on a case from every start."""
+        """Run a program on a case from every start, which is an initial omega.
+
+        The step size is divided by `parts`; without `may_stop` the stop test is skipped.
+        """
 
     def solution(self, case: int) -> Array:
-        """Return the reference omega (rad/s) of a case at its steps, shape (..., steps, 3)."""
+        """Return the reference omega (rad/s) of a case at its steps, shape (..., steps, 3).
+
+        Here ... is the shape of the starts.
+        """
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Any:
-        """Return the largest errors of omega (rad/s), shape (...), by `largest_error`."""
+        """Return the largest error of omega (rad/s) for each start, as `largest_error` does."""
 
     def models(self, case: int, terms: int) -> Array:
         """Return omega (rad/s) of the collocation model whose trial functions have `terms` terms.
 
-        The shape is (..., steps, 3); omega is NaN from an overflow on.
+        The shape is (..., steps, 3), where ... is the shape of the starts; omega is NaN from an
+        overflow on.
         """
 
 
 def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
-    """Grade the claim that omega3 varies: reproduced if its range exceeds `limit` (rad/s).
+    """Grade the claim that omega3 varies.
 
-    The range is of the reference solution over the run.
+    It is reproduced if the range of omega3 over the run exceeds `limit` (rad/s). The range is of
+    the reference solution, which `bench` supplies.
     """
     moved = spread_of(bench.solution(case))[..., 2]
     return Grade({"range of omega3 (rad/s)": moved}, moved > limit)
@@ -87,7 +98,8 @@ def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
 def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
     """Grade the claim that all three programs coincide with the known solution.
 
-    Reproduced if every error is below `limit` (rad/s), half a unit of the last printed digit.
+    It is reproduced if the largest error of omega of every program is below `limit` (rad/s), half a
+    unit of the last printed digit. `bench` supplies the runs and the reference solutions.
     """
     numbers = {f"{name}: largest error (rad/s)": bench.error(name, case) for name in PROGRAMS}
     return Grade(numbers, _most(numbers) < limit)
@@ -96,8 +108,10 @@ def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
 def concur(bench: Bench, case: int, share: float) -> Grade:
     """Grade the claim that the two-term and the four-term program agree.
 
-    In part if both runs are complete and differ by at most the fraction `share` of the largest
-    omega. Reproduced if they also differ in each component by at most a tenth of its range.
+    It is reproduced in part if both runs are complete and their omegas differ by at most the
+    fraction `share` of the largest reference omega. It is reproduced as a whole if they also differ
+    in each component by at most a tenth of the component's range. `bench` supplies the runs and the
+    reference solutions.
     """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
@@ -119,8 +133,9 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 def fails(bench: Bench, case: int, share: float) -> Grade:
     """Grade the claim that the Runge-Kutta program fails.
 
-    Reproduced if the run ended early and the error of a component exceeds the fraction `share` of
-    its range; in part if only one of the two is true.
+    It is reproduced if the run ended early and the error of an omega component exceeds the fraction
+    `share` of the component's range. It is reproduced in part if only one of the two is true.
+    `bench` supplies the runs and the reference solutions.
     """
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
@@ -132,7 +147,8 @@ def fails(bench: Bench, case: int, share: float) -> Grade:
 def diverged(bench: Bench, case: int) -> Grade:
     """Grade the claim that the two-term run diverged.
 
-    Reproduced if the run overflowed, or if its error exceeds the largest omega of the solution.
+    It is reproduced if the run overflowed, or if its largest error of omega exceeds the largest
+    omega of the reference solution. `bench` supplies the runs and the reference solutions.
     """
     runs, error = bench.runs("two-term", case), bench.error("two-term", case)
     numbers = {"steps": runs.steps, "largest error (rad/s)": error}
@@ -142,8 +158,9 @@ def diverged(bench: Bench, case: int) -> Grade:
 def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -> Grade:
     """Grade the claim that collocation models with different numbers of terms agree.
 
-    Reproduced if the models with the later numbers in `terms` all differ from the model with the
-    first number by at most the fraction `share` of the largest omega.
+    `terms` has the numbers of terms, of the first model and of the others. The claim is reproduced
+    if all other models differ from the first one by at most the fraction `share` of the largest
+    reference omega. `bench` supplies the models and the reference solution.
     """
     first, *others = terms
     model, largest = bench.models(case, first), largest_of(bench.solution(case))
@@ -160,8 +177,8 @@ def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -
 def dynamic(bench: Bench, case: int, factor: float) -> Grade:
     """Grade the claim that the motion of a case is the liveliest of all seven cases.
 
-    Reproduced if the largest angular acceleration of its four-term run is at least `factor` times
-    the largest angular acceleration in every other case.
+    It is reproduced if the largest angular acceleration of the case's four-term run is at least
+    `factor` times the largest angular acceleration in every other case. `bench` supplies the runs.
     """
     rates = {}
     for each in range(1, 8):
@@ -178,10 +195,11 @@ def dynamic(bench: Bench, case: int, factor: float) -> Grade:
 def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
     """Grade the claim that collocation improves with a tenth of the step size, with one exception.
 
-    The exception is the two-term program in the case `exception`. A run improves if its error falls
-    at least to half; a run that overflowed before does not count as improved. Reproduced if at
-    least four fifths of the other pairs of program and case improve, and the exception does not; in
-    part if at least half of the other pairs improve.
+    The exception is the two-term program in the case `exception`. A run improves if its largest
+    error of omega falls at least to half. A run that overflows with the full step size does not
+    count as improved. The claim is reproduced if at least four fifths of the other pairs of program
+    and case improve, and the exception does not. It is reproduced in part if at least half of the
+    other pairs improve. `bench` supplies the runs and the reference solutions.
     """
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:
@@ -202,8 +220,9 @@ def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
 def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
     """Grade the claim that the Runge-Kutta program does not improve with a tenth of the step size.
 
-    A run improves if its error falls at least to half. Reproduced if no case improves, in part if
-    at most a third of the cases do. The runs are without the stop test.
+    A run improves if its largest error of omega falls at least to half. The claim is reproduced if
+    no case improves, in part if at most a third of the cases do. The runs are without the stop
+    test. `bench` supplies the runs and the reference solutions.
     """
     numbers = {}
     for case in cases:
@@ -221,8 +240,8 @@ def largest_error(
 ) -> Array:
     """Return the largest error of any omega component (rad/s), one number for each start.
 
-    Only rows at the steps of the case count; the error is infinite after an overflow. `may_stop`
-    and `parts` are as in `Bench`.
+    A start is an initial omega of the runs that `bench` supplies. Only rows at the steps of the
+    case count; the error is infinite after an overflow. `may_stop` and `parts` are as in `Bench`.
     """
     runs = bench.runs(program, case, may_stop, parts)
     error = _farthest(runs.omega, bench.solution(case)).max(axis=-1)
@@ -232,7 +251,8 @@ def largest_error(
 def share_of_range(omega: Array, truth: Array) -> Array:
     """Return the largest error of any varying component, divided by the range of the component.
 
-    `truth` is the reference omega of a case. The result has one number for each start, shape (...).
+    `omega` is the result of a run, and `truth` the reference omega of its case, both of the shape
+    (..., steps, 3). The result has one number for each start, shape (...).
     """
     spread = spread_of(truth)
     moving = spread > 1e-12 * largest_of(truth)[..., None]
@@ -252,9 +272,10 @@ def largest_of(omega: Array) -> Array:
 
 
 def _farthest(first: Array, second: Array) -> Array:
-    """Return the largest difference of each omega component (rad/s), shape (..., 3).
+    """Return the largest difference of each omega component over the steps (rad/s), shape (..., 3).
 
-    Steps at which an omega is NaN, because a run has no row there, do not count.
+    `first` and `second` have the shape (..., steps, 3). Steps at which an omega is NaN, because a
+    run has no row there, do not count.
     """
     with np.errstate(all="ignore"):
         apart = _by_component(first - second)
@@ -265,7 +286,7 @@ def _farthest(first: Array, second: Array) -> Array:
 def _by_component(omega: Array) -> Array:
     """Return omega, shape (..., steps, 3), as a contiguous array of the shape (3, ..., steps).
 
-    NumPy reduces this array over the steps ten times as fast.
+    NumPy computes maxima over the steps of this array ten times as fast as of the original array.
     """
     return np.ascontiguousarray(np.moveaxis(omega, -1, 0))
 

@@ -1,4 +1,7 @@
-"""The sentences of sections V and VI of the thesis, each with its claims or a reason for none."""
+"""The sentences of sections V and VI of the thesis, each with the claims that it makes.
+
+A sentence without claims has the reason why it makes none.
+"""
 
 from typing import NamedTuple
 
@@ -17,11 +20,13 @@ class Sentence(NamedTuple):
     claims : tuple of str
         The identifiers of the claims that the sentence makes.
     why : str
-        For a sentence without claims, its function in the text.
+        For a sentence without claims, its function in the text of the thesis.
     laboratory : str
-        The run that shows the sentence best, as options of `run`: ``case=2&program=two-term``.
+        The run that shows best what the sentence says, as options of the verb `run`:
+        ``case=2&program=two-term``.
     command : str
-        A command, without ``pyharness``, that shows more than `claims --explain` of its claims.
+        A command, without ``pyharness``, that shows more about the sentence's claims than
+        `claims --explain` does.
     """
 
     where: str

@@ -1,8 +1,9 @@
-"""Tests of the claims about history, theory and orders, most of them in sections I to IV.
+"""Tests of the thesis's claims about history, theory and orders, most of them in sections I to IV.
 
 Each function is the `test` of one or more claims in `data/claims.toml`, with arguments, errors and
-verdicts as in `verdicts`. `cases` are numbers of cases of Table 1. A `limit` is on the largest
-error, as a fraction of the largest omega.
+verdicts as in `verdicts`. `lab` is a laboratory, which supplies scenes, runs and reference
+solutions, and `cases` are numbers of cases of Table 1. A `limit` is on the largest error of any
+omega component, as a fraction of the largest omega.
 """
 
 import math
@@ -29,8 +30,9 @@ Weights = Sequence[Callable[[Array], Any]]
 def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge the claim that the solutions of some cases are not known.
 
-    False if Jacobi's elliptic functions solve every case with an error, against the reference and
-    relative to the largest omega, of at most `limit`.
+    The verdict is "false" if Jacobi's elliptic functions solve all `cases` with an error of at most
+    `limit`. The error is the largest one against the reference solution of `lab`, relative to the
+    largest omega.
     """
     numbers = {}
     for case in cases:
@@ -45,7 +47,8 @@ def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Jud
 def by_sources(lab: Laboratory, holds: bool) -> Judged:
     """Return the verdict of the sources on a statement of history, which no run can test.
 
-    The verdict is reproduced if the statement `holds`, otherwise false.
+    The verdict is "reproduced" if the statement `holds` according to the sources, otherwise
+    "false". `lab` is not used.
     """
     return Judged(REPRODUCED if holds else FALSE, {})
 
@@ -53,8 +56,9 @@ def by_sources(lab: Laboratory, holds: bool) -> Judged:
 def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge the claim that Hamilton's equations of a rigid body are partial differential equations.
 
-    False if six ordinary differential equations in Euler angles and momenta solve the case with an
-    error, relative to the largest omega, of at most `limit`.
+    `cases` has one case. The verdict is "false" if six ordinary differential equations, in Euler
+    angles and their momenta, solve this case with an error of at most `limit`. The error is the
+    largest one against the reference solution of `lab`, relative to the largest omega.
     """
     from scipy.integrate import solve_ivp
 
@@ -62,7 +66,7 @@ def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged
     scene, truth = lab.scene(case), lab.truth(case)
     assert scene.moments is not None
     moments = scene.moments
-    # Any attitude serves that is not near the singular one; the angles are 3-1-3 (rad).
+    # 3-1-3 Euler angles (rad) of an initial attitude, which must not be near the singular one.
     begin = (0.3, 1.1, -0.4)
     momenta = _angle_rates_to_omega(begin).T @ (np.array(moments) * scene.omega)
     found = solve_ivp(
@@ -76,7 +80,10 @@ def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
 
 def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
-    """Return the matrix that maps the rates of the 3-1-3 angles (rad/s) to omega in body axes."""
+    """Return the matrix that maps the rates of the 3-1-3 angles (rad/s) to omega in body axes.
+
+    `angles` are the three angles (rad). The shape is (3, 3).
+    """
     _, theta, psi = angles
     return np.array(
         [
@@ -88,16 +95,21 @@ def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
 
 
 def _omega(moments: Triple, state: Array) -> Array:
-    """Return omega (rad/s) from the 3-1-3 angles and their conjugate momenta, which are `state`."""
+    """Return omega (rad/s) from the 3-1-3 angles (rad) and their conjugate momenta.
+
+    `state` has the three angles, then the three momenta. `moments` are the principal moments of the
+    body (kg m2).
+    """
     momentum = np.linalg.solve(_angle_rates_to_omega(state[:3]).T, np.asarray(state[3:]))
     rates: Array = momentum / np.array(moments)
     return rates
 
 
 def _hamilton(moments: Triple, state: Array) -> Array:
-    """Return dH/dp and -dH/dq, the rates of `state`: three 3-1-3 angles q and their momenta p.
+    """Return dH/dp and -dH/dq, the rates of `state`.
 
-    The Hamiltonian is H = sum I omega**2 / 2, with the principal `moments` I (kg m2).
+    `state` has the three 3-1-3 angles q (rad) and their conjugate momenta p. The Hamiltonian is H =
+    sum I omega**2 / 2, with the principal `moments` I (kg m2).
     """
     theta, psi = float(state[1]), float(state[2])
     omega = _omega(moments, state)
@@ -126,8 +138,9 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
     """Judge the claim that a bounded function satisfies a Lipschitz condition.
 
-    The quotients (f(y) - f(x)) / (y - x) are computed for the square root f, which is bounded on
-    (0, 1), with x from 1e-2 to 10**-decades and y = 2 x. False if a quotient exceeds `above`.
+    The function f is the square root, which is bounded on (0, 1). The quotients (f(y) - f(x)) / (y
+    - x) are computed for x from 1e-2 to 10**-decades and y = 2 x. The verdict is "false" if a
+    quotient exceeds `above`, otherwise "reproduced". `lab` is not used.
     """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
@@ -140,8 +153,9 @@ def local_error(
 ) -> Judged:
     """Judge the claim that the error of one step of a method falls with a power of the step size.
 
-    The power p, for which the error of one step of size h is O(h**p), is measured in each case.
-    Reproduced if every p differs from `power` by at most `within`, in part if some p does.
+    `method` is the name of the method. The power p, with which the error of one step of size h is
+    O(h**p), is measured in each of the `cases` in `lab`. The verdict is "reproduced" if every p
+    differs from `power` by at most `within`, and "reproduced in part" if some p does.
     """
     numbers = {}
     for case in cases:
@@ -155,8 +169,9 @@ def local_error(
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that Runge-Kutta and the Taylor series up to h**4 are the same method.
 
-    Reproduced if one step of size h has the same result with both, to 1e-14 of the largest omega.
-    In part if the difference is O(h**p), with a measured p that differs from 5 by at most `within`.
+    The verdict is "reproduced" if one step of size h has the same result with both, to 1e-14 of the
+    largest omega, in all `cases` of `lab`. It is "reproduced in part" if the difference is O(h**p)
+    with a measured p that differs from 5 by at most `within`.
     """
     numbers, same, near = {}, True, True
     for case in cases:
@@ -175,7 +190,10 @@ def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
 
 
 def _stepped(scene: Scene, method: str) -> Array:
-    """Return omega at the end of a scene, by a fixed-step method without a tolerance."""
+    """Return omega (rad/s) at the end of a scene, by a fixed-step method without a tolerance.
+
+    `method` is the name of the method.
+    """
     omega: Array = solve(scene, scene.times(), method).omega[-1]
     return omega
 
@@ -201,7 +219,7 @@ def _power(
 def _taylor_step(scene: Scene, order: int) -> Array:
     """Return omega after one step of its Taylor series up to h**order, where h is the step size.
 
-    The torque must be constant.
+    The torque of the scene must be constant. The shape is (3,), and the unit rad/s.
     """
     coefficients = np.array(scene.euler_coefficients)
     torque = np.array(scene.normalized_torque(0.0))
@@ -220,9 +238,10 @@ def _taylor_step(scene: Scene, order: int) -> Array:
 def crandall_example(lab: Laboratory, best: list[str]) -> Judged:
     """Judge the claim that in Crandall's example four weightings are better than the Taylor series.
 
-    The example is dx/dt = -x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2. In
-    part if the largest error of each weighting is below half the error of the series. Reproduced if
-    also the two weightings in `best` have the smallest errors.
+    The example is dx/dt = -x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2. The
+    verdict is at least "reproduced in part" if the largest error of each weighting is below half
+    the error of the series. It is "reproduced" if also the two weightings in `best` have the
+    smallest errors. `lab` is not used.
     """
     t, weight = np.polynomial.legendre.leggauss(12)
     t, weight = (t + 1.0) / 2.0, weight / 2.0
@@ -248,11 +267,11 @@ def crandall_example(lab: Laboratory, best: list[str]) -> Judged:
 
 
 def _weighted(t: Array, weight: Array, by: Weights) -> Array:
-    """Return the linear equations for c1 and c2, a row for each weight function in `by`.
+    """Return the linear equations for c1 and c2 of Crandall's example, a row for each weight.
 
-    A row has the weighted integrals over (0, 1) of the factors of c1 and c2 in the residual, and of
-    the right-hand side. `t` and `weight` are the nodes and weights of a quadrature on (0, 1), which
-    is applied to each half.
+    `by` has the weight functions. A row has three weighted integrals over (0, 1): of the factor of
+    c1 in the residual, of the factor of c2, and of the right-hand side. `t` and `weight` are the
+    nodes and weights of a quadrature on (0, 1), which is applied to each half of the interval.
     """
     halves = [(t / 2.0, weight / 2.0), ((t + 1.0) / 2.0, weight / 2.0)]
     rows = []
@@ -268,9 +287,11 @@ def _weighted(t: Array, weight: Array, by: Weights) -> Array:
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that the rates Q of eq. 32 tell whether a steady rotation is stable.
 
-    Each steady rotation is perturbed by 1e-8 of its size. Where Re Q is above 0, the perturbation
-    must grow at the rate Re Q, within the fraction `within`. Elsewhere it must stay within ten
-    times its initial size for ten periods. Reproduced if all do so, otherwise false.
+    By eq. 32 a small perturbation of a steady rotation changes as exp(Q t). Each steady rotation of
+    the `cases` in `lab` is perturbed by 1e-8 of its size. If Re Q (1/s) is above 0, the
+    perturbation must grow at the rate Re Q, within the fraction `within`. Otherwise it must stay
+    within ten times its initial size for ten periods. The verdict is "reproduced" if all
+    perturbations do so, otherwise "false".
     """
     numbers, told = {}, True
     for case in cases:
@@ -279,7 +300,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
             disturbance = 1e-8 * math.hypot(*each.omega) * np.array([0.6, 0.5, 0.4])
             start = tuple((each.omega + disturbance).tolist())
             rate = each.rates[0].real
-            # By then the decaying part has vanished, and the growing part is still small.
+            # In these times the decaying part vanishes, and the growing part is still small.
             times = np.linspace(0.1, 10.0, 100) * (each.period or 1.0)
             if rate:
                 times = np.array([8.0, 10.0]) / rate
@@ -300,8 +321,10 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
 def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge the claim that in some cases a trial solution of eq. 32 is the solution itself.
 
-    The trial solution is about the steady rotation about axis 3 with the initial omega3. Reproduced
-    if in some case its error against the reference, over the largest omega, is at most `limit`.
+    The trial solution is a steady rotation about axis 3, with the initial omega3, plus exponential
+    functions of time. The verdict is "reproduced" if its error is at most `limit` in at least one
+    of the `cases`. The error is the largest one against the reference solution of `lab`, relative
+    to the largest omega.
     """
     numbers = {}
     for case in cases:
@@ -319,8 +342,9 @@ def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged
 def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that one-term collocation is enough for a linear top, as in Case 1.
 
-    Reproduced if its error against the reference, over the largest omega, is at most `limit`,
-    otherwise false.
+    The verdict is "reproduced" if the error of one-term collocation is at most `limit`, otherwise
+    "false". The error is the largest one against the reference solution of `lab`, relative to the
+    largest omega.
     """
     found = run(lab.scene(case), Member("collocation", 1))
     truth = lab.truth(case)
@@ -332,7 +356,8 @@ def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
 def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
     """Judge the claim that the products vanish from Euler's equations of a symmetric body.
 
-    Reproduced if the coefficients of all products are 0 in all `cases`, in part if in some case.
+    The products are those of two omega components. The verdict is "reproduced" if their
+    coefficients are 0 in all `cases` of `lab`, and "reproduced in part" if they are 0 in some case.
     """
     left = {
         f"case {case}: largest coefficient": max(map(abs, lab.scene(case).euler_coefficients))
@@ -343,7 +368,11 @@ def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
 
 
 def step_on_cards(lab: Laboratory, step: float) -> Judged:
-    """Judge the claim that each of the three decks sets DT to `step` (s) before its loop."""
+    """Judge the claim that each of the three decks sets DT to `step` (s) before its loop.
+
+    The verdict is "reproduced" if each deck does so. DT is the step size on the cards. `lab` is not
+    used.
+    """
     numbers = {
         f"{program}: DT (s)": float(card.statement.partition("=")[2])
         for program in ("two-term", "four-term", "runge-kutta")
@@ -357,8 +386,9 @@ def step_on_cards(lab: Laboratory, step: float) -> Judged:
 def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
     """Judge the claim that the collocation points are inside the interval of the step.
 
-    The fraction of steps in which all points are inside is computed for both collocation programs.
-    Reproduced if it is 1, in part if it is at least 1/2 for both, otherwise false.
+    `cases` has one case. The fraction of steps in which all points are inside is computed for both
+    collocation programs in `lab`. The verdict is "reproduced" if it is 1 for both, "reproduced in
+    part" if it is at least 1/2 for both, otherwise "false".
     """
     (case,) = cases
     numbers, shares = {}, []
@@ -375,7 +405,8 @@ def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
 def possible_bodies(lab: Laboratory, cases: list[int]) -> Judged:
     """Judge the claim that every case is a possible rigid body.
 
-    Reproduced if in all `cases` no moment exceeds the sum of the other two, otherwise false.
+    The verdict is "reproduced" if in all `cases` of `lab` no moment of inertia exceeds the sum of
+    the other two, otherwise "false".
     """
     excess = {}
     for case in cases:

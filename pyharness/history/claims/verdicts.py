@@ -1,12 +1,14 @@
-"""Tests of the claims about one case; each test returns a verdict with its numbers.
+"""Tests of the thesis's claims about one case; each test returns a verdict with its numbers.
 
 Each function is the `test` of one or more claims in `data/claims.toml`. The `rule` of the claim
-describes what the function decides, and its `parameters` are the keyword arguments. `lab` runs the
-programs under the chosen assumptions, and `case` is the number of a case of Table 1. All numbers
-are computed. The tests over several cases are in `methods`.
+describes how the function decides, and the `parameters` of the claim are the keyword arguments.
+`lab` is a laboratory, which runs the programs under the chosen assumptions, and `case` is the
+number of a case of Table 1. All numbers of a verdict are computed by the test. The tests over
+several cases are in `methods`.
 
-Unless a docstring says otherwise, an error is the largest error of any component of omega over the
-steps that the program ran, and a claim that fails has the verdict "not reproduced".
+Unless a docstring says otherwise, an error is the largest error of any component of omega against
+the reference solution, over the steps that the program ran. A claim that fails has the verdict "not
+reproduced".
 """
 
 import math
@@ -32,7 +34,7 @@ UNDECIDED = "undecided"
 
 @dataclass(frozen=True)
 class Judged:
-    """The verdict on one claim, with the computed numbers that support it, by description."""
+    """The verdict on one claim, and the computed numbers that support it, by description."""
 
     verdict: str
     numbers: dict[str, float]
@@ -41,7 +43,7 @@ class Judged:
 def graded(
     numbers: dict[str, float], whole: bool, part: bool = False, otherwise: str = NOT_REPRODUCED
 ) -> Judged:
-    """Return the verdict: reproduced if `whole`, in part if `part`, else `otherwise`.
+    """Return the verdict "reproduced" if `whole`, "reproduced in part" if `part`, else `otherwise`.
 
     `numbers` are the computed numbers that support the verdict, by description.
     """
@@ -58,9 +60,10 @@ def judged(grade: rules.Grade, otherwise: str = NOT_REPRODUCED) -> Judged:
 
 
 def constant_solution(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the solution of a case is constant; the verdict may be false.
+    """Judge the claim that the solution of a case is constant.
 
-    Reproduced if every component of the reference omega varies by at most 1e-12 rad/s.
+    The verdict is "reproduced" if every omega component of the reference solution, which `lab`
+    computes, varies by at most 1e-12 rad/s; otherwise "false".
     """
     moved = float(ranges(lab.truth(case)).max())
     return graded({"change over the run (rad/s)": moved}, moved <= 1e-12, otherwise=FALSE)
@@ -69,8 +72,9 @@ def constant_solution(lab: Laboratory, case: int) -> Judged:
 def known_solution(lab: Laboratory, case: int) -> Judged:
     """Judge the claim that the solution of a case is (sin 5t, cos 5t, 10), as the thesis prints.
 
-    Reproduced if it differs from the reference solution by at most 1e-15 (1 + 5 t) rad/s in any
-    component, where t (s) is the end of the run; otherwise false.
+    The printed solution is compared with the reference solution, which `lab` computes. The verdict
+    is "reproduced" if no component differs by more than 1e-15 (1 + 5 t) rad/s, where t (s) is the
+    end of the run; otherwise it is "false".
     """
     truth = lab.truth(case)
     t = truth.time
@@ -82,9 +86,10 @@ def known_solution(lab: Laboratory, case: int) -> Judged:
 
 
 def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge the claim that omega3 varies: reproduced if its range exceeds `limit`, else false.
+    """Judge the claim that omega3 varies.
 
-    The range is of the reference solution over the run; the limit is in rad/s.
+    The verdict is "reproduced" if the range of omega3 over the run exceeds `limit` (rad/s),
+    otherwise "false". The range is of the reference solution, which `lab` computes.
     """
     return judged(rules.omega3_varies(lab, case, limit), FALSE)
 
@@ -92,8 +97,10 @@ def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that all three programs coincide with the known solution.
 
-    Reproduced if every error is below `limit` (rad/s), half a unit of the last printed digit. The
-    numbers also show how many steps the Runge-Kutta program runs from each start in `starts`.
+    The verdict is "reproduced" if the error of every program in `lab` is below `limit` (rad/s),
+    half a unit of the last printed digit. An error is the largest error of any omega component
+    against the reference solution. The numbers also show how many steps the Runge-Kutta program
+    runs from each initial omega in `starts`.
     """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
@@ -110,8 +117,9 @@ def _shown(start: Triple) -> str:
 def coincident(lab: Laboratory, case: int, share: float) -> Judged:
     """Judge the claim that collocation coincides with the known solution on the thesis's graph.
 
-    Reproduced if, for both programs, the error of every varying component is at most the fraction
-    `share` of the component's range.
+    The error of each component of omega that varies is divided by the component's range. The
+    verdict is "reproduced" if the largest ratio is at most `share` for both collocation programs in
+    `lab`.
     """
     numbers = {}
     for program in COLLOCATION:
@@ -124,7 +132,9 @@ def coincident(lab: Laboratory, case: int, share: float) -> Judged:
 def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
     """Judge the claim that the collocation errors, over the amplitude, are from `low` to `high`.
 
-    The amplitude is half the largest range of a component of the reference omega.
+    The verdict is "reproduced" if this is so for both collocation programs in `lab`. An error is
+    the largest error of any omega component against the reference solution. The amplitude is half
+    the largest range of a component of the reference omega.
     """
     amplitude = float(ranges(lab.truth(case)).max()) / 2.0
     numbers = {
@@ -137,8 +147,10 @@ def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
 def poor(lab: Laboratory, case: int, share: float) -> Judged:
     """Judge the claim that the Runge-Kutta results are poor.
 
-    Reproduced if their error exceeds the fraction `share` of the amplitude, which is half the
-    largest range of a component of the reference omega.
+    The verdict is "reproduced" if the error of the Runge-Kutta program in `lab` exceeds the
+    fraction `share` of the amplitude. An error is the largest error of any omega component against
+    the reference solution. The amplitude is half the largest range of a component of the reference
+    omega.
     """
     amplitude = float(ranges(lab.truth(case)).max()) / 2.0
     found = lab.error("runge-kutta", case) / amplitude
@@ -148,8 +160,9 @@ def poor(lab: Laboratory, case: int, share: float) -> Judged:
 def error_constant(lab: Laboratory, case: int) -> Judged:
     """Judge the claim that the error of collocation does not grow during the run.
 
-    Reproduced if, for both programs, the error in the last fifth of the steps is at most twice the
-    error in the first fifth.
+    The largest errors of omega in the last and in the first fifth of the steps are compared. The
+    verdict is "reproduced" if, for both collocation programs in `lab`, the error in the last fifth
+    is at most twice the error in the first fifth.
     """
     truth = lab.truth(case).omega
     numbers = {}
@@ -164,8 +177,9 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
     """Judge the claim that the stop test ended the Runge-Kutta run at step number `step`.
 
-    Reproduced if it did, in part if it ended the run at another step. The numbers also name the
-    subsets of the program's defects with which the stop test ends the run at `step`.
+    The verdict is "reproduced" if the test ended the run of `lab` at this step, and "reproduced in
+    part" if at another step. The numbers also name the subsets of the program's defects with which
+    the test ends the run at `step`.
     """
     stop = lab.run("runge-kutta", case).stop
     found = math.nan if stop is None else float(stop.step)
@@ -193,8 +207,9 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
 def growing(lab: Laboratory, case: int) -> Judged:
     """Judge the claim that omega1 of the Runge-Kutta program grows beyond the sine.
 
-    Reproduced if omega1 at the end of the run exceeds 1 rad/s, and exceeds omega1 of the reference
-    solution at that time by more than a thousandth.
+    Two conditions are tested on omega1 at the end of the run of `lab`. It must exceed 1 rad/s, and
+    it must exceed omega1 of the reference solution at that time by more than a thousandth. The
+    verdict is "reproduced" if both hold.
     """
     run = lab.run("runge-kutta", case)
     value, solution = float(run.omega[-1, 0]), float(lab.truth(case).omega[run.steps - 1, 0])
@@ -205,8 +220,9 @@ def growing(lab: Laboratory, case: int) -> Judged:
 def search(lab: Laboratory, case: int) -> Judged:
     """Return the Runge-Kutta error divided by the error of the corrected Runge-Kutta program.
 
-    Both errors are over the steps that the run of `lab` has. The claim is about a search for a
-    mistake, which no run can test; the verdict is therefore always "not testable".
+    Both errors are the largest of any omega component, over the steps that the run of `lab` has.
+    The claim is about a search for a mistake, which no run can test. The verdict is therefore
+    always "not testable".
     """
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
@@ -218,7 +234,8 @@ def search(lab: Laboratory, case: int) -> Judged:
 def concur(lab: Laboratory, case: int, share: float) -> Judged:
     """Judge the claim that the two collocation programs agree, by the rule `rules.concur`.
 
-    `share` is the largest difference that counts as agreement, as a fraction of the largest omega.
+    `lab` runs the programs. `share` is the largest difference that counts as agreement, as a
+    fraction of the largest omega.
     """
     return judged(rules.concur(lab, case, share))
 
@@ -226,7 +243,8 @@ def concur(lab: Laboratory, case: int, share: float) -> Judged:
 def fails(lab: Laboratory, case: int, share: float) -> Judged:
     """Judge the claim that the Runge-Kutta program fails, by the rule `rules.fails`.
 
-    `share` is the error that the program must exceed, as a fraction of a component's range.
+    `lab` runs the program. `share` is the error that the program must exceed, as a fraction of a
+    component's range.
     """
     return judged(rules.fails(lab, case, share))
 
@@ -234,8 +252,8 @@ def fails(lab: Laboratory, case: int, share: float) -> Judged:
 def differ(lab: Laboratory, case: int, share: float) -> Judged:
     """Judge the claim that the two-term and the four-term program differ.
 
-    Reproduced if their omegas differ by more than the fraction `share` of the largest omega of the
-    reference solution.
+    The verdict is "reproduced" if the omegas of the two runs of `lab` differ by more than the
+    fraction `share` of the largest reference omega.
     """
     two, four = (lab.run(program, case).omega for program in COLLOCATION)
     apart = distance(two, four) / largest(lab.truth(case))
@@ -245,23 +263,27 @@ def differ(lab: Laboratory, case: int, share: float) -> Judged:
 def more_reliable(lab: Laboratory, case: int) -> Judged:
     """Judge the claim that the four-term program is more accurate than the two-term program.
 
-    Reproduced if its error is at most 0.5 of the two-term error, in part if at most 0.8.
+    The errors are those of the runs of `lab`. The verdict is "reproduced" if the four-term error is
+    at most 0.5 of the two-term error, and "reproduced in part" if at most 0.8. An error is the
+    largest error of any omega component against the reference solution.
     """
     ratio = lab.error("four-term", case) / lab.error("two-term", case)
     return graded({"four-term error over two-term error": ratio}, ratio <= 0.5, ratio <= 0.8)
 
 
 def diverged(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the two-term run diverged, by the rule `rules.diverged`."""
+    """Judge the claim that the two-term run of `lab` diverged, by the rule `rules.diverged`."""
     return judged(rules.diverged(lab, case))
 
 
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
     """Judge the claim that the two-term error has its cause in a motion too fast for two terms.
 
-    The corrected programs run from each start in `starts`. Reproduced if the two-term error is
-    more than `worse` times the four-term error from every start, in part if it is more than `same`
-    times the four-term error from some start, otherwise false.
+    The corrected programs run from each initial omega in `starts`, otherwise under the assumptions
+    of `lab`. The verdict is "reproduced" if the two-term error is more than `worse` times the
+    four-term error from every start. It is "reproduced in part" if the two-term error is more than
+    `same` times the four-term error from some start, otherwise "false". An error is the largest
+    error of any omega component against the reference solution.
     """
     numbers = {}
     for start in starts():
@@ -275,8 +297,8 @@ def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
 def models_concur(lab: Laboratory, case: int, share: float, terms: Sequence[int]) -> Judged:
     """Judge the claim that collocation models agree, by the rule `rules.models_concur`.
 
-    `terms` are their numbers of terms, and `share` is the largest difference that counts as
-    agreement, as a fraction of the largest omega.
+    `lab` computes the models. `terms` are their numbers of terms, and `share` is the largest
+    difference that counts as agreement, as a fraction of the largest omega.
     """
     return judged(rules.models_concur(lab, case, share, terms))
 
@@ -284,6 +306,7 @@ def models_concur(lab: Laboratory, case: int, share: float, terms: Sequence[int]
 def dynamic(lab: Laboratory, case: int, factor: float) -> Judged:
     """Judge the claim that the motion of a case is the liveliest, by the rule `rules.dynamic`.
 
-    Its largest angular acceleration must be at least `factor` times that of every other case.
+    In the four-term runs of `lab`, its largest angular acceleration must be at least `factor` times
+    the largest angular acceleration in every other case.
     """
     return judged(rules.dynamic(lab, case, factor))

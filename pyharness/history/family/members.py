@@ -1,13 +1,16 @@
-"""The weighted residual family of III.1 and IV.2 of the thesis.
+"""The family of weighted residual methods in III.1 and IV.2 of the thesis.
 
-A member of the family has any weighting, number of terms and number of corrections.
+A member of the family is a method. It is defined by its weighting, its number of terms and its
+number of corrections, and collocation also by its points.
 
 One step of length h solves omega' = f(t, omega), equations 16-18, with a polynomial trial function
 omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant, with its value at the
-beginning of the step. Each correction evaluates f along the previous estimate, and chooses the c's
-so that the integrals of W (omega' - f) vanish (eq. 26). The thesis makes one correction.
+beginning of the step. Each correction evaluates f along the previous estimate. It then chooses the
+coefficients c1, ..., cn so that the integrals of W (omega' - f) vanish for n weight functions W
+(eq. 26). The thesis makes one correction.
 
-A correction has the same coefficients in every step: see `pyharness.theory.tableau`.
+The coefficients of a correction are the same in every step; `pyharness.theory.tableau` computes
+them.
 """
 
 import math
@@ -34,11 +37,12 @@ _WORST_CONDITION = 1e8
 class Member:
     """One method of the family; the constructor raises InputError if there is no such method.
 
-    `terms` is n, the number of powers of t in the trial function. `corrections` counts the
-    corrections of the first estimate. Least squares takes its weights with f held constant (eq. 25
-    with dR/dc_i = i t**(i-1)). `points` is for collocation only: the points where the residual
-    vanishes, as fractions of the step. They are k/(n+1) (`thesis`), the points of Gauss and
-    Legendre (`gauss`), or n different numbers from 0 to 1.
+    `weighting` is one of `WEIGHTINGS`. `terms` is n, the number of powers of t in the trial
+    function. `corrections` counts the corrections of the first estimate. Least squares takes its
+    weights with f held constant (eq. 25, where the residual R has the derivatives dR/dc_i = i
+    t**(i-1)). `points` is for collocation only: the points where the residual vanishes, as
+    fractions of the step. They are k/(n+1) (`thesis`), the points of Gauss and Legendre (`gauss`),
+    or n different numbers from 0 to 1.
     """
 
     weighting: str = "collocation"
@@ -94,7 +98,7 @@ class Member:
 def converged_order(member: Member) -> int:
     """Return the order of a member's global error in the limit of many corrections.
 
-    docs/explanation/family.md derives these orders.
+    A member is a weighted residual method. docs/explanation/family.md derives these orders.
     """
     n = member.terms
     if member.weighting == "galerkin":
@@ -112,7 +116,7 @@ def converged_order(member: Member) -> int:
 
 
 def predicted_order(member: Member) -> int:
-    """Return the order of a member: for general motions its global error is O(h**order).
+    """Return the order p of a member: for general motions its global error is O(h**p).
 
     Here h is the step size. The first estimate has order 1. Each correction raises the order by
     one, up to the converged order.
@@ -124,9 +128,9 @@ def run(scene: Scene, member: Member) -> Trajectory:
     """Integrate a scene with one member (Jacobs 1982, III.1, eq. 20-27, and IV.2).
 
     Return the trajectory of omega, without translational velocity. The first estimate evaluates the
-    torque at the beginning of the step, and the corrections evaluate it at the times of the nodes.
-    The global error is O(h**p), with the step size h and p from `predicted_order`. The rounding
-    error is about one unit in the last place per step.
+    torque at the beginning of the step. The corrections evaluate it at the nodes, the times within
+    the step where they need the right-hand side. The global error is O(h**p), with the step size h
+    and p from `predicted_order`. The rounding error is about one unit in the last place per step.
     """
     omega = march(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
@@ -147,10 +151,10 @@ def run(scene: Scene, member: Member) -> Trajectory:
 def march(scene: Scene, members: Sequence[Member]) -> Array:
     """Integrate a scene with several members of the family at once.
 
-    Return omega (rad/s), shape (members, steps, 3). It is not finite from an overflow on. The cost
-    is hardly higher than for one member.
+    Return omega (rad/s) in the order of `members`, shape (members, steps, 3). It is not finite from
+    an overflow on. The run time is hardly longer than for one member.
     """
-    # Most corrections first: the members that still need one are then contiguous in memory.
+    # Most corrections first: members that still need a correction are then contiguous in memory.
     order = sorted(range(len(members)), key=lambda i: -members[i].corrections)
     members = [members[i] for i in order]
     schemes = [tableau(m.weighting, m.terms, m.points) for m in members]
@@ -191,10 +195,10 @@ def march(scene: Scene, members: Sequence[Member]) -> Array:
 
 
 def _stages(matrix: Array, rates: Array) -> Array:
-    """Return the product of `_sums` in a third of the time.
+    """Return the same matrix products as `_sums`, computed in a third of its time.
 
-    The last axis of `matrix`, shape (i, j, members), is the member. `rates` has the shape (members,
-    j, 3).
+    `matrix`, shape (i, j, members), has the matrix of a member at each index of its last axis.
+    `rates` has the shape (members, j, 3), and the result the shape (members, i, 3).
     """
     side_by_side = np.ascontiguousarray(rates.transpose(1, 2, 0))
     total: Array = matrix[:, 0, None] * side_by_side[0]
@@ -209,25 +213,25 @@ def _stages(matrix: Array, rates: Array) -> Array:
 def _sums(factors: Array, rates: Array) -> Array:
     """Return for every member the matrix product of factors and rates, shape (members, i, 3).
 
-    The terms are summed in order, and not by a BLAS. The factors have the shape (members, i, j),
-    and the rates (members, j, 3).
+    The terms are summed in order by NumPy, so that the result does not depend on a BLAS library.
+    The factors have the shape (members, i, j), and the rates (members, j, 3).
     """
     total: Array = np.einsum("mij,mjk->mik", factors, rates)
     return total
 
 
 def _rates(scene: Scene, torque: Array, omega: Array) -> Array:
-    rates = np.empty(omega.shape)  # C order, because the memory layout decides how matmul rounds
+    rates = np.empty(omega.shape)  # C order, because the layout can change how NumPy rounds sums
     for i, (a, j, k) in enumerate(zip(scene.euler_coefficients, (1, 0, 0), (2, 2, 1), strict=True)):
         rates[..., i] = torque[..., i] + a * omega[..., j] * omega[..., k]
     return rates
 
 
 def _torque(scene: Scene, times: Array) -> Array:
-    """Return the torque divided by the moments (rad/s2) at `times`, which have any shape.
+    """Return the torque divided by the moments (rad/s2) at `times` (s), an array of any shape.
 
-    The shape is (..., 3), or (3,) if the torque is constant. A body without moments has its torque
-    in this form.
+    The shape of the result is (..., 3), where ... is the shape of `times`, or (3,) if the torque is
+    constant. The torque of a body without moments is given in rad/s2 already.
     """
     law = scene.body_torque
     torque = np.array(law.constant)

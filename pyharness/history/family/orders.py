@@ -1,4 +1,4 @@
-"""The errors of the family's members, and their measured and derived orders of convergence."""
+"""The errors of weighted residual methods, and their measured and derived orders of convergence."""
 
 import math
 from collections.abc import Sequence
@@ -20,13 +20,16 @@ SCHEMES: tuple[tuple[str, str | None], ...] = (
     ("galerkin", None),
     ("least-squares", None),
 )
-# Numbers of steps over the horizon; every other entry halves the step. The first horizon is short,
-# so that the leading term of the error dominates early. Longer ones follow for members whose error
-# is lost in rounding there. The last ones are shorter than the first, for long scenes.
+# `_LADDER` has the numbers of steps from 0 to the horizon; each is twice the number two places
+# before it. A horizon is a fraction of the scene's end time. The first horizon is short, so that
+# the leading term of the error dominates at large steps already. Longer horizons follow for members
+# whose error over the first horizon is mostly rounding error. The last three are shorter than the
+# first, for long scenes.
 _LADDER = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192)
 _HORIZONS = (1 / 4, 1 / 2, 1, 1 / 16, 1 / 64, 1 / 256)
-# A slope counts if both its errors, relative to the largest omega at the horizon, are in this
-# range. Above it, the error is not small. Below it, rounding error (at most 1e-15 here) matters.
+# A measured order counts if both errors from which it is computed are in this range; they are
+# relative to the largest omega at the horizon. Above the range, higher terms of the error matter.
+# Below it, rounding error (at most 1e-15 here) matters.
 _LARGEST, _SMALLEST = 1e-2, 5e-14
 _SLOPES_WANTED = 4
 _SETTLED = 0.1
@@ -38,10 +41,11 @@ MOST_STEPS = 2_000
 class OrderFinding:
     """The order of one member in one scene, derived and measured, and the error of the member.
 
-    docs/explanation/family.md derives the order `predicted`. `measured` is None if the error is
-    rounding error alone, or never gets small. `settled` is true if the last two measured values of
-    the order differ by at most a tenth. `error` is the largest error of any omega component over
-    the scene's own steps (rad/s), infinite after an overflow.
+    A member is a weighted residual method. docs/explanation/family.md derives the order
+    `predicted`. `measured` is None if the error is rounding error alone, or is never small enough.
+    `settled` is true if the last two measured values of the order differ by at most a tenth.
+    `error` is the largest error of any omega component over the scene's own steps (rad/s), infinite
+    after an overflow.
     """
 
     member: Member
@@ -59,7 +63,8 @@ class OrderFinding:
     def misses(self) -> bool:
         """Return whether the measured order settled below the derived order by more than `SLACK`.
 
-        A measured order above the derived order is no miss, because it occurs in special scenes.
+        A measured order above the derived order is no miss, because in special scenes the error
+        term that limits the order is small.
         """
         return self.settled and self.deviation < -SLACK
 
@@ -67,9 +72,9 @@ class OrderFinding:
 def family_members(
     terms: Sequence[int] = range(1, 6), corrections: Sequence[int] = range(1, 9)
 ) -> list[Member]:
-    """Return a member for every number of `terms` and of `corrections` in every scheme.
+    """Return a member for every combination of scheme, number of terms and number of corrections.
 
-    A scheme, in `SCHEMES`, is a weighting with its collocation points.
+    A scheme, in `SCHEMES`, is a weighting with its choice of collocation points.
     """
     return [Member(w, n, p, k) for w, p in SCHEMES for n in terms for k in corrections]
 
@@ -82,7 +87,8 @@ def order_table(
     """Measure the orders and errors of many members at once, by default of `family_members()`.
 
     Return an `OrderFinding` for each member. `progress` is called before each phase of the work.
-    Raise InputError if the solution itself becomes unbounded, or if the scene has too many steps.
+    Raise InputError if the reference solution grows without bound, or if the scene has more than
+    `MOST_STEPS` steps.
     """
     if scene.steps > MOST_STEPS:
         raise InputError(f"steps is {scene.steps}; allowed for orders: 1 to {MOST_STEPS}")
@@ -126,8 +132,8 @@ def order_table(
 def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array) -> Array:
     """Return the members' errors at the time `horizon` (s) for ever smaller step sizes.
 
-    The shape is (step sizes, members). An error is the norm of the difference from `end`, the true
-    omega at the horizon (rad/s), divided by the largest component of `end`.
+    The shape is (step sizes, members). An error is the norm of the difference from `end`, the
+    reference omega at the horizon (rad/s), divided by the largest component of `end`.
     """
     scale = float(np.abs(end).max()) or 1.0
     rungs = []
@@ -141,10 +147,11 @@ def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array)
 
 
 def _slopes(errors: Array) -> list[float]:
-    """Return the order that each halving of the step size shows, where both errors are in range.
+    """Return the order that each halving of the step size shows.
 
     `errors` are those of one member from `_ladder`. Each error belongs to half the step size of the
-    error two places before it.
+    error two places before it. An order is returned only if both errors are in the range from
+    `_SMALLEST` to `_LARGEST`.
     """
     return [
         math.log2(coarse / fine)

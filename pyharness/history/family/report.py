@@ -1,4 +1,4 @@
-"""The report of `family`: the orders and errors of the weighted residual methods, its members."""
+"""The report of the verb `family`: the orders and errors of the weighted residual methods."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -12,10 +12,10 @@ from pyharness.model.scene_report import heading
 
 
 def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
-    """Return the report of the members' orders and errors in a scene.
+    """Return the report of the orders and errors of weighted residual methods in a scene.
 
-    The tables have a row for each weighting, choice of collocation points and number of terms n,
-    and a column for each number of corrections k.
+    `found` has the result for each method. The tables have a row for each weighting, choice of
+    collocation points and number of terms n, and a column for each number of corrections k.
     """
     names = ("predicted", "measured", "settled", "error")
     measures = [{name: getattr(each, name) for name in names} for each in found]
@@ -41,9 +41,10 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
 
 
 def verdict(found: Sequence[OrderFinding]) -> list[str]:
-    """Return sentences that compare the members' measured orders with the derived orders.
+    """Return sentences that compare the methods' measured orders with the derived orders.
 
-    There is one sentence if no member misses its derived order, else one for each that does.
+    There is one sentence if no measured order misses the derived order, else one for each that
+    does.
     """
     unexpected = _unexpected(found)
     if unexpected:

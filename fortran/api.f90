@@ -7,7 +7,7 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
                        ier_rows, n_rows, status, evaluations, stop_variable, stop_quotient)
   ! Run one of the three programs of the appendix on one scene; units as in deck_t of deck.fypp.
   !f2py threadsafe
-  use deck_binary64, only: deck_t, stop_t
+  use deck_binary64, only: deck_t, outcome_t
   use listing_flags, only: listing_from_bits
   use programs_binary64, only: run
   implicit none
@@ -40,15 +40,17 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
   integer(4), intent(out) :: stop_variable        ! 0 none, 1-3 U, 4-6 V, 7 norm of U, 8 of U and V
   real(8), intent(out) :: stop_quotient           ! change of K over change of U, 1/s
   type(deck_t) :: scene
-  type(stop_t) :: stop_at
+  type(outcome_t) :: found
 
   scene = deck_t(by_moments /= 0, body, omega, masses, forces, torque_constant, torque_rate, &
                  torque_first, torque_varies /= 0, sines, cosines, step_size, n_steps, lipschitz, &
                  may_stop /= 0, with_velocity /= 0)
-  call run(program, scene, listing_from_bits(flags), rows, ier_rows, n_rows, status, evaluations, &
-           stop_at)
-  stop_variable = stop_at%variable
-  stop_quotient = stop_at%quotient
+  call run(program, scene, listing_from_bits(flags), rows, ier_rows, found)
+  n_rows = found%n_rows
+  status = found%status
+  evaluations = found%evaluations
+  stop_variable = found%stop_at%variable
+  stop_quotient = found%stop_at%quotient
 end subroutine run_program
 
 subroutine solve_linear(n, m, a, b, factors, x, ier)
@@ -75,7 +77,7 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   ! one sign and are ordered away from 0.
   !f2py threadsafe
   use levels, only: taylor_solve
-  use problem, only: problem_t
+  use problem, only: problem_t, request_t, solution_t
   implicit none
   real(8), intent(in) :: coefficients(3)        ! A, B, C
   real(8), intent(in) :: m_constant(3)          ! torque over moment, 1/s2
@@ -86,7 +88,7 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   real(8), intent(in), target :: cosines(4, n_cosines)  ! as sines
   real(8), intent(in) :: omega0(3)              ! rad/s
   integer(4), intent(in) :: n_times
-  real(8), intent(in) :: times(n_times)         ! s
+  real(8), intent(in), target :: times(n_times)         ! s
   real(8), intent(in) :: tolerance              ! allowed error over the largest |omega|
   !f2py real(8), optional, intent(inout) :: effort(5) = 1.0
   real(8), intent(inout) :: effort(5) ! (1) factor on the work limit; out: (2) factor required,
@@ -94,17 +96,23 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   !f2py integer(4), optional, intent(in) :: n_attitudes = 0
   integer(4), intent(in) :: n_attitudes         ! n_times, or 0 without attitude
   !f2py real(8), optional, intent(inout) :: attitudes = 0.0
-  real(8), intent(inout) :: attitudes(4, n_attitudes + 1) ! column 1: the attitude at time 0
-  real(8), intent(out) :: rows(3, n_times)      ! rad/s; n_rows columns are set
+  real(8), intent(inout), target :: attitudes(4, n_attitudes + 1) ! column 1: the attitude at time 0
+  real(8), intent(out), target :: rows(3, n_times)      ! rad/s; n_rows columns are set
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 work limit, 6 sensitive
   integer(8), intent(out) :: steps
   ! steps: number of steps of the last integration
+  type(solution_t) :: solution
 
+  solution%rows => rows
+  if (n_attitudes > 0) solution%attitudes(1:4, 0:n_attitudes) => attitudes
   call taylor_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
                               cosines), &
-                    omega0, tolerance, effort(1), n_times, times, rows, &
-                    n_attitudes, attitudes, n_rows, status, steps, effort(2), effort(3:5))
+                    request_t(omega0, tolerance, effort(1), times), solution)
+  n_rows = solution%n_rows
+  status = solution%status
+  steps = solution%steps
+  effort(2:) = [solution%needed, solution%error, solution%growth, solution%spent]
 end subroutine taylor_rows
 
 subroutine space_torque_rows(coefficients, ratios, m_constant, m_rate, n_sines, sines, n_cosines, &
@@ -113,7 +121,7 @@ subroutine space_torque_rows(coefficients, ratios, m_constant, m_rate, n_sines, 
   ! Integrate by Taylor series under a torque about the axes of space: omega and attitude at
   ! `times`, which have one sign and are ordered away from 0.
   !f2py threadsafe
-  use problem, only: problem_t
+  use problem, only: problem_t, request_t, solution_t
   use space_torque, only: space_torque_solve
   implicit none
   real(8), intent(in) :: coefficients(3)        ! A, B, C
@@ -126,23 +134,29 @@ subroutine space_torque_rows(coefficients, ratios, m_constant, m_rate, n_sines, 
   real(8), intent(in), target :: cosines(4, n_cosines)  ! as sines
   real(8), intent(in) :: omega0(3)              ! rad/s
   integer(4), intent(in) :: n_times
-  real(8), intent(in) :: times(n_times)         ! s
+  real(8), intent(in), target :: times(n_times)         ! s
   real(8), intent(in) :: tolerance              ! allowed error: relative, and of the angle in rad
   !f2py integer(4), intent(in), check(n_attitudes == n_times) :: n_attitudes
   integer(4), intent(in) :: n_attitudes         ! n_times
-  real(8), intent(inout) :: attitudes(4, n_attitudes + 1) ! column 1: the attitude at time 0
+  real(8), intent(inout), target :: attitudes(4, n_attitudes + 1) ! column 1: the attitude at time 0
   !f2py real(8), optional, intent(inout) :: effort(5) = 1.0
   real(8), intent(inout) :: effort(5) ! (1) factor on the work limit; out: (2) factor required,
   ! (3) estimated error, (4) error amplification, (5) steps of all integrations
-  real(8), intent(out) :: rows(3, n_times)      ! rad/s; n_rows columns are set
+  real(8), intent(out), target :: rows(3, n_times)      ! rad/s; n_rows columns are set
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 work limit, 6 sensitive
   integer(8), intent(out) :: steps
+  type(solution_t) :: solution
 
+  solution%rows => rows
+  solution%attitudes(1:4, 0:n_times) => attitudes
   call space_torque_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
                                     cosines), &
-                          ratios, omega0, tolerance, effort(1), n_times, times, rows, attitudes, &
-                          n_rows, status, steps, effort(2), effort(3:5))
+                          ratios, request_t(omega0, tolerance, effort(1), times), solution)
+  n_rows = solution%n_rows
+  status = solution%status
+  steps = solution%steps
+  effort(2:) = [solution%needed, solution%error, solution%growth, solution%spent]
 end subroutine space_torque_rows
 
 subroutine choose_instructions(highest, taken)
@@ -194,9 +208,12 @@ subroutine torque_free_attitude_solution(moments, moments_low, omega0, attitude0
   real(8), intent(out) :: attitudes(4, n_times)
   integer(4), intent(out) :: n_rows       ! number of rows that hold a result
   integer(4), intent(out) :: status       ! 0 complete, 2 overflow, 3 refused, 4 phase has no digit
+  real(8) :: both(3, 2)
 
-  call torque_free_attitude_rows(moments, moments_low, omega0, attitude0, n_times, times, rows, &
-                                 attitudes, n_rows, status)
+  both(:, 1) = moments
+  both(:, 2) = moments_low
+  call torque_free_attitude_rows(both, [omega0, attitude0], n_times, times, rows, attitudes, &
+                                 n_rows, status)
 end subroutine torque_free_attitude_solution
 
 subroutine torque_free_growth(coefficients, omega0, t_end, growth)
@@ -217,7 +234,7 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
                            n_times, times, effort, rows, n_rows, status)
   ! Evaluate the closed form of a sphere under the torque law of a scene.
   !f2py threadsafe
-  use problem, only: problem_t
+  use problem, only: problem_t, request_t, solution_t
   use sphere, only: sphere_rows
   implicit none
   real(8), intent(in) :: m_constant(3)        ! torque over moment, 1/s2; its rate below, 1/s3
@@ -228,16 +245,21 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
   real(8), intent(in), target :: cosines(4, n_cosines)
   real(8), intent(in) :: omega0(3)
   integer(4), intent(in) :: n_times
-  real(8), intent(in) :: times(n_times)
+  real(8), intent(in), target :: times(n_times)
   !f2py real(8), optional, intent(inout) :: effort(2) = 1.0
   real(8), intent(inout) :: effort(2)
   ! effort: (1) factor on the work limit; out: (2) factor required
-  real(8), intent(out) :: rows(3, n_times)
+  real(8), intent(out), target :: rows(3, n_times)
   integer(4), intent(out) :: n_rows, status
+  type(solution_t) :: solution
 
+  solution%rows => rows
   call sphere_rows(problem_t([0.0d0, 0.0d0, 0.0d0], m_constant, m_rate, n_sines, n_cosines, &
                              sines, cosines), &
-                   omega0, effort(1), n_times, times, rows, n_rows, status, effort(2))
+                   request_t(omega0, 0.0d0, effort(1), times), solution)
+  n_rows = solution%n_rows
+  status = solution%status
+  effort(2) = solution%needed
 end subroutine sphere_solution
 
 subroutine torque_noise_ratio(m_constant, m_rate, n_sines, sines, n_cosines, cosines, t_end, &
@@ -269,7 +291,7 @@ subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_co
   ! Integrate by Gauss collocation, with equal steps from each output time to the next.
   !f2py threadsafe
   use gauss_collocation, only: gauss_rows
-  use problem, only: problem_t
+  use problem, only: problem_t, request_t, solution_t
   implicit none
   real(8), intent(in) :: coefficients(3), m_constant(3), m_rate(3)
   integer(4), intent(in) :: n_sines
@@ -278,20 +300,24 @@ subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_co
   real(8), intent(in), target :: cosines(4, n_cosines)
   real(8), intent(in) :: omega0(3)
   integer(4), intent(in) :: n_times
-  real(8), intent(in) :: times(n_times)     ! s, ordered away from 0
+  real(8), intent(in), target :: times(n_times)     ! s, ordered away from 0
   integer(4), intent(in) :: stages          ! 1 to 8
   real(8), intent(in) :: step               ! largest step, s, above 0
   !f2py real(8), optional, intent(in) :: effort = 1.0
   real(8), intent(in) :: effort
-  real(8), intent(out) :: rows(3, n_times)
+  real(8), intent(out), target :: rows(3, n_times)
   real(8), intent(out) :: reached(4)        ! time and omega after the last successful step
   integer(4), intent(out) :: n_rows, status
   integer(8), intent(out) :: evaluations
+  type(solution_t) :: solution
 
+  solution%rows => rows
   call gauss_rows(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
                             cosines), &
-                  omega0, n_times, times, stages, step, effort, rows, reached, n_rows, status, &
-                  evaluations)
+                  request_t(omega0, 0.0d0, effort, times), stages, step, solution, reached)
+  n_rows = solution%n_rows
+  status = solution%status
+  evaluations = solution%evaluations
 end subroutine gauss_solution
 
 subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
@@ -301,7 +327,7 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
   ! step before an output time is shorter.
   !f2py threadsafe
   use fixed_step, only: fixed_step_rows
-  use problem, only: problem_t
+  use problem, only: problem_t, request_t, solution_t
   implicit none
   real(8), intent(in) :: coefficients(3), m_constant(3), m_rate(3)
   integer(4), intent(in) :: n_sines
@@ -310,19 +336,25 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
   real(8), intent(in), target :: cosines(4, n_cosines)
   real(8), intent(in) :: omega0(3)
   integer(4), intent(in) :: n_times
-  real(8), intent(in) :: times(n_times)
+  real(8), intent(in), target :: times(n_times)
   integer(4), intent(in) :: method          ! code of the module methods
   real(8), intent(in) :: step               ! s, above 0
   !f2py real(8), optional, intent(inout) :: effort(2) = 1.0
   real(8), intent(inout) :: effort(2)
-  real(8), intent(out) :: rows(3, n_times)
+  real(8), intent(out), target :: rows(3, n_times)
   integer(4), intent(out) :: n_rows, status
   integer(8), intent(out) :: steps, evaluations
+  type(solution_t) :: solution
 
+  solution%rows => rows
   call fixed_step_rows(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
                                  cosines), &
-                       omega0, n_times, times, method, step, effort(1), rows, n_rows, status, &
-                       steps, evaluations, effort(2))
+                       request_t(omega0, 0.0d0, effort(1), times), method, step, solution)
+  n_rows = solution%n_rows
+  status = solution%status
+  steps = solution%steps
+  evaluations = solution%evaluations
+  effort(2) = solution%needed
 end subroutine fixed_step_solution
 
 subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps, found)

@@ -106,6 +106,7 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   bodies%by_moments = by_moments /= 0
   bodies%tolerance = tolerance
   bodies%step = step
+  bodies%effort = effort
   bodies%n = n
   bodies%body => body
   bodies%constant => constant
@@ -115,7 +116,7 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   bodies%omega0 => omega0
   bodies%times => times
   call watch(c_loc(given_up))
-  call solve_bodies(bodies, code, effort, packed, attitude0, omega, attitude, status, raised)
+  call solve_bodies(bodies, code, packed, attitude0, omega, attitude, status, raised)
   call watch(c_null_ptr)
 end subroutine solve_ensemble
 
@@ -140,6 +141,6 @@ subroutine solve_packed_many(packed, n_packed, n, omega0, n_times, times, given_
   integer(4), intent(out) :: raised
 
   call watch(c_loc(given_up))
-  call solve_packed_bodies(packed, n_packed, n, omega0, n_times, times, omega, status, raised)
+  call solve_packed_bodies(packed, n_packed, n, omega0, times, omega, status, raised)
   call watch(c_null_ptr)
 end subroutine solve_packed_many

@@ -25,6 +25,7 @@ module bodies
     logical :: by_moments       !! body in kg m2, torque in N m; else A, B, C and 1/s2
     real(dp) :: tolerance       !! relative
     real(dp) :: step            !! s, of the methods with a fixed step
+    real(dp) :: effort          !! factor on the work limit of each body
     integer :: n                !! number of bodies
     real(dp), pointer, contiguous :: body(:, :)         !! (3, 1 or n)
     real(dp), pointer, contiguous :: constant(:, :)     !! (3, 1 or n)

@@ -75,11 +75,13 @@ contains
       end if
       if (e%listing%do_variable) call drop_third_stage(s%K_v(:, :, 3), s%third_v)
       call move(b, s%third, s%third_v, b%V, b%DT, s%K_v(:, :, 4), s%second_v)     ! 1150-1170
-      call close_step(e, b%DT, s%K_v, s%first_v, s%third_v, b%V, s%V, s%change_u(:, 4:6), &
+      call close_step(e, b%DT, s%K_v, s%third_v, b%V, s%V, s%change_u(:, 4:6), &
                       s%change_k(:, 4:6))                                         ! 1210-1230
+      call begin_next(e, s%first_v, b%V, s%V)
     end if
-    call close_step(e, b%DT, s%K, s%first, s%third, b%U, s%U, s%change_u(:, 1:3), &
+    call close_step(e, b%DT, s%K, s%third, b%U, s%U, s%change_u(:, 1:3), &
                     s%change_k(:, 1:3))                                           ! 1180-1200
+    call begin_next(e, s%first, b%U, s%U)
   end subroutine step_runge_kutta
 
   pure subroutine drop_third_stage(K, third)
@@ -155,14 +157,13 @@ contains
     end do
   end subroutine turn_last
 
-  pure subroutine close_step(e, DT, K, first, third, U, next, change_u, change_k)
-    !! Compute the result (eq. 31), the start of the next step, and the changes that the Lipschitz
-    !! test (eq. 19) compares.
+  pure subroutine close_step(e, DT, K, third, U, before, change_u, change_k)
+    !! Compute the result (eq. 31) and the changes that the Lipschitz test (eq. 19) compares.
     type(ensemble_t), intent(in) :: e
     real(dp), intent(in) :: DT(LANE_COUNT), K(LANE_COUNT, 3, 4)
-    real(dp), dimension(LANE_COUNT, 3), intent(in) :: first, third
+    real(dp), dimension(LANE_COUNT, 3), intent(in) :: third
     real(dp), dimension(LANE_COUNT, 3), intent(inout) :: U     !! UU of the cards, then U(4)
-    real(dp), dimension(LANE_COUNT, 3), intent(inout) :: next  !! U(1) of this step, then the next
+    real(dp), dimension(LANE_COUNT, 3), intent(in) :: before   !! U(1) of this step
     real(dp), dimension(LANE_COUNT, 3), intent(out) :: change_u, change_k
     real(dp) :: new
     integer :: axis
@@ -180,10 +181,20 @@ contains
     if (.not. e%listing%lipschitz_mismatched_pairs) then
       do axis = 1, 3
         do i = 1, LANE_COUNT
-          change_u(i, axis) = abs(third(i, axis) - next(i, axis))                 ! 1270-1320
+          change_u(i, axis) = abs(third(i, axis) - before(i, axis))               ! 1270-1320
         end do
       end do
     end if
+  end subroutine close_step
+
+  pure subroutine begin_next(e, first, U, next)
+    !! Set the start of the next step.
+    type(ensemble_t), intent(in) :: e
+    real(dp), dimension(LANE_COUNT, 3), intent(in) :: first, U
+    real(dp), dimension(LANE_COUNT, 3), intent(inout) :: next  !! U(1) of this step, then the next
+    integer :: axis
+    integer :: i
+
     if (e%listing%base_not_restored) then
       do axis = 1, 3
         do i = 1, LANE_COUNT
@@ -197,7 +208,7 @@ contains
         end do
       end do
     end if
-  end subroutine close_step
+  end subroutine begin_next
 
   pure subroutine test(e, b, s, verdict, found)
     !! Find the lanes that exceed the Lipschitz constant; lipschitz_test finds the variable.

@@ -18,13 +18,12 @@ module many_bodies
 
 contains
 
-  subroutine solve_packed_bodies(packed, n_packed, n, omega0, n_times, times, omega, status, &
-                                 raised)
+  subroutine solve_packed_bodies(packed, n_packed, n, omega0, times, omega, status, raised)
     !! Solve many initial omegas of one prepared scene.
-    integer, intent(in) :: n_packed, n, n_times
+    integer, intent(in) :: n_packed, n
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in), target :: omega0(3, n)
-    real(dp), intent(in), target :: times(n_times)
+    real(dp), intent(in), target, contiguous :: times(:)
     real(dp), intent(inout) :: omega(3, n)
     integer(i1), intent(inout) :: status(n)
     integer, intent(out) :: raised
@@ -42,6 +41,7 @@ contains
     bodies%by_moments = .false.
     bodies%tolerance = packed(TOLERANCE)
     bodies%step = packed(STEP)
+    bodies%effort = packed(EFFORT)
     bodies%n = n
     bodies%body(1:3, 1:1) => packed(COEFFICIENTS:COEFFICIENTS + 2)
     bodies%constant(1:3, 1:1) => packed(CONSTANT:CONSTANT + 2)
@@ -51,15 +51,13 @@ contains
     bodies%cosines(1:4, 1:int(packed(N_COSINES)), 1:1) => packed(middle:n_packed - 1)
     bodies%omega0 => omega0
     bodies%times => times
-    call solve_bodies(bodies, code, packed(EFFORT), own, no_attitude, omega, no_attitude, status, &
-                      raised)
+    call solve_bodies(bodies, code, own, no_attitude, omega, no_attitude, status, raised)
   end subroutine solve_packed_bodies
 
-  subroutine solve_bodies(bodies, code, effort_, packed, attitude0, omega, attitude, status, raised)
+  subroutine solve_bodies(bodies, code, packed, attitude0, omega, attitude, status, raised)
     !! Compute omega of each body at its time, and its attitude if attitude0 is specified.
     type(bodies_t), intent(in), target :: bodies
     integer, intent(in) :: code                !! code of the module methods
-    real(dp), intent(in) :: effort_            !! factor on the work limit of each body
     real(dp), intent(in) :: packed(0:)         !! scene of all bodies, as in prepared.f90; or none
     real(dp), intent(in) :: attitude0(:, :)    !! (4, 0, 1 or n)
     real(dp), intent(inout) :: omega(3, bodies%n) !! rad/s; NaN unless the status is 0 or 6
@@ -83,10 +81,9 @@ contains
     if (raised /= 0 .or. .not. any(status == NEEDS_FALLBACK)) then
       continue
     else if (size(attitude0) > 0) then
-      call solve_left_with_attitude(bodies, code, effort_, attitude0, omega, attitude, status, &
-                                    raised)
+      call solve_left_with_attitude(bodies, code, attitude0, omega, attitude, status, raised)
     else
-      call solve_left(bodies, code, effort_, packed, omega, status, raised)
+      call solve_left(bodies, code, packed, omega, status, raised)
     end if
   end subroutine solve_bodies
 

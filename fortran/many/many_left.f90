@@ -27,11 +27,10 @@ module many_left
 
 contains
 
-  subroutine solve_left(bodies, code, effort_, packed, omega, status, raised)
+  subroutine solve_left(bodies, code, packed, omega, status, raised)
     !! Solve the bodies that are left, one by one.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: code
-    real(dp), intent(in) :: effort_
     real(dp), intent(in) :: packed(0:)
     real(dp), intent(inout) :: omega(3, bodies%n)
     integer(i1), intent(inout) :: status(bodies%n)
@@ -50,7 +49,7 @@ contains
                             steps, found)
         call tell_sensitive(packed, size(packed), bodies%omega0(:, i), time, steps, ended)
       else
-        call pack(bodies, i, code, .false., effort_, own, n_own)
+        call pack(bodies, i, code, .false., own, n_own)
         if (.not. is_body(bodies, i, own(:n_own - 1))) then
           status(i) = int(REFUSED, i1)
           omega(:, i) = transfer(huge(0_int64), 1.0_dp)
@@ -65,12 +64,10 @@ contains
     end do
   end subroutine solve_left
 
-  subroutine solve_left_with_attitude(bodies, code, effort_, attitude0, omega, attitude, status, &
-                                      raised)
+  subroutine solve_left_with_attitude(bodies, code, attitude0, omega, attitude, status, raised)
     !! Solve all bodies with attitude, one by one.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: code
-    real(dp), intent(in) :: effort_
     real(dp), intent(in) :: attitude0(:, :)
     real(dp), intent(inout) :: omega(3, bodies%n)
     real(dp), intent(inout) :: attitude(:, :)
@@ -83,7 +80,7 @@ contains
 
     raised = 0
     do i = 1, bodies%n
-      call pack(bodies, i, code, .true., effort_, own, n_own)
+      call pack(bodies, i, code, .true., own, n_own)
       if (.not. is_body(bodies, i, own(:n_own - 1))) then
         status(i) = int(REFUSED, i1)
         omega(:, i) = transfer(huge(0_int64), 1.0_dp)
@@ -115,12 +112,11 @@ contains
     end if
   end function is_body
 
-  subroutine pack(bodies, i, code, with_attitude, effort_, packed, n_packed)
+  subroutine pack(bodies, i, code, with_attitude, packed, n_packed)
     !! Pack body i as prepared.f90 reads it.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: i, code
     logical, intent(in) :: with_attitude
-    real(dp), intent(in) :: effort_
     real(dp), intent(inout) :: packed(0:)
     integer, intent(out) :: n_packed   !! length, with the waves that act on the body
     real(dp) :: of(3)
@@ -134,7 +130,7 @@ contains
     packed(COEFFICIENTS:COEFFICIENTS + 2) = coefficients_of(bodies, i)
     packed(CONSTANT:CONSTANT + 2) = bodies%constant(:, of_body(size(bodies%constant, 2), i))/of
     packed(RATE:RATE + 2) = bodies%rate(:, of_body(size(bodies%rate, 2), i))/of
-    packed(EFFORT) = effort_
+    packed(EFFORT) = bodies%effort
     packed(COEFFICIENTS_LOW:COEFFICIENTS_LOW + 2) = 0.0_dp
     packed(MOMENTS:MOMENTS + 2) = of
     packed(MOMENTS_LOW:MOMENTS_LOW + 2) = 0.0_dp

@@ -5,7 +5,7 @@ module many_slots
   use many_columns, only: block_t, columns_of, equations_of, next_block, times_of
   use problem, only: problem_t
   use series, only: MOST_ORDER
-  use taylor_plan, only: add_wave_rates, tolerance_and_step, steady_rates
+  use taylor_plan, only: add_wave_rates, first_step, local_tolerance_of, steady_rates
   use torque_noise, only: torque_noise_of
   implicit none(type, external)
   private
@@ -159,8 +159,9 @@ contains
       end do
     end if
     do i = 1, LANES
-      call tolerance_and_step(coupling(i), r%scale(i), gain(i), rate(i), turned(i), tolerance, &
-                              r%rest(i), r%local_tolerance(i), r%h(i))
+      r%h(i) = first_step(rate(i), r%rest(i))
+      r%local_tolerance(i) = local_tolerance_of(coupling(i), r%scale(i), gain(i), turned(i), &
+                                                tolerance, r%rest(i))
       r%local_tolerance(i) = merge(MORE_WITH_WAVES, MORE, bodies%n_waves > 0)*r%local_tolerance(i)
       push = sqrt(abs(r%a(i, 1)))
       ramp = sqrt(abs(r%a(i, 2)))

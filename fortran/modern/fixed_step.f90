@@ -5,7 +5,7 @@ module fixed_step
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use methods, only: IMPROVED_EULER, RK4, TAYLOR_3
-  use problem, only: problem_t
+  use problem, only: problem_t, request_t, solution_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use torque_law, only: torque_at, torque_rate_at
   implicit none(type, external)
@@ -21,24 +21,15 @@ module fixed_step
 
 contains
 
-  subroutine fixed_step_rows(problem, omega0, n_times, times, method, step, effort, rows, n_rows, &
-                             status, steps, evaluations, needed)
-    !! Compute the angular velocity at each of `times`, which are ordered away from 0. Between two
+  subroutine fixed_step_rows(problem, request, method, step, solution)
+    !! Compute the angular velocity at each of the times, which are ordered away from 0. Between two
     !! of them there are as many whole steps as fit and then a shorter one. The last whole step may
-    !! be longer by up to EXCESS instead.
+    !! be longer by up to EXCESS instead. The status is COMPLETE, OVERFLOW, GAVE_UP or INTERRUPTED.
     type(problem_t), intent(in) :: problem
-    real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
-    integer, intent(in) :: n_times
-    real(dp), intent(in) :: times(n_times)         !! s
+    type(request_t), intent(in) :: request         !! its tolerance is not used
     integer, intent(in) :: method                  !! IMPROVED_EULER, TAYLOR_3 or RK4
     real(dp), intent(in) :: step                   !! s, above 0
-    real(dp), intent(in) :: effort                 !! factor on the work limit
-    real(dp), intent(out) :: rows(3, n_times)      !! rad/s
-    integer, intent(out) :: n_rows                 !! number of rows that hold a result
-    integer, intent(out) :: status                 !! COMPLETE, OVERFLOW, GAVE_UP or INTERRUPTED
-    integer(int64), intent(out) :: steps           !! steps taken
-    integer(int64), intent(out) :: evaluations     !! right-hand sides evaluated
-    real(dp), intent(out) :: needed                !! effort that the times require
+    type(solution_t), intent(inout) :: solution    !! without estimates
     real(dp) :: y(3)
     real(dp) :: begin, h, n_steps
     real(dp) :: total          ! number of steps to all times
@@ -49,36 +40,36 @@ contains
     integer(int64) :: piece
     integer :: i
 
-    n_rows = 0
-    status = GAVE_UP
+    solution%n_rows = 0
+    solution%status = GAVE_UP
     ! A varying torque costs as much as the rest of the step, and a wave twice that.
     cost = 1.0_dp + 2.0_dp*real(problem%n_sines + problem%n_cosines, dp) &
            + merge(1.0_dp, 0.0_dp, any(abs(problem%rate) > 0.0_dp))
-    steps = 0
-    evaluations = 0
+    solution%steps = 0
+    solution%evaluations = 0
     total = 0.0_dp
     begin = 0.0_dp
-    do i = 1, n_times
-      total = total + steps_to(times(i) - begin, step)
-      begin = times(i)
+    do i = 1, size(request%times)
+      total = total + steps_to(request%times(i) - begin, step)
+      begin = request%times(i)
     end do
-    needed = total*cost/MOST_STEPS
-    if (.not. total <= min(COUNTABLE, effort*(MOST_STEPS/cost))) return
+    solution%needed = total*cost/MOST_STEPS
+    if (.not. total <= min(COUNTABLE, request%effort*(MOST_STEPS/cost))) return
     stride = 1 + int(STEPS_BETWEEN_LOOKS/cost, int64)
     unseen = 0
-    y = omega0
+    y = request%omega
     begin = 0.0_dp
-    do i = 1, n_times
-      h = sign(step, times(i) - begin)
-      n_steps = steps_to(times(i) - begin, step)
-      steps = steps + int(n_steps, int64)
-      evaluations = per_step(method)*steps
+    do i = 1, size(request%times)
+      h = sign(step, request%times(i) - begin)
+      n_steps = steps_to(request%times(i) - begin, step)
+      solution%steps = solution%steps + int(n_steps, int64)
+      solution%evaluations = per_step(method)*solution%steps
       done = 0
       do
         if (unseen >= stride) then
           unseen = 0
           if (interrupt_raised() /= 0) then
-            status = INTERRUPTED
+            solution%status = INTERRUPTED
             return
           end if
         end if
@@ -89,17 +80,17 @@ contains
         unseen = unseen + piece
       end do
       begin = begin + h*(n_steps - 1.0_dp)
-      call advance(problem, method, begin, times(i) - begin, 0_int64, 1_int64, y)
-      begin = times(i)
+      call advance(problem, method, begin, request%times(i) - begin, 0_int64, 1_int64, y)
+      begin = request%times(i)
       unseen = unseen + 1
       if (.not. all(abs(y) <= huge(step))) then
-        status = OVERFLOW
+        solution%status = OVERFLOW
         return
       end if
-      rows(:, i) = y
-      n_rows = i
+      solution%rows(:, i) = y
+      solution%n_rows = i
     end do
-    status = COMPLETE
+    solution%status = COMPLETE
   end subroutine fixed_step_rows
 
   pure real(dp) function steps_to(time, step)

@@ -3,18 +3,8 @@
    Plain code runs on every processor. */
 #include <stdint.h>
 
-#define ARGUMENTS                                                                              \
-  const void *problem, const double *omega, const double *tolerance, const double *effort,     \
-      int n_times, const double *times, double *rows, int n_attitudes,                         \
-      double *attitudes, int *n_rows, int *status, int64_t *steps, double *needed, double *found
-
-#define QUICK_ARGUMENTS                                                                        \
-  const void *problem, const double *omega, const double *tolerance, const double *effort,     \
-      const double *t_end, int contest, double *result, int *status, int *steps,               \
-      double *error
-
-typedef void solver(ARGUMENTS);
-typedef void quick_solver(QUICK_ARGUMENTS);
+typedef void solver(const void *problem, const void *request, void *solution);
+typedef void quick_solver(const void *problem, const void *request, int contest, void *solution);
 typedef void free_solver(const void *bodies, int n, double *omega, int8_t *status);
 typedef void series_solver(const void *bodies, int n, double *omega, int8_t *status, int *interrupted);
 typedef void fixed_solver(const void *bodies, int method, int n, double *omega, int8_t *status,
@@ -78,15 +68,14 @@ int choose_level(int highest)
 
 __attribute__((constructor)) static void choose_best(void) { choose_level(2); }
 
-void taylor_solve(ARGUMENTS)
+void taylor_solve(const void *problem, const void *request, void *solution)
 {
-  chosen.taylor(problem, omega, tolerance, effort, n_times, times, rows, n_attitudes, attitudes,
-                n_rows, status, steps, needed, found);
+  chosen.taylor(problem, request, solution);
 }
 
-void quick_solve(QUICK_ARGUMENTS)
+void quick_solve(const void *problem, const void *request, int contest, void *solution)
 {
-  chosen.quick(problem, omega, tolerance, effort, t_end, contest, result, status, steps, error);
+  chosen.quick(problem, request, contest, solution);
 }
 
 void many_free(const void *bodies, int n, double *omega, int8_t *status)

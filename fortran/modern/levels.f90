@@ -1,7 +1,7 @@
 module levels
   !! The interfaces of levels.c: the kernels of the chosen instruction set. C passes on the address
-  !! of a problem_t, a bodies_t or an ensemble_t and does not read it.
-  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t, c_ptr
+  !! of a problem_t, a request_t, a solution_t, a bodies_t or an ensemble_t and does not read it.
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_ptr
   use bodies, only: i1
   implicit none(type, external)
   private
@@ -17,35 +17,20 @@ module levels
       integer(c_int), intent(in), value :: highest
     end function choose_level
 
-    subroutine taylor_solve(problem, omega, tolerance, effort, n_times, times, rows, &
-                            n_attitudes, attitudes, n_rows, status, steps, needed, found) &
-      bind(c, name="taylor_solve")
+    subroutine taylor_solve(problem, request, solution) bind(c, name="taylor_solve")
       !! Call taylor_solve of taylor.f90 at the chosen level.
-      import :: c_double, c_int, c_int64_t
       implicit none(type, external)
-      type(*), intent(in) :: problem
-      real(c_double), intent(in) :: omega(3), tolerance, effort
-      integer(c_int), intent(in), value :: n_times
-      real(c_double), intent(in) :: times(n_times)
-      real(c_double), intent(inout) :: rows(3, n_times)
-      integer(c_int), intent(in), value :: n_attitudes
-      real(c_double), intent(inout) :: attitudes(4, 0:n_attitudes)
-      integer(c_int), intent(out) :: n_rows, status
-      integer(c_int64_t), intent(out) :: steps
-      real(c_double), intent(out) :: needed, found(3)
+      type(*), intent(in) :: problem, request
+      type(*), intent(inout) :: solution
     end subroutine taylor_solve
 
-    subroutine quick_solve(problem, omega, tolerance, effort, t_end, contest, result, status, &
-                           steps, error) bind(c, name="quick_solve")
+    subroutine quick_solve(problem, request, contest, solution) bind(c, name="quick_solve")
       !! Call quick_solve of scaled_runge_kutta.f90 at the chosen level.
-      import :: c_double, c_int
+      import :: c_int
       implicit none(type, external)
-      type(*), intent(in) :: problem
-      real(c_double), intent(in) :: omega(3), tolerance, effort, t_end
+      type(*), intent(in) :: problem, request
       integer(c_int), intent(in), value :: contest
-      real(c_double), intent(out) :: result(3)
-      integer(c_int), intent(out) :: status, steps
-      real(c_double), intent(out) :: error
+      type(*), intent(inout) :: solution
     end subroutine quick_solve
 
     subroutine many_free(bodies, n, omega, status) bind(c, name="many_free")

@@ -10,7 +10,7 @@ module prepared
                      QUICK_OR_TAYLOR, RK4, SPACE_TORQUE, SPHERE, TAYLOR
   use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, MOMENTS, &
                     MOMENTS_LOW, N_COSINES, N_SINES, RATE, STEP, TOLERANCE, WAVES
-  use problem, only: problem_t
+  use problem, only: problem_t, request_t, solution_t
   use space_torque, only: space_torque_solve
   use sphere, only: sphere_rows
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, REFUSED, SENSITIVE
@@ -44,19 +44,18 @@ contains
     if (largest <= LARGE .and. largest*LARGE >= 1.0_dp) then
       call solve_as_given(packed, n_packed, omega0, t_end, omega, status, steps, found)
     else
-      call solve_near_one(packed, n_packed, omega0, t_end, largest, omega, status, steps, found)
+      call solve_near_one(packed, n_packed, omega0, t_end, omega, status, steps, found)
     end if
     ! ieee_value is not used: its module makes the binary depend on libgfortran.
     if (.not. is_result(status)) omega = transfer(huge(0_int64), 1.0_dp)
   end subroutine solve_prepared
 
-  subroutine solve_near_one(packed, n_packed, omega0, t_end, largest, omega, status, steps, found)
+  subroutine solve_near_one(packed, n_packed, omega0, t_end, omega, status, steps, found)
     !! Solve in units that bring omega near 1. The scale is a power of two, so no digit changes.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)  !! rad/s
     real(dp), intent(in) :: t_end      !! s
-    real(dp), intent(in) :: largest    !! largest component of omega0, rad/s
     real(dp), intent(out) :: omega(3)  !! rad/s
     integer, intent(out) :: status     !! code of the module statuses
     integer(int64), intent(out) :: steps !! or right-hand sides, of Gauss collocation
@@ -69,7 +68,7 @@ contains
     integer :: power       ! omega is 2**power times its value in the new units
     integer :: code, i
 
-    reach = largest
+    reach = max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3)))
     do i = 0, 2
       reach = max(reach, abs(packed(CONSTANT + i)*t_end), abs(packed(RATE + i)*t_end*t_end))
     end do
@@ -126,95 +125,100 @@ contains
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)  !! rad/s
     real(dp), intent(in) :: t_end      !! s
-    real(dp), intent(out) :: omega(3)  !! rad/s
+    real(dp), intent(out), target :: omega(3)  !! rad/s
     integer, intent(out) :: ended      !! code of the module statuses
     integer(int64), intent(out) :: count !! or right-hand sides, of Gauss collocation
     real(dp), intent(out) :: found(2)  !! estimated relative error, amplification; negative: unknown
     type(problem_t) :: problem
-    real(dp) :: times(1)
+    type(solution_t) :: solution
+    real(dp), target :: times(1)
     real(dp) :: reached(4)
-    integer :: code, n_rows, quick_steps
-    integer(int64) :: evaluations
-    real(dp) :: needed, estimates(3), no_attitude(4, 1)
+    integer :: code, n_rows
 
     code = int(packed(METHOD))
     times(1) = t_end
     count = 0
     found = -1.0_dp
-    select case (code)
-    case (CLOSED_FORM, CLOSED_FORM_OR_TAYLOR)
+    ended = REFUSED
+    if (code == CLOSED_FORM .or. code == CLOSED_FORM_OR_TAYLOR) then
       call torque_free_rows(packed(COEFFICIENTS:COEFFICIENTS + 2), &
                             packed(COEFFICIENTS_LOW:COEFFICIENTS_LOW + 2), omega0, 1, times, &
                             omega, n_rows, ended)
-      if (ended == REFUSED .and. code == CLOSED_FORM_OR_TAYLOR) then
-        call unpack(packed, n_packed, problem)
-        call taylor_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), 1, times, omega, &
-                          0, no_attitude, n_rows, ended, count, needed, estimates)
-        found = estimates(:2)
-      end if
-    case (SPHERE)
+    end if
+    if (ended == REFUSED .and. code /= CLOSED_FORM) then
       call unpack(packed, n_packed, problem)
-      call sphere_rows(problem, omega0, packed(EFFORT), 1, times, omega, n_rows, ended, needed)
-    case (TAYLOR, QUICK, QUICK_OR_TAYLOR)
-      call unpack(packed, n_packed, problem)
-      ended = REFUSED
-      if (code /= TAYLOR) then
-        call quick_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), t_end, &
-                         merge(1, 0, code == QUICK_OR_TAYLOR), omega, ended, quick_steps, &
-                         found(1))
-        ! A negative number of steps tells the caller that the kernel chose quick.
-        count = merge(-quick_steps, quick_steps, code == QUICK_OR_TAYLOR)
-        if (code == QUICK .and. ended == SENSITIVE) then
-          call compare_with_series(problem, omega0, packed(TOLERANCE), packed(EFFORT), times, &
-                                   omega, ended, found)
-        end if
-      end if
-      if (ended /= COMPLETE .and. ended /= INTERRUPTED .and. code /= QUICK) then
-        call taylor_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), 1, times, omega, &
-                          0, no_attitude, n_rows, ended, count, needed, estimates)
-        found = estimates(:2)
-      end if
-    case (IMPROVED_EULER:RK4)
-      call unpack(packed, n_packed, problem)
-      call fixed_step_rows(problem, omega0, 1, times, code, packed(STEP), packed(EFFORT), omega, &
-                           n_rows, ended, count, evaluations, needed)
-    case default
-      call unpack(packed, n_packed, problem)
-      call gauss_rows(problem, omega0, 1, times, code - GAUSS, packed(STEP), packed(EFFORT), &
-                      omega, reached, n_rows, ended, count)
-    end select
+      solution%rows(1:3, 1:1) => omega
+      associate (request => request_t(omega0, packed(TOLERANCE), packed(EFFORT), times))
+        select case (code)
+        case (SPHERE)
+          call sphere_rows(problem, request, solution)
+        case (CLOSED_FORM_OR_TAYLOR, TAYLOR, QUICK, QUICK_OR_TAYLOR)
+          call solve_by_series(problem, request, code, solution, found)
+        case (IMPROVED_EULER:RK4)
+          call fixed_step_rows(problem, request, code, packed(STEP), solution)
+        case default
+          call gauss_rows(problem, request, code - GAUSS, packed(STEP), solution, reached)
+          solution%steps = solution%evaluations
+        end select
+      end associate
+      ended = solution%status
+      count = solution%steps
+    end if
     ! A start that is not finite may be returned as it is, for example at time 0.
     if (is_result(ended)) then
       if (.not. all(abs(omega) <= huge(t_end))) ended = OVERFLOW
     end if
   end subroutine solve_as_given
 
-  subroutine compare_with_series(problem, omega0, tolerance, effort, times, omega, ended, found)
+  subroutine solve_by_series(problem, request, code, solution, found)
+    !! Solve by the series, or by quick where this is requested or faster.
+    type(problem_t), intent(in) :: problem
+    type(request_t), intent(in) :: request
+    integer, intent(in) :: code         !! of the module methods
+    type(solution_t), intent(inout) :: solution
+    real(dp), intent(out) :: found(2)   !! estimated relative error, amplification; below 0: unknown
+
+    found = -1.0_dp
+    if (code == QUICK .or. code == QUICK_OR_TAYLOR) then
+      call quick_solve(problem, request, merge(1, 0, code == QUICK_OR_TAYLOR), solution)
+      found(1) = solution%error
+      if (code == QUICK) then
+        if (solution%status == SENSITIVE) then
+          call compare_with_series(problem, request, solution%rows(:, 1), solution%status, found)
+        end if
+        return
+      end if
+      ! A negative number of steps tells the caller that the kernel chose quick.
+      solution%steps = -solution%steps
+      if (solution%status == COMPLETE .or. solution%status == INTERRUPTED) return
+    end if
+    call taylor_solve(problem, request, solution)
+    found = [solution%error, solution%growth]
+  end subroutine solve_by_series
+
+  subroutine compare_with_series(problem, request, omega, ended, found)
     !! Compare with the series a result whose method does not measure the amplification of rounding
     !! errors: compute its error and amplification.
     type(problem_t), intent(in) :: problem
-    real(dp), intent(in) :: omega0(3)  !! rad/s
-    real(dp), intent(in) :: tolerance, effort
-    real(dp), intent(in) :: times(1)   !! s
+    type(request_t), intent(in) :: request
     real(dp), intent(in) :: omega(3)   !! the result, rad/s
     integer, intent(inout) :: ended    !! SENSITIVE, or COMPLETE if the series excludes that
     real(dp), intent(inout) :: found(2) !! estimated relative error, amplification; below 0: unknown
-    real(dp) :: other(3, 1), no_attitude(4, 1)
-    real(dp) :: needed, estimates(3)
-    integer :: n_rows, ended_other
-    integer(int64) :: count
+    real(dp), target :: other(3, 1)
+    type(solution_t) :: solution
 
-    call taylor_solve(problem, omega0, tolerance, effort, 1, times, other, 0, no_attitude, n_rows, &
-                      ended_other, count, needed, estimates)
-    if (ended_other == INTERRUPTED) ended = INTERRUPTED
-    if (.not. is_result(ended_other)) then
+    solution%rows => other
+    call taylor_solve(problem, request, solution)
+    if (solution%status == INTERRUPTED) ended = INTERRUPTED
+    if (.not. is_result(solution%status)) then
       found = -1.0_dp
       return
     end if
     found(1) = max(found(1), maxval(abs(omega - other(:, 1))) &
-                   /max(maxval(abs(omega0)), maxval(abs(omega)), tiny(needed))) + estimates(1)
-    found(2) = estimates(2)
-    if (ended_other == COMPLETE .and. found(1) <= tolerance) ended = COMPLETE
+                   /max(maxval(abs(request%omega)), maxval(abs(omega)), tiny(found))) &
+               + solution%error
+    found(2) = solution%growth
+    if (solution%status == COMPLETE .and. found(1) <= request%tolerance) ended = COMPLETE
   end subroutine compare_with_series
 
   subroutine solve_prepared_attitude(packed, n_packed, start, t_end, state, status, steps, found)
@@ -223,14 +227,15 @@ contains
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: start(7)   !! omega, rad/s, and a unit quaternion, scalar first
     real(dp), intent(in) :: t_end      !! s
-    real(dp), intent(out) :: state(7)
+    real(dp), intent(out), target :: state(7)
     integer, intent(out) :: status     !! code of the module statuses
     integer(int64), intent(out) :: steps
     real(dp), intent(out) :: found(2)  !! estimated relative error, amplification; negative: unknown
     type(problem_t) :: problem
-    real(dp) :: times(1)
+    type(solution_t) :: solution
+    real(dp), target :: times(1), attitudes(4, 0:1)
+    real(dp) :: both(3, 2)  ! moments and their low parts, kg m2
     integer :: code, n_rows
-    real(dp) :: needed, estimates(3), attitudes(4, 0:1)
 
     code = int(packed(METHOD))
     times(1) = t_end
@@ -240,26 +245,28 @@ contains
       status = OVERFLOW
     else
       status = REFUSED
-      attitudes(:, 0) = start(4:)
-      if (code == SPACE_TORQUE) then
-        call unpack(packed, n_packed, problem)
-        call space_torque_solve(problem, &
-                                maxval(packed(MOMENTS:MOMENTS + 2))/packed(MOMENTS:MOMENTS + 2), &
-                                start(:3), packed(TOLERANCE), packed(EFFORT), 1, times, state(:3), &
-                                attitudes, n_rows, status, steps, needed, estimates)
-        state(4:) = attitudes(:, 1)
-        found = estimates(:2)
-      else if (code /= TAYLOR) then
-        call torque_free_attitude_rows(packed(MOMENTS:MOMENTS + 2), &
-                                       packed(MOMENTS_LOW:MOMENTS_LOW + 2), start(:3), &
-                                       start(4:), 1, times, state(:3), state(4:), n_rows, status)
+      if (code /= SPACE_TORQUE .and. code /= TAYLOR) then
+        both(:, 1) = packed(MOMENTS:MOMENTS + 2)
+        both(:, 2) = packed(MOMENTS_LOW:MOMENTS_LOW + 2)
+        call torque_free_attitude_rows(both, start, 1, times, state(:3), state(4:), n_rows, status)
       end if
       if (status == REFUSED .and. code /= CLOSED_FORM) then
         call unpack(packed, n_packed, problem)
-        call taylor_solve(problem, start(:3), packed(TOLERANCE), packed(EFFORT), 1, times, &
-                          state(:3), 1, attitudes, n_rows, status, steps, needed, estimates)
+        attitudes(:, 0) = start(4:)
+        solution%rows(1:3, 1:1) => state(:3)
+        solution%attitudes(1:4, 0:1) => attitudes
+        associate (request => request_t(start(:3), packed(TOLERANCE), packed(EFFORT), times))
+          if (code == SPACE_TORQUE) then
+            call space_torque_solve(problem, maxval(packed(MOMENTS:MOMENTS + 2)) &
+                                    /packed(MOMENTS:MOMENTS + 2), request, solution)
+          else
+            call taylor_solve(problem, request, solution)
+          end if
+        end associate
         state(4:) = attitudes(:, 1)
-        found = estimates(:2)
+        status = solution%status
+        steps = solution%steps
+        found = [solution%error, solution%growth]
       end if
     end if
     if (.not. is_result(status)) state = transfer(huge(0_int64), 1.0_dp)

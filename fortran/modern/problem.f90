@@ -2,6 +2,7 @@ module problem
   !! The equations that the modern methods solve, divided by the moments (equations 16-18):
   !! omega' = M(t) + (A w2 w3, B w1 w3, C w1 w2), M(t) = constant + rate t + sines + cosines.
   !! A wave is one of the sines or cosines.
+  use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   implicit none(type, external)
   private
@@ -16,5 +17,28 @@ module problem
     real(dp), pointer, contiguous :: sines(:, :)   !! amplitude (3) in 1/s2, frequency in rad/s
     real(dp), pointer, contiguous :: cosines(:, :) !! as sines
   end type problem_t
+
+  type, public :: request_t
+    !! What is to be computed.
+    real(dp) :: omega(3)                           !! at time 0, rad/s
+    real(dp) :: tolerance                          !! largest error, over the largest |omega|
+    real(dp) :: effort                             !! factor on the work limit
+    real(dp), pointer, contiguous :: times(:)      !! s
+  end type request_t
+
+  type, public :: solution_t
+    !! What was computed. A kernel sets the components that it has.
+    real(dp), pointer, contiguous :: rows(:, :)    !! omega at the first n_rows times, rad/s
+    !! (4, 0:n): column 0 is the attitude at time 0, by the caller; null if not requested
+    real(dp), pointer, contiguous :: attitudes(:, :) => null()
+    integer :: n_rows                              !! number of rows that hold a result
+    integer :: status                              !! of the module statuses
+    integer(int64) :: steps = 0                    !! of the last integration
+    integer(int64) :: evaluations                  !! right-hand sides
+    real(dp) :: needed                             !! effort that the times require
+    real(dp) :: error                              !! estimated, over the largest |omega|
+    real(dp) :: growth                             !! error amplification; negative: unknown
+    real(dp) :: spent                              !! steps of all integrations
+  end type solution_t
 
 end module problem

@@ -13,11 +13,20 @@ module scaled_march
   ! shorter ones.
   real(dp), parameter, public :: GAIN = 15.0_dp
 
+  type, public :: marched_t
+    !! The result of an integration by steps of h, 2 h and 4 h side by side.
+    real(dp) :: x(3)        !! the unknowns at the end, 1/s, without the torque's integral
+    real(dp) :: gaps(3, 2)  !! step h minus step 2 h, and step 2 h minus step 4 h
+    real(dp) :: top(3)      !! largest size of each unknown, with the integral of the torque
+    real(dp) :: spread      !! integral of the second unknown's size over time
+    logical :: ended        !! whether the user interrupted
+  end type marched_t
+
   public :: march_constant, march_varying
 
 contains
 
-  subroutine march_constant(motion, start, h, fours, x, gaps, top, spread, ended)
+  subroutine march_constant(motion, start, h, fours, found)
     !! Take groups of four equal steps under constant torque. Steps of twice and of four times the
     !! length are taken alongside, in time that the processor would spend waiting.
     type(motion_t), intent(in) :: motion
@@ -26,12 +35,7 @@ contains
     real(dp), intent(in) :: h           !! s
     integer, intent(in) :: fours
     ! fours: number of groups of four steps
-    real(dp), intent(out) :: x(3)
-    ! x: the unknowns at the end, 1/s
-    real(dp), intent(out) :: gaps(3, 2) !! step h minus step 2 h, and step 2 h minus step 4 h
-    real(dp), intent(out) :: top(3)     !! largest size of each unknown
-    real(dp), intent(out) :: spread     !! integral of the second unknown's size over time
-    logical, intent(out) :: ended       !! whether the user interrupted
+    type(marched_t), intent(out) :: found
     real(dp) :: x1, x2, x3, a1, a2, a3, b1, b2, b3, c1, c2, c3, d1, d2, d3, p1, p2, p3, m1, m2, m3
     real(dp) :: y(3, 2)                 ! results of the longer steps
     real(dp) :: whole, half, third, sixth          ! parts of a step, s
@@ -60,10 +64,10 @@ contains
     x3 = start(3)
     y(:, 1) = start
     y(:, 2) = start
-    top = abs(start)
+    found%top = abs(start)
     ! The trapezoidal rule on every second step; its last node gets the weight 1/2 after the loop.
-    spread = 0.5_dp*top(2)
-    ended = .false.
+    found%spread = 0.5_dp*found%top(2)
+    found%ended = .false.
     do i = 1, 2*fours
       ! eq. 31 with the longer steps
       do k = 1, 1 + mod(i, 2)
@@ -119,22 +123,22 @@ contains
         x2 = ((x2 + sixth_2*a2) + third_2*(b2 + c2)) + sixth_2*d2
         x3 = ((x3 + sixth*a3) + third*(b3 + c3)) + sixth*d3
       end do
-      top(1) = max(top(1), abs(x1))
-      top(2) = max(top(2), abs(x2))
-      spread = spread + abs(x2)
-      top(3) = max(top(3), abs(x3))
+      found%top(1) = max(found%top(1), abs(x1))
+      found%top(2) = max(found%top(2), abs(x2))
+      found%spread = found%spread + abs(x2)
+      found%top(3) = max(found%top(3), abs(x3))
       if (iand(i, BETWEEN_LOOKS) == 0) then
-        ended = interrupt_raised() /= 0
-        if (ended) exit
+        found%ended = interrupt_raised() /= 0
+        if (found%ended) exit
       end if
     end do
-    spread = 2.0_dp*abs(h)*(spread - 0.5_dp*abs(x2))
-    x = [x1, x2, x3]
-    gaps(:, 1) = x - y(:, 1)
-    gaps(:, 2) = y(:, 1) - y(:, 2)
+    found%spread = 2.0_dp*abs(h)*(found%spread - 0.5_dp*abs(x2))
+    found%x = [x1, x2, x3]
+    found%gaps(:, 1) = found%x - y(:, 1)
+    found%gaps(:, 2) = y(:, 1) - y(:, 2)
   end subroutine march_constant
 
-  subroutine march_varying(motion, start, aside, t_end, fours, x, gaps, top, spread, ended)
+  subroutine march_varying(motion, start, aside, t_end, fours, found)
     !! Do the same under a torque that varies. The integral of the torque is exact, and the rest is
     !! smooth.
     type(motion_t), intent(in) :: motion
@@ -142,12 +146,8 @@ contains
     real(dp), intent(in) :: aside(3)     !! offset of the start of the longer steps
     real(dp), intent(in) :: t_end        !! s
     integer, intent(in) :: fours
-    real(dp), intent(out) :: x(3)        !! without the integral of the torque
-    real(dp), intent(out) :: gaps(3, 2)
-    ! gaps: as in march_constant
-    real(dp), intent(out) :: top(3)      !! with the integral
-    real(dp), intent(out) :: spread      !! integral of the second unknown's size over time
-    logical, intent(out) :: ended        !! whether the user interrupted
+    type(marched_t), intent(out) :: found
+    real(dp) :: x(3)
     real(dp) :: x1, x2, x3, a1, a2, a3, b1, b2, b3, c1, c2, c3, d1, d2, d3, p1, p2, p3, m1, m2, m3
     real(dp) :: y(3, 2)                  ! results of the longer steps
     real(dp) :: whole, half, third, sixth          ! parts of a step, s
@@ -192,11 +192,11 @@ contains
     x3 = x(3)
     y(:, 1) = x + aside
     y(:, 2) = x - GAIN*aside
-    top = abs(start)
+    found%top = abs(start)
     ! The trapezoidal rule on every second step; its last node gets the weight 1/2 after the loop.
-    spread = 0.5_dp*top(2)
+    found%spread = 0.5_dp*found%top(2)
     s(:, 8) = motion%mean
-    ended = .false.
+    found%ended = .false.
     do i = 1, 2*fours
       if (mod(i, 2) == 1) then
         afresh = mod(i, 2*EXACT_AGAIN) == 1
@@ -272,20 +272,21 @@ contains
         x2 = ((x2 + sixth_2*a2) + third_2*(b2 + c2)) + sixth_2*d2
         x3 = ((x3 + sixth*a3) + third*(b3 + c3)) + sixth*d3
       end do
-      top(1) = max(top(1), abs(x1 + s(1, end_)))
-      top(2) = max(top(2), abs(x2 + s(2, end_)))
-      spread = spread + abs(x2 + s(2, end_))
-      top(3) = max(top(3), abs(x3 + s(3, end_)))
+      found%top(1) = max(found%top(1), abs(x1 + s(1, end_)))
+      found%top(2) = max(found%top(2), abs(x2 + s(2, end_)))
+      found%spread = found%spread + abs(x2 + s(2, end_))
+      found%top(3) = max(found%top(3), abs(x3 + s(3, end_)))
       if (iand(i, BETWEEN_LOOKS) == 0) then
-        ended = interrupt_raised() /= 0
-        if (ended) exit
+        found%ended = interrupt_raised() /= 0
+        if (found%ended) exit
       end if
     end do
-    spread = 2.0_dp*abs(h)*(spread - 0.5_dp*abs(x2 + s(2, 8)))
+    found%spread = 2.0_dp*abs(h)*(found%spread - 0.5_dp*abs(x2 + s(2, 8)))
     x = [x1, x2, x3]
-    gaps(:, 1) = x - y(:, 1)
-    gaps(:, 2) = y(:, 1) - y(:, 2)
+    found%gaps(:, 1) = x - y(:, 1)
+    found%gaps(:, 2) = y(:, 1) - y(:, 2)
     if (motion%resolved < motion%waves) x = x + turned(motion, x + s(:, 8), t_end)
+    found%x = x
   end subroutine march_varying
 
   pure subroutine turn(motion, t, afresh, turn_sines, turn_versines, sines, versines, s)

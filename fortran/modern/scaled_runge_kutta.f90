@@ -2,11 +2,11 @@ module scaled_runge_kutta
   !! Classical Runge-Kutta (eq. 31) for few digits. The unknowns are scaled so that a slope is one
   !! fused multiply-add. The waves of the torque are integrated exactly. Equal steps of three
   !! lengths are taken at once.
-  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
-  use problem, only: problem_t
-  use scaled_march, only: GAIN, march_constant, march_varying
+  use problem, only: problem_t, request_t, solution_t
+  use scaled_march, only: GAIN, march_constant, march_varying, marched_t
   use scaled_motion, only: amplification, average, integral, MOST_WAVES, motion_t, reach_of, &
                            scaled, steps_for_waves
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED, SENSITIVE
@@ -56,29 +56,36 @@ module scaled_runge_kutta
 
 contains
 
-  subroutine quick_solve(problem_at, omega, tolerance, effort, t_end, contest, result, status, &
-                         steps, error) &
+  subroutine quick_solve(problem_at, request_at, contest, solution_at) &
     bind(c, name="quick_solve_level")
-    !! Compute the angular velocity at `t_end`.
-    type(c_ptr), intent(in), value :: problem_at        !! address of a problem_t, passed through C
-    real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
-    real(c_double), intent(in) :: tolerance             !! relative
-    real(c_double), intent(in) :: effort                !! factor on the work limit
-    real(c_double), intent(in) :: t_end                 !! s
+    !! Compute the angular velocity at the first of the times: row, status, steps of the last
+    !! attempt, error. The status is any but STOPPED. It is SENSITIVE if rounding may count, which
+    !! only the series can measure; the error is then without amplified rounding.
+    ! Addresses of a problem_t, a request_t and a solution_t, passed through C.
+    type(c_ptr), intent(in), value :: problem_at, request_at, solution_at
     !! not 0: REFUSED if the series is faster, or will be needed anyway
     integer(c_int), intent(in), value :: contest
-    real(c_double), intent(out) :: result(3)            !! rad/s
-    !! any but STOPPED; SENSITIVE if rounding may count: only the series can tell by how much
-    integer(c_int), intent(out) :: status
-    integer(c_int), intent(out) :: steps                !! of the last attempt
-    !! estimated relative error, with amplified rounding if complete and without if sensitive
-    real(c_double), intent(out) :: error
     type(problem_t), pointer :: problem
+    type(request_t), pointer :: request
+    type(solution_t), pointer :: solution
+
+    call c_f_pointer(problem_at, problem)
+    call c_f_pointer(request_at, request)
+    call c_f_pointer(solution_at, solution)
+    call solve(problem, request, contest /= 0, solution)
+  end subroutine quick_solve
+
+  subroutine solve(problem, request, is_contest, solution)
+    !! Compute the angular velocity at the first of the times.
+    type(problem_t), intent(in) :: problem
+    type(request_t), intent(in) :: request
+    logical, intent(in) :: is_contest
+    type(solution_t), intent(inout) :: solution
     type(motion_t) :: motion
     logical :: varies
-    real(dp) :: start(3), x(3)
-    real(dp) :: gaps(3, 2)   ! differences of the results by steps of successive lengths
-    real(dp) :: top(3)       ! largest size of each unknown, 1/s
+    real(dp) :: omega(3), start(3), x(3)
+    real(dp) :: t_end        ! s
+    type(marched_t) :: found
     real(dp) :: rate         ! bound of the unknowns, 1/s
     real(dp) :: rate_0       ! its value at time 0
     real(dp) :: turn_0       ! rate_0 times the whole time, rad
@@ -94,23 +101,22 @@ contains
     real(dp) :: radians      ! of the motion and of the waves
     real(dp) :: cost         ! in steps under constant torque
     real(dp) :: bits         ! bits of the target error
-    real(dp) :: spread       ! integral of the second unknown's size over time
     real(dp) :: exponent     ! integral of the logarithmic norm over time
     real(dp) :: bound        ! of the norm of the state-transition matrix
     real(dp) :: noise        ! bound of amplified rounding, relative
     real(dp) :: blurred      ! rounding error of torques that cancel, relative
-    logical :: ended         ! whether the user interrupted
     integer :: n
 
-    aim = SHARE*tolerance
-    status = REFUSED
-    steps = 0
-    error = 0.0_dp
-    result = omega
-    call c_f_pointer(problem_at, problem)
+    aim = SHARE*request%tolerance
+    omega = request%omega
+    t_end = request%times(1)
+    solution%status = REFUSED
+    solution%steps = 0
+    solution%error = 0.0_dp
+    solution%rows(:, 1) = omega
     if (problem%n_sines + problem%n_cosines > MOST_WAVES) return
-    call scaled(problem, t_end, motion, status)
-    if (status /= COMPLETE) return
+    call scaled(problem, t_end, motion, solution%status)
+    if (solution%status /= COMPLETE) return
     start = omega(motion%axes)/motion%scale
     rate_0 = max(abs(start(1)), abs(start(2)), abs(start(3)))
     rate = rate_0 + abs(t_end)*max(abs(motion%slope(1)), abs(motion%slope(2)), abs(motion%slope(3)))
@@ -122,7 +128,7 @@ contains
     ! In radians, whose powers are in range in any unit of time.
     turn_0 = rate_0*abs(t_end)
     turn = rate*abs(t_end)
-    status = GAVE_UP
+    solution%status = GAVE_UP
     if (.not. turn <= LONGEST) return
     power_5 = turn**5
     if (turn > 1.1_dp*turn_0) power_5 = (turn**6 - turn_0**6)/(6.0_dp*(turn - turn_0))
@@ -133,7 +139,7 @@ contains
       call average(motion, rate, t_end, faint, left_out)
       n_steps = max(n_steps, steps_for_waves(motion, t_end, aim))
     end if
-    if (contest /= 0) then
+    if (is_contest) then
       radians = 0.5_dp*(turn_0 + turn)
       do n = 1, motion%waves
         radians = radians + WAVE_RADIAN*abs(motion%frequency(n)*t_end)
@@ -142,73 +148,73 @@ contains
       if (varies) cost = n_steps*(VARYING + A_WAVE*motion%resolved)
       bits = 1023.0_dp - real(ishft(transfer(aim, 0_int64), -52), dp)
       if (cost > 10.0_dp + radians*(SERIES_STEPS + SERIES_STEPS_A_BIT*bits)) then
-        status = REFUSED
+        solution%status = REFUSED
         return
       end if
       if (KEPT*abs(start(2)*t_end) > LOG_2*(BITS_KEPT - bits)) then
-        status = REFUSED
+        solution%status = REFUSED
         return
       end if
     end if
-    allowed = min(COUNTABLE, MOST_STEPS*effort)
+    allowed = min(COUNTABLE, MOST_STEPS*request%effort)
     most = min(allowed, MOST_TIMES*n_steps)
-    status = GAVE_UP
+    solution%status = GAVE_UP
     do
       if (.not. n_steps <= most) return
       n = int(0.25_dp*(n_steps + 3.0_dp))
-      steps = 4*n
+      solution%steps = 4*n
       if (varies) then
-        call march_varying(motion, start, (GAIN*left_out)*ASIDE, t_end, n, x, gaps, top, &
-                           spread, ended)
+        call march_varying(motion, start, (GAIN*left_out)*ASIDE, t_end, n, found)
       else
-        call march_constant(motion, start, (0.25_dp*t_end)/n, n, x, gaps, top, spread, ended)
+        call march_constant(motion, start, (0.25_dp*t_end)/n, n, found)
       end if
-      if (ended) then
-        status = INTERRUPTED
+      if (found%ended) then
+        solution%status = INTERRUPTED
         return
       end if
       ! The gaps are tested, not the error: a maximum may lose a NaN.
-      if (.not. sum(abs(gaps)) <= huge(error)) then
-        status = merge(GAVE_UP, OVERFLOW, sum(abs(x)) <= huge(error))
+      if (.not. sum(abs(found%gaps)) <= huge(solution%error)) then
+        solution%status = merge(GAVE_UP, OVERFLOW, sum(abs(found%x)) <= huge(solution%error))
         n_steps = 2.0_dp*n_steps
         cycle
       end if
-      status = GAVE_UP
-      gaps(:, 1) = gaps(:, 1)/GAIN
-      error = 0.0_dp
-      if (all(abs(gaps) <= 0.0_dp)) exit
+      solution%status = GAVE_UP
+      found%gaps(:, 1) = found%gaps(:, 1)/GAIN
+      solution%error = 0.0_dp
+      if (all(abs(found%gaps) <= 0.0_dp)) exit
       far = max(1.0_dp/(GAIN*(GAIN + 1.0_dp)), aim/FARTHEST)
-      error = max(maxval(abs(gaps(:, 1)*motion%scale)), far*maxval(abs(gaps(:, 2)*motion%scale))) &
-              /maxval(abs(top*motion%scale))
-      if (error <= aim) exit
-      n_steps = 4.0_dp + n_steps*min(8.0_dp, 1.1_dp*sqrt(sqrt(error/aim)))
+      solution%error = max(maxval(abs(found%gaps(:, 1)*motion%scale)), &
+                           far*maxval(abs(found%gaps(:, 2)*motion%scale))) &
+                       /maxval(abs(found%top*motion%scale))
+      if (solution%error <= aim) exit
+      n_steps = 4.0_dp + n_steps*min(8.0_dp, 1.1_dp*sqrt(sqrt(solution%error/aim)))
       if (varies .and. motion%resolved < motion%waves) then
-        faint = faint*min(0.1_dp, 0.1_dp*aim/error)
+        faint = faint*min(0.1_dp, 0.1_dp*aim/solution%error)
         call average(motion, rate, t_end, faint, left_out)
         n_steps = max(n_steps, steps_for_waves(motion, t_end, aim))
         most = min(allowed, max(most, MOST_TIMES*steps_for_waves(motion, t_end, aim)))
       end if
     end do
-    x = x + gaps(:, 1)
+    x = found%x + found%gaps(:, 1)
     if (varies) x = x + integral(motion, t_end)
-    result(motion%axes) = x*motion%scale
+    solution%rows(motion%axes, 1) = x*motion%scale
     blurred = 0.0_dp
     if (problem%n_sines + problem%n_cosines > 0) then
-      blurred = OF_WAVES*ROUNDING*torque_noise_of(problem, t_end, real(steps, dp), &
-                                                  maxval(abs(top*motion%scale)))
+      blurred = OF_WAVES*ROUNDING*torque_noise_of(problem, t_end, real(solution%steps, dp), &
+                                                  maxval(abs(found%top*motion%scale)))
     end if
     ! Each step rounds omega. If perturbations grow at the same rate from step to step, the steps in
     ! the last 1/(1 + exponent) of the time contribute nearly all of the amplified rounding.
-    call amplification(motion, t_end, spread, top, exponent, bound)
-    noise = ROUNDING*(1.0_dp + 0.5_dp*real(steps, dp)/(1.0_dp + exponent))*bound
+    call amplification(motion, t_end, found%spread, found%top, exponent, bound)
+    noise = ROUNDING*(1.0_dp + 0.5_dp*real(solution%steps, dp)/(1.0_dp + exponent))*bound
     if (.not. abs(t_end) > 0.0_dp) then
       ! There is no error, not even by the change of units.
-      result = omega
+      solution%rows(:, 1) = omega
       noise = 0.0_dp
     end if
-    error = error + blurred
-    status = merge(COMPLETE, SENSITIVE, noise + blurred*bound <= CERTAIN*tolerance)
-    if (status == COMPLETE) error = error + noise
-  end subroutine quick_solve
+    solution%error = solution%error + blurred
+    solution%status = merge(COMPLETE, SENSITIVE, noise + blurred*bound <= CERTAIN*request%tolerance)
+    if (solution%status == COMPLETE) solution%error = solution%error + noise
+  end subroutine solve
 
 end module scaled_runge_kutta

@@ -7,7 +7,7 @@ module space_torque
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
-  use problem, only: problem_t
+  use problem, only: problem_t, request_t, solution_t
   use space_torque_plan, only: LEAST_LOCAL_TOLERANCE, order_for, plan
   use space_torque_series, only: evaluate, expand, fitting, LONGER, series_t, torque_terms
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, SENSITIVE
@@ -40,10 +40,18 @@ module space_torque
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: NO_DIGIT = 1e100_dp    ! a relative error that leaves no digit
 
-  ! The outcome of an integration.
+  ! One integration of a request.
+  type :: attempt_t
+    logical :: is_perturbed
+    real(dp) :: local_tolerance ! largest last terms, relative to the scale
+    integer :: order
+    real(dp) :: guess           ! of the first step, s
+    real(dp) :: most_steps
+    integer(int64) :: stride    ! steps between polls for an interrupt
+  end type attempt_t
+
+  ! The outcome of an integration, beside its rows and status.
   type :: outcome_t
-    integer :: status
-    integer :: n_rows
     integer(int64) :: steps
     real(dp) :: scale  ! largest |omega|, rad/s
     real(dp) :: ahead  ! estimated steps to the end, if the work limit is exceeded
@@ -53,169 +61,168 @@ module space_torque
 
 contains
 
-  subroutine space_torque_solve(problem, ratios, omega, tolerance, effort, n_times, times, rows, &
-                                attitudes, n_rows, status, steps, needed, found)
-    !! Compute the solution at `times`, which have one sign and are ordered away from 0.
+  subroutine space_torque_solve(problem, ratios, request, solution)
+    !! Compute the solution at the times, which have one sign and are ordered away from 0. The
+    !! status is COMPLETE, OVERFLOW, GAVE_UP, INTERRUPTED or SENSITIVE, the amplification unknown.
     type(problem_t), intent(in) :: problem  !! torque over the largest moment, about axes of space
     real(dp), intent(in) :: ratios(3)       !! largest moment over each moment
-    real(dp), intent(in) :: omega(3)        !! at time 0, rad/s
-    real(dp), intent(in) :: tolerance       !! of omega, relative, and of the angle, rad
-    real(dp), intent(in) :: effort          !! factor on the work limit
-    integer, intent(in) :: n_times
-    real(dp), intent(in) :: times(n_times)  !! s
-    real(dp), intent(inout) :: rows(3, n_times) !! omega for n_rows times, rad/s
-    real(dp), intent(inout) :: attitudes(4, 0:n_times) !! column 0: the attitude at time 0
-    integer, intent(out) :: n_rows
-    integer, intent(out) :: status          !! COMPLETE, OVERFLOW, GAVE_UP, INTERRUPTED or SENSITIVE
-    integer(int64), intent(out) :: steps    !! of the last integration
-    real(dp), intent(out) :: needed         !! estimated effort, if the work limit is exceeded
-    real(dp), intent(out) :: found(3)       !! error; -1: amplification unknown; steps of all
+    type(request_t), intent(in) :: request  !! tolerance of omega, relative, and of the angle, rad
+    type(solution_t), intent(inout) :: solution
     real(dp), allocatable :: before(:, :), before_q(:, :)
     type(outcome_t) :: last, now ! the integration before, and this one
-    real(dp) :: local_tolerance  ! of this integration: largest last terms, relative to scale
+    type(attempt_t) :: attempt
     real(dp) :: local_tolerance_before, next
-    real(dp) :: h             ! first estimate of a step, s
+    real(dp) :: t_end         ! last of the times, s
     real(dp) :: cost, most, spent
     real(dp) :: error
     real(dp) :: blurred       ! rounding error of torques that cancel, relative
     integer :: count          ! number of integrations
-    integer :: failed
-    logical :: is_perturbed   ! whether this integration is perturbed
+    integer :: n_times, failed
+    integer :: status_before, n_rows_before ! of the integration before
 
-    n_rows = 0
-    steps = 0
-    needed = 0.0_dp
-    found = [0.0_dp, -1.0_dp, 0.0_dp]
-    status = COMPLETE
-    attitudes(:, 0) = attitudes(:, 0)/norm2(attitudes(:, 0))
-    if (times(n_times) == 0.0_dp) then
-      rows(:, 1) = omega
-      attitudes(:, 1) = attitudes(:, 0)
-      n_rows = 1
+    solution%n_rows = 0
+    solution%steps = 0
+    solution%needed = 0.0_dp
+    solution%error = 0.0_dp
+    solution%growth = -1.0_dp
+    solution%spent = 0.0_dp
+    solution%status = COMPLETE
+    solution%attitudes(:, 0) = solution%attitudes(:, 0)/norm2(solution%attitudes(:, 0))
+    n_times = size(request%times)
+    t_end = request%times(n_times)
+    if (t_end == 0.0_dp) then
+      solution%rows(:, 1) = request%omega
+      solution%attitudes(:, 1) = solution%attitudes(:, 0)
+      solution%n_rows = 1
       return
     end if
-    status = GAVE_UP
+    solution%status = GAVE_UP
     allocate (before(3, n_times), stat=failed)
     if (failed == 0) allocate (before_q(4, n_times), stat=failed)
     if (failed /= 0) return
-    call plan(problem, ratios, omega, tolerance, times(n_times), local_tolerance, h)
+    call plan(problem, ratios, request%omega, request%tolerance, t_end, attempt%local_tolerance, &
+              attempt%guess)
     cost = 1.0_dp + A_WAVE*real(problem%n_sines + problem%n_cosines, dp)
-    most = effort*(MOST_STEPS/cost)
+    most = request%effort*(MOST_STEPS/cost)
+    attempt%stride = 1 + int(BETWEEN_LOOKS/cost, int64)
     spent = 0.0_dp
     error = NO_DIGIT
     count = 0
     do
-      is_perturbed = mod(count, 2) == 0
+      attempt%is_perturbed = mod(count, 2) == 0
       ! Integrations with the same local tolerance have different orders.
-      call march(problem, ratios, omega, is_perturbed, local_tolerance, &
-                 order_for(local_tolerance) + 2*mod(count, 2), h, most - spent, &
-                 1 + int(BETWEEN_LOOKS/cost, int64), times, rows, attitudes, now)
+      attempt%order = order_for(attempt%local_tolerance) + 2*mod(count, 2)
+      attempt%most_steps = most - spent
+      call march(problem, ratios, request, attempt, solution, now)
       count = count + 1
       spent = spent + real(now%steps, dp)
-      if (now%status == GAVE_UP .or. now%status == INTERRUPTED) exit
+      if (solution%status == GAVE_UP .or. solution%status == INTERRUPTED) exit
       if (count > 1) then
         error = NO_DIGIT
-        if (last%n_rows == now%n_rows) then
-          error = difference(rows(:, :now%n_rows), before(:, :now%n_rows), now%scale, &
-                             attitudes(:, 1:now%n_rows), before_q(:, :now%n_rows))
+        if (n_rows_before == solution%n_rows) then
+          associate (n => solution%n_rows)
+            error = difference(solution%rows(:, :n), before(:, :n), now%scale, &
+                               solution%attitudes(:, 1:n), before_q(:, :n))
+          end associate
         end if
-        if (error <= merge(1.0_dp, TRUSTED, count > 2)*tolerance &
-            .and. last%status == now%status) exit
+        if (error <= merge(1.0_dp, TRUSTED, count > 2)*request%tolerance &
+            .and. status_before == solution%status) exit
         if (local_tolerance_before <= LEAST_LOCAL_TOLERANCE) exit
       end if
-      next = FINER*local_tolerance
-      if (count > 1) next = min(next, SAFETY*local_tolerance_before*(tolerance/error))
+      next = FINER*attempt%local_tolerance
+      if (count > 1) next = min(next, SAFETY*local_tolerance_before*(request%tolerance/error))
       last = now
-      before(:, :) = rows
-      before_q(:, :) = attitudes(:, 1:)
-      local_tolerance_before = local_tolerance
-      local_tolerance = max(LEAST_LOCAL_TOLERANCE, next)
+      status_before = solution%status
+      n_rows_before = solution%n_rows
+      before(:, :) = solution%rows
+      before_q(:, :) = solution%attitudes(:, 1:)
+      local_tolerance_before = attempt%local_tolerance
+      attempt%local_tolerance = max(LEAST_LOCAL_TOLERANCE, next)
     end do
-    if (is_perturbed .and. count > 1 .and. now%status /= GAVE_UP &
-        .and. now%status /= INTERRUPTED) then
+    if (attempt%is_perturbed .and. count > 1 .and. solution%status /= GAVE_UP &
+        .and. solution%status /= INTERRUPTED) then
       ! The result is the other integration. Its error is the difference, not a hundredth of it.
       error = MARGIN*error
       now = last
-      rows(:, :) = before
-      attitudes(:, 1:) = before_q
+      solution%status = status_before
+      solution%n_rows = n_rows_before
+      solution%rows(:, :) = before
+      solution%attitudes(:, 1:) = before_q
     end if
-    n_rows = now%n_rows
-    status = now%status
-    steps = now%steps
+    solution%steps = now%steps
     blurred = 0.0_dp
     if (problem%n_sines + problem%n_cosines > 0) then
       ! Any axis of the body may become parallel to the torque.
-      blurred = ROUNDING*torque_noise_of(problem, times(n_times), real(steps, dp), &
+      blurred = ROUNDING*torque_noise_of(problem, t_end, real(solution%steps, dp), &
                                          now%scale/maxval(ratios))
       ! A constant error of the torque changes omega in proportion to the time, and the attitude by
       ! the integral of that.
-      blurred = blurred*max(1.0_dp, 0.5_dp*now%scale*abs(times(n_times)))
+      blurred = blurred*max(1.0_dp, 0.5_dp*now%scale*abs(t_end))
     end if
-    found(1) = error + (ROUNDING + blurred)
-    found(1) = found(1) + ROUNDING*wave_rounding_of(problem, times(n_times), real(steps, dp), &
-                                                    now%scale/maxval(ratios))
-    found(3) = spent
-    if (status == COMPLETE .and. .not. error + blurred <= tolerance) then
-      status = SENSITIVE
+    solution%error = error + (ROUNDING + blurred)
+    solution%error = solution%error + ROUNDING*wave_rounding_of(problem, t_end, &
+                                                                real(solution%steps, dp), &
+                                                                now%scale/maxval(ratios))
+    solution%spent = spent
+    if (solution%status == COMPLETE .and. .not. error + blurred <= request%tolerance) then
+      solution%status = SENSITIVE
       ! Amplified rounding errors have been sampled only once.
-      found(1) = ONE_SAMPLE*found(1)
+      solution%error = ONE_SAMPLE*solution%error
     end if
-    if (status == GAVE_UP) then
+    if (solution%status == GAVE_UP) then
       if (count == 1) now%ahead = MARCHES*now%ahead
-      needed = (spent - real(now%steps, dp) + now%ahead)*cost/MOST_STEPS
-      steps = int(spent, int64)
+      solution%needed = (spent - real(now%steps, dp) + now%ahead)*cost/MOST_STEPS
+      solution%steps = int(spent, int64)
     end if
   end subroutine space_torque_solve
 
-  subroutine march(problem, ratios, omega, is_perturbed, local_tolerance, order, guess, &
-                   most_steps, stride, times, rows, attitudes, found)
-    !! Integrate once from 0 to the last of the times.
+  subroutine march(problem, ratios, request, attempt, solution, found)
+    !! Integrate once from 0 to the last of the times: rows, attitudes, their number and the status.
     type(problem_t), intent(in) :: problem
-    real(dp), intent(in) :: ratios(3), omega(3)
-    logical, intent(in) :: is_perturbed
-    real(dp), intent(in) :: local_tolerance !! largest last terms, relative to the scale
-    integer, intent(in) :: order
-    real(dp), intent(in) :: guess           !! of the first step, s
-    real(dp), intent(in) :: most_steps
-    integer(int64), intent(in) :: stride    !! steps between polls for an interrupt
-    real(dp), intent(in) :: times(:)        !! s
-    real(dp), intent(inout) :: rows(:, :)
-    real(dp), intent(inout) :: attitudes(:, 0:)
+    real(dp), intent(in) :: ratios(3)
+    type(request_t), intent(in) :: request
+    type(attempt_t), intent(in) :: attempt
+    type(solution_t), intent(inout) :: solution
     type(outcome_t), intent(out) :: found
     type(series_t) :: s
     real(dp) :: y(7), y_low(7)  ! omega and q, and their rounding errors
     real(dp) :: change(7)       ! of y in a step
-    real(dp) :: t, t_low, h, rest, factor, power
+    real(dp) :: t(2)            ! time and its rounding error, s
+    real(dp) :: t_end           ! last of the times, s
+    real(dp) :: h, rest, factor, power
     logical :: at_end
-    integer :: k, tries
+    integer :: k, order, tries
     integer(int64) :: next_look, half_way ! steps; the latter: half of those allowed
     real(dp) :: t_half                    ! the time after half_way steps, s
 
-    y = [omega, attitudes(:, 0)]
+    order = attempt%order
+    t_end = request%times(size(request%times))
+    y = [request%omega, solution%attitudes(:, 0)]
     y_low = 0.0_dp
-    if (is_perturbed) y_low(:3) = maxval(abs(omega))*PERTURBATION
+    if (attempt%is_perturbed) y_low(:3) = maxval(abs(request%omega))*PERTURBATION
     t = 0.0_dp
-    t_low = 0.0_dp
-    rest = times(size(times))
-    found = outcome_t(COMPLETE, 0, 0_int64, maxval(abs(omega)), 0.0_dp)
+    rest = t_end
+    solution%status = COMPLETE
+    solution%n_rows = 0
+    found = outcome_t(0_int64, maxval(abs(request%omega)), 0.0_dp)
     next_look = 1
-    half_way = max(1_int64, int(0.5_dp*min(COUNTABLE, most_steps), int64))
+    half_way = max(1_int64, int(0.5_dp*min(COUNTABLE, attempt%most_steps), int64))
     t_half = 0.0_dp
     tries = 0
-    h = guess
+    h = attempt%guess
     do
       s%w(:, 0) = y(:3)
       s%q(:, 0) = y(4:)
-      call torque_terms(problem, t, t_low, h, order, s)
+      call torque_terms(problem, t(1), t(2), h, order, s)
       call expand(problem, ratios, h, order, s)
       ! The scale of a body at rest is the omega that it is about to reach.
       if (found%steps == 0) found%scale = maxval(abs(s%w(:, :4)))
-      factor = fitting(s, order, local_tolerance, found%scale)
+      factor = fitting(s, order, attempt%local_tolerance, found%scale)
       if (.not. factor > 0.0_dp) then
         ! The terms are not finite.
         tries = tries + 1
         if (tries > MOST_TRIES) then
-          found%status = OVERFLOW
+          solution%status = OVERFLOW
           return
         end if
         h = 0.0625_dp*h
@@ -237,84 +244,82 @@ contains
         s%w(:, k) = power*s%w(:, k)
         s%q(:, k) = power*s%q(:, k)
       end do
-      call add_rows(s, order, t, t_low, h, at_end, y_low, times, rows, attitudes, found)
-      if (found%status /= COMPLETE) return
+      call add_rows(s, order, t, h, at_end, y_low, request, solution)
+      if (solution%status /= COMPLETE) return
       change = evaluate(s, order, 1.0_dp)
       found%steps = found%steps + 1
-      if (is_perturbed) then
+      if (attempt%is_perturbed) then
         k = 1 + int(mod(found%steps, 3_int64))
         change(k) = change(k) + (1 - 2*mod(found%steps, 2_int64))*(found%scale*PERTURBATION(k))
       end if
       call add_change(change, y, y_low)
       if (.not. maxval(abs(y)) <= huge(h)) then
-        found%status = OVERFLOW
+        solution%status = OVERFLOW
         return
       end if
       found%scale = max(found%scale, maxval(abs(y(:3))))
       if (at_end) then
-        found%n_rows = size(times)
-        rows(:, found%n_rows) = y(:3)
-        attitudes(:, found%n_rows) = y(4:)/norm2(y(4:))
+        solution%n_rows = size(request%times)
+        solution%rows(:, solution%n_rows) = y(:3)
+        solution%attitudes(:, solution%n_rows) = y(4:)/norm2(y(4:))
         return
       end if
-      call two_sum((t), h + t_low, t, t_low)
-      rest = (times(size(times)) - t) - t_low
+      call two_sum((t(1)), h + t(2), t(1), t(2))
+      rest = (t_end - t(1)) - t(2)
       if (found%steps >= next_look) then
-        next_look = min(found%steps + stride, max(found%steps + 1, &
-                                                  int(min(COUNTABLE, most_steps), int64)))
-        if (found%steps == half_way) t_half = t
+        next_look = min(found%steps + attempt%stride, max(found%steps + 1, &
+                                                  int(min(COUNTABLE, attempt%most_steps), int64)))
+        if (found%steps == half_way) t_half = t(1)
         if (found%steps < half_way) next_look = min(next_look, half_way)
         ! Extrapolate the steps so far in proportion to the time, or faster if the motion becomes
         ! faster.
         power = 1.0_dp
         if (found%steps > half_way) then
-          power = log(real(found%steps, dp)/real(half_way, dp))/log(t/t_half)
+          power = log(real(found%steps, dp)/real(half_way, dp))/log(t(1)/t_half)
         end if
         power = merge(min(3.0_dp, power), 1.0_dp, power > GROWING)
-        found%ahead = real(found%steps, dp)*(1.0_dp + abs(rest/t))**power
-        if (real(found%steps, dp) >= most_steps &
-            .or. (found%steps == 1 .and. found%ahead > HOPELESS*most_steps)) then
-          found%status = GAVE_UP
+        found%ahead = real(found%steps, dp)*(1.0_dp + abs(rest/t(1)))**power
+        if (real(found%steps, dp) >= attempt%most_steps &
+            .or. (found%steps == 1 .and. found%ahead > HOPELESS*attempt%most_steps)) then
+          solution%status = GAVE_UP
           return
         end if
         if (interrupt_raised() /= 0) then
-          found%status = INTERRUPTED
+          solution%status = INTERRUPTED
           return
         end if
       end if
     end do
   end subroutine march
 
-  subroutine add_rows(s, order, t, t_low, h, at_end, y_low, times, rows, attitudes, found)
+  subroutine add_rows(s, order, t, h, at_end, y_low, request, solution)
     !! Compute the rows within the step, except the last row of all.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
-    real(dp), intent(in) :: t, t_low, h     !! s
+    real(dp), intent(in) :: t(2), h         !! time and its rounding error, step, s
     logical, intent(in) :: at_end
     real(dp), intent(in) :: y_low(7)
-    real(dp), intent(in) :: times(:)        !! s
-    real(dp), intent(inout) :: rows(:, :)
-    real(dp), intent(inout) :: attitudes(:, 0:)
-    type(outcome_t), intent(inout) :: found !! n_rows and status change
+    type(request_t), intent(in) :: request
+    type(solution_t), intent(inout) :: solution
     real(dp) :: change(7), q(4)
     integer :: n, last
 
-    last = size(times)
+    last = size(request%times)
     if (at_end) last = last - 1
-    do n = found%n_rows + 1, last
-      if (abs(times(n) - t) > abs(h)) return
-      change = y_low + evaluate(s, order, ((times(n) - t) - t_low)/h)
-      rows(:, n) = s%w(:, 0) + change(:3)
-      if (.not. maxval(abs(rows(:, n))) <= huge(h)) then
-        found%status = OVERFLOW
+    do n = solution%n_rows + 1, last
+      if (abs(request%times(n) - t(1)) > abs(h)) return
+      change = y_low + evaluate(s, order, ((request%times(n) - t(1)) - t(2))/h)
+      solution%rows(:, n) = s%w(:, 0) + change(:3)
+      if (.not. maxval(abs(solution%rows(:, n))) <= huge(h)) then
+        solution%status = OVERFLOW
         return
       end if
       q = s%q(:, 0) + change(4:)
-      attitudes(:, n) = q/norm2(q)
-      found%n_rows = n
+      solution%attitudes(:, n) = q/norm2(q)
+      solution%n_rows = n
       if (mod(n, ROWS_BETWEEN_LOOKS) == 0) then
         if (interrupt_raised() /= 0) then
-          found%status = INTERRUPTED
+          solution%status = INTERRUPTED
           return
         end if
       end if

@@ -2,7 +2,7 @@ module sphere
   !! Closed form of the sphere under the torque law of a scene: the integral of the torque.
   use interruption, only: interrupt_raised
   use kinds, only: dp
-  use problem, only: problem_t
+  use problem, only: problem_t, request_t, solution_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use two_words, only: sine_cosine, two_product, two_sum
   implicit none(type, external)
@@ -17,41 +17,37 @@ module sphere
 
 contains
 
-  subroutine sphere_rows(problem, omega0, effort, n_times, times, rows, n_rows, status, needed)
-    !! Compute the angular velocity of a sphere, or of any body with A = B = C = 0: omega0 plus the
-    !! integral of the torque over the moment.
+  subroutine sphere_rows(problem, request, solution)
+    !! Compute the angular velocity of a sphere, or of any body with A = B = C = 0: the initial
+    !! omega plus the integral of the torque over the moment. The status is COMPLETE, OVERFLOW,
+    !! GAVE_UP or INTERRUPTED.
     type(problem_t), intent(in) :: problem         !! its coefficients are not used
-    real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
-    real(dp), intent(in) :: effort                 !! factor on the work limit
-    integer, intent(in) :: n_times
-    real(dp), intent(in) :: times(n_times)         !! s, in any order
-    real(dp), intent(out) :: rows(3, n_times)      !! rad/s
-    integer, intent(out) :: n_rows                 !! number of rows that hold a result
-    integer, intent(out) :: status                 !! COMPLETE, OVERFLOW, GAVE_UP or INTERRUPTED
-    real(dp), intent(out) :: needed                !! effort that the times require
+    type(request_t), intent(in) :: request         !! times in any order; no tolerance
+    type(solution_t), intent(inout) :: solution    !! without estimates
     real(dp) :: total(3)
     real(dp) :: rest(3)    ! rounding error of the total
     real(dp) :: t
     real(dp) :: unseen     ! terms since the last poll
     integer :: i
 
-    n_rows = 0
-    status = GAVE_UP
-    needed = n_times*(1.0_dp + real(problem%n_sines + problem%n_cosines, dp))/MOST_TERMS
-    if (needed > effort) return
-    status = COMPLETE
+    solution%n_rows = 0
+    solution%status = GAVE_UP
+    solution%needed = size(request%times)*(1.0_dp + real(problem%n_sines + problem%n_cosines, dp)) &
+                      /MOST_TERMS
+    if (solution%needed > request%effort) return
+    solution%status = COMPLETE
     unseen = 0.0_dp
-    do i = 1, n_times
+    do i = 1, size(request%times)
       unseen = unseen + (1.0_dp + real(problem%n_sines + problem%n_cosines, dp))
       if (unseen > BETWEEN_LOOKS) then
         unseen = 0.0_dp
         if (interrupt_raised() /= 0) then
-          status = INTERRUPTED
+          solution%status = INTERRUPTED
           return
         end if
       end if
-      t = times(i)
-      total = omega0
+      t = request%times(i)
+      total = request%omega
       rest = 0.0_dp
       call add(total, rest, problem%constant, t)
       call add(total, rest, problem%rate, 0.5_dp*t*t)
@@ -61,11 +57,11 @@ contains
       end if
       total = total + rest
       if (.not. all(abs(total) <= huge(t))) then
-        status = OVERFLOW
+        solution%status = OVERFLOW
         return
       end if
-      rows(:, i) = total
-      n_rows = i
+      solution%rows(:, i) = total
+      solution%n_rows = i
     end do
   end subroutine sphere_rows
 

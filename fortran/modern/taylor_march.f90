@@ -4,16 +4,16 @@ module taylor_march
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
-  use problem, only: problem_t
+  use problem, only: problem_t, request_t, solution_t
   use series, only: LEAST_LOCAL_TOLERANCE, SLACK
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
-  use taylor_attitude, only: attitude_t, begin_attitude, expand_both, turn_error, turn_on
-  use taylor_error, only: begin, blocks_t, count_step, estimate_truncation, &
+  use taylor_attitude, only: begin_attitude, expand_both, turn_error, turn_on
+  use taylor_error, only: begin, count_step, estimate_truncation, &
                           estimate_truncation_from_rest, growths_of, likely_remainder
   use taylor_plan, only: plan
-  use taylor_rows, only: add_last_row, add_rows, outcome_t, state_t
+  use taylor_rows, only: add_last_row, add_rows, outcome_t, room_t, state_t
   use taylor_series, only: expand, fitting, predict_step, propagate_precisely, &
-                           propagate_variations, rescale, series_t, size_of
+                           propagate_variations, rescale, size_of
   use torque_terms, only: longest_turn, steps_by_turns, torque_terms_at, turn_waves, wave_t
   use two_words, only: two_sum
   implicit none(type, external)
@@ -35,42 +35,29 @@ module taylor_march
   integer, parameter :: FEW_STEPS = 2
   real(dp), parameter :: NO_DIGIT = 1e100_dp ! a relative error that leaves no digit
 
-  ! This type aligns columns of four to the loads of a register, which Fortran cannot request of a
-  ! variable.
-  type, public :: room_t
-    type(series_t) :: s
-    type(blocks_t) :: blocks
-    type(state_t) :: now
-    type(attitude_t) :: attitude
-  end type room_t
+  ! One integration of a request.
+  type, public :: attempt_t
+    real(dp) :: tolerance      ! of this integration
+    logical :: precise         ! propagate variations with high accuracy
+    real(dp) :: most_steps     ! number of steps allowed
+    integer(int64) :: stride   ! steps between polls for an interrupt
+  end type attempt_t
 
   public :: march
 
 contains
 
-  subroutine march(problem, omega, asked, tolerance, precise, most_steps, stride, n_times, times, &
-                   s, blocks, now, attitude, waves, rows, n_attitudes, attitudes, found)
-    !! Integrate once from 0 to the last of the times.
+  subroutine march(problem, request, attempt, room, waves, solution, found)
+    !! Integrate once from 0 to the last of the times: rows, their number and the status.
     type(problem_t), intent(in) :: problem
-    real(dp), intent(in) :: omega(3)                    !! at time 0, rad/s
-    real(dp), intent(in) :: asked                       !! tolerance of this integration
-    real(dp), intent(in) :: tolerance                   !! of the error at `times`, relative
-    logical, intent(in) :: precise                      !! propagate variations with high accuracy
-    real(dp), intent(in) :: most_steps
-    ! most_steps: number of steps allowed
-    integer(int64), intent(in) :: stride                !! steps between polls for an interrupt
-    integer, intent(in) :: n_times
-    real(dp), intent(in) :: times(n_times)              !! s
-    type(series_t), intent(inout) :: s
-    type(blocks_t), intent(inout) :: blocks
-    type(state_t), intent(inout) :: now
-    type(attitude_t), intent(inout) :: attitude
-    type(wave_t), intent(inout) :: waves(:)
-    real(dp), intent(inout) :: rows(3, n_times)         !! omega for n_rows times, rad/s
-    integer, intent(in) :: n_attitudes                  !! n_times, or 0
-    real(dp), intent(inout) :: attitudes(4, 0:n_attitudes) !! column 0: at time 0
+    type(request_t), intent(in) :: request
+    type(attempt_t), intent(in) :: attempt
+    type(room_t), intent(inout) :: room
+    type(wave_t), intent(inout), contiguous :: waves(:)
+    type(solution_t), intent(inout) :: solution
     type(outcome_t), intent(out) :: found
-    real(dp) :: coefficients(4), constant(4), rate(4) ! of the problem, then 0
+    real(dp) :: coefficients(4), steady(4, 2) ! of the problem, then 0
+    real(dp) :: t_end         ! last of the times, s
     real(dp) :: left(4)       ! truncation error of the step, rad/s
     real(dp) :: error(3)      ! propagated so far, rad/s
     real(dp) :: h             ! step, s
@@ -95,182 +82,187 @@ contains
     integer(int64) :: half_way   ! half of the steps allowed
     real(dp) :: t_half           ! the time after half_way steps, s
 
-    found = outcome_t(COMPLETE, 0, 0_int64, 0.0_dp, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, &
-                      .true., 1.0_dp)
-    with_attitude = n_attitudes > 0
-    rest = times(n_times)
+    found = outcome_t(0_int64, 0.0_dp, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, .true., 1.0_dp)
+    solution%status = COMPLETE
+    solution%n_rows = 0
+    with_attitude = associated(solution%attitudes)
+    t_end = request%times(size(request%times))
+    rest = t_end
     if (rest == 0.0_dp) then
-      rows(:, 1) = omega
-      if (with_attitude) attitudes(:, 1) = attitudes(:, 0)
-      found%n_rows = 1
+      solution%rows(:, 1) = request%omega
+      if (with_attitude) solution%attitudes(:, 1) = solution%attitudes(:, 0)
+      solution%n_rows = 1
       return
     end if
-    now = state_t([omega, 0.0_dp], 0.0_dp, 0.0_dp, 0.0_dp, &
-                  max(abs(omega(1)), abs(omega(2)), abs(omega(3))), 0.0_dp, 0.0_dp, 0)
-    call plan(problem, now%scale, asked, rest, with_attitude, order, local_tolerance, h)
-    found%finest = local_tolerance <= LEAST_LOCAL_TOLERANCE
-    part = 65536/order
-    coupling = coupling_of(problem%coefficients)
-    farthest = merge(A_PRECISE_STEP, A_STEP, precise)
-    lasting = steps_by_turns(local_tolerance)
-    if (size(waves) > 0) longest = longest_turn(order, local_tolerance)
-    s%torque = 0.0_dp
-    coefficients = [problem%coefficients, 0.0_dp]
-    constant = [problem%constant, 0.0_dp]
-    rate = [problem%rate, 0.0_dp]
-    call begin(precise, s%lanes, blocks)
-    s%weight = 0.0_dp
-    if (with_attitude) call begin_attitude(attitudes(:, 0), attitude)
-    next_look = 1
-    half_way = max(1_int64, int(0.5_dp*most_steps, int64))
-    t_half = 0.0_dp
-    decay = 0
-    tries = 0
-    do
-      now%scale = max(now%scale, abs(now%w(1)), abs(now%w(2)), abs(now%w(3)))
-      call shorten_to(farthest, coupling*now%scale, h)
-      call fit_to_end(h, rest, at_end)
-      allowed = local_tolerance*now%scale
-      ! Four at once: numbers stored one by one could not be loaded together without a wait.
-      do i = 1, 4
-        s%terms(i, 0) = now%w(i)
-        s%factors(i) = h*coefficients(i)
-      end do
-      call torque_terms_at(constant, rate, now%t, now%t_low, h, order, longest, now%since == 0, &
-                           waves, s%torque)
-      if (with_attitude) then
-        do i = 1, 4
-          s%turns(i, 0) = attitude%q(i)
-          s%half(i) = 0.5_dp*h
-        end do
-        s%weight = now%scale
-        call expand_both(order, s)
-      else
-        call expand(order, s)
-      end if
-      if (found%steps == 0) then
-        call predict_step(h, s, order, part, allowed, decay, next)
-        ! The scale of a body at rest is the omega that it is about to reach.
-        now%scale = max(now%scale, min(huge(h), maxval(abs(s%terms(:3, 1:4)))))
+    associate (s => room%s, blocks => room%blocks, now => room%now, attitude => room%attitude)
+      now = state_t([request%omega, 0.0_dp], 0.0_dp, 0.0_dp, 0.0_dp, &
+                    max(abs(request%omega(1)), abs(request%omega(2)), abs(request%omega(3))), &
+                    0.0_dp, 0.0_dp, 0)
+      call plan(problem, now%scale, attempt%tolerance, rest, with_attitude, order, &
+                local_tolerance, h)
+      found%finest = local_tolerance <= LEAST_LOCAL_TOLERANCE
+      part = 65536/order
+      coupling = coupling_of(problem%coefficients)
+      farthest = merge(A_PRECISE_STEP, A_STEP, attempt%precise)
+      lasting = steps_by_turns(local_tolerance)
+      if (size(waves) > 0) longest = longest_turn(order, local_tolerance)
+      s%torque = 0.0_dp
+      coefficients = [problem%coefficients, 0.0_dp]
+      steady(:, 1) = [problem%constant, 0.0_dp]
+      steady(:, 2) = [problem%rate, 0.0_dp]
+      call begin(attempt%precise, s%lanes, blocks)
+      s%weight = 0.0_dp
+      if (with_attitude) call begin_attitude(solution%attitudes(:, 0), attitude)
+      next_look = 1
+      half_way = max(1_int64, int(0.5_dp*attempt%most_steps, int64))
+      t_half = 0.0_dp
+      decay = 0
+      tries = 0
+      do
+        now%scale = max(now%scale, abs(now%w(1)), abs(now%w(2)), abs(now%w(3)))
+        call shorten_to(farthest, coupling*now%scale, h)
+        call fit_to_end(h, rest, at_end)
         allowed = local_tolerance*now%scale
-        if (with_attitude) s%weight = now%scale
-      end if
-      last = size_of(s, order)
-      ! From rest, a torque that grows with time makes only every third term.
-      if (found%steps == 0) last = last + size_of(s, order - 2)
-      call predict_step(h, s, order, part, allowed, decay, next)
-      if ((.not. last <= SLACK*allowed) .or. (found%steps == 0 .and. tries == 0)) then
-        ! The first step is a guess, and a later one may be too long: the terms are only rescaled.
-        tries = tries + 1
-        if (.not. last <= huge(h)) then
-          if (tries > MOST_TRIES) then
-            found%status = OVERFLOW
-            exit
-          end if
-          h = h*0.0625_dp
-          if (size(waves) > MANY_WAVES) then
-            if (interrupt_raised() /= 0) then
-              found%status = INTERRUPTED
+        ! Four at once: numbers stored one by one could not be loaded together without a wait.
+        do i = 1, 4
+          s%terms(i, 0) = now%w(i)
+          s%factors(i) = h*coefficients(i)
+        end do
+        call torque_terms_at(steady, [now%t, now%t_low], h, order, longest, now%since == 0, waves, &
+                             s%torque)
+        if (with_attitude) then
+          do i = 1, 4
+            s%turns(i, 0) = attitude%q(i)
+            s%half(i) = 0.5_dp*h
+          end do
+          s%weight = now%scale
+          call expand_both(order, s)
+        else
+          call expand(order, s)
+        end if
+        if (found%steps == 0) then
+          call predict_step(h, s, order, part, allowed, decay, next)
+          ! The scale of a body at rest is the omega that it is about to reach.
+          now%scale = max(now%scale, min(huge(h), maxval(abs(s%terms(:3, 1:4)))))
+          allowed = local_tolerance*now%scale
+          if (with_attitude) s%weight = now%scale
+        end if
+        last = size_of(s, order)
+        ! From rest, a torque that grows with time makes only every third term.
+        if (found%steps == 0) last = last + size_of(s, order - 2)
+        call predict_step(h, s, order, part, allowed, decay, next)
+        if ((.not. last <= SLACK*allowed) .or. (found%steps == 0 .and. tries == 0)) then
+          ! The first step is a guess, and a later one may be too long: the terms are only rescaled.
+          tries = tries + 1
+          if (.not. last <= huge(h)) then
+            if (tries > MOST_TRIES) then
+              solution%status = OVERFLOW
               exit
             end if
+            h = h*0.0625_dp
+            if (size(waves) > MANY_WAVES) then
+              if (interrupt_raised() /= 0) then
+                solution%status = INTERRUPTED
+                exit
+              end if
+            end if
+            cycle
           end if
-          cycle
+          next = fitting(h, last, order, allowed)
+          call shorten_to(farthest, coupling*now%scale, next)
+          if (abs(next) > abs(rest)) next = rest
+          at_end = abs(next) >= abs(rest)
+          if (.not. at_end .and. abs(rest) < 4.0_dp*abs(next)) next = rest/ceiling(rest/next)
+          call rescale(s, order, next/h, with_attitude)
+          now%since = lasting
+          h = next
         end if
-        next = fitting(h, last, order, allowed)
-        call shorten_to(farthest, coupling*now%scale, next)
-        if (abs(next) > abs(rest)) next = rest
-        at_end = abs(next) >= abs(rest)
-        if (.not. at_end .and. abs(rest) < 4.0_dp*abs(next)) next = rest/ceiling(rest/next)
-        call rescale(s, order, next/h, with_attitude)
-        now%since = lasting
+        error = s%lanes(1, :)
+        if (attempt%precise) then
+          call propagate_precisely(s)
+        else
+          call propagate_variations(s)
+        end if
+        call estimate_truncation(s, order, 1.0_dp/max(allowed, tiny(h)), left)
+        if (found%steps < FEW_STEPS) then
+          from_rest = found%steps == 0 .and. .not. maxval(abs(request%omega)) > 0.0_dp
+          if (from_rest) then
+            call estimate_truncation_from_rest(s, order, 1.0_dp/max(allowed, tiny(h)), left)
+          end if
+          found%least = max(found%least, likely_remainder(order, s%terms)/max(now%scale, tiny(h)))
+        end if
+        if (with_attitude) then
+          found%least = max(found%least, 2.0_dp*likely_remainder(order, s%turns))
+          call turn_error(s, order, from_rest, error, s%lanes(1, :) + left(:3), &
+                          attitude)
+        end if
+        n_before = solution%n_rows
+        call add_rows(room, order, h, at_end, error, left(:3), request, solution)
+        if (solution%status /= COMPLETE) exit
+        call count_step(attempt%precise, solution%n_rows > n_before, s%lanes, blocks)
+        if (blocks%steps == 0) then
+          ! Not at every step, to save time.
+          now%peak = max(now%peak, maxval(abs(error)))
+          if (with_attitude) attitude%peak = max(attitude%peak, sum(abs(attitude%error)))
+        end if
+        call add_change(s%change, now)
+        if (with_attitude) call turn_on(s, attitude)
+        found%steps = found%steps + 1
+        ! Where products overflow, a step may be accepted that has no meaning.
+        if (.not. now%scale > LARGEST) tries = 1
+        if (.not. all(abs(now%w) <= huge(h))) then
+          solution%status = OVERFLOW
+          exit
+        end if
+        if (at_end) then
+          call add_last_row(room, order, request, solution)
+          exit
+        end if
+        now%since = merge(0, now%since + 1, now%since + 1 >= lasting)
+        if (now%since > 0) call turn_waves(waves)
+        call two_sum((now%t), h + now%t_low, now%t, now%t_low)
+        rest = (t_end - now%t) - now%t_low
         h = next
-      end if
-      error = s%lanes(1, :)
-      if (precise) then
-        call propagate_precisely(s)
-      else
-        call propagate_variations(s)
-      end if
-      call estimate_truncation(s, order, 1.0_dp/max(allowed, tiny(h)), left)
-      if (found%steps < FEW_STEPS) then
-        from_rest = found%steps == 0 .and. .not. maxval(abs(omega)) > 0.0_dp
-        if (from_rest) then
-          call estimate_truncation_from_rest(s, order, 1.0_dp/max(allowed, tiny(h)), left)
+        if (found%steps >= next_look) then
+          if (real(found%steps, dp) >= attempt%most_steps) then
+            ! Extrapolate the steps so far in proportion to the time, or faster if the motion
+            ! becomes faster.
+            found%ahead = 1.0_dp
+            if (found%steps > half_way .and. abs(now%t) > abs(t_half)) then
+              found%ahead = log(real(found%steps, dp)/real(half_way, dp))/log(now%t/t_half)
+            end if
+            found%ahead = merge(min(3.0_dp, found%ahead), 1.0_dp, found%ahead > GROWING)
+            found%ahead = real(found%steps, dp)*exp(found%ahead*log(1.0_dp + abs(rest/now%t)))
+            solution%status = GAVE_UP
+          else if (found%steps == 1 .and. abs(rest) > (HOPELESS*attempt%most_steps)*abs(h)) then
+            found%ahead = abs(rest)/max(abs(h), tiny(h))
+            solution%status = GAVE_UP
+          else if (found%steps > 1) then
+            if (interrupt_raised() /= 0) solution%status = INTERRUPTED
+          end if
+          if (solution%status /= COMPLETE) exit
+          next_look = min(found%steps + attempt%stride, &
+                          max(found%steps + 1, int(attempt%most_steps, int64)))
+          if (found%steps == half_way) t_half = now%t
+          if (found%steps < half_way) next_look = min(next_look, half_way)
         end if
-        found%least = max(found%least, likely_remainder(order, s%terms)/max(now%scale, tiny(h)))
+      end do
+      call growths_of(attempt%precise, s%lanes, blocks, found%growth, found%largest)
+      found%precise_steps = coupling*now%scale*abs(t_end)/A_PRECISE_STEP
+      found%scale = now%scale
+      found%error = now%worst
+      if (.not. maxval(abs(s%lanes(1, :))) <= found%error) found%error = maxval(abs(s%lanes(1, :)))
+      if (now%scale > 0.0_dp) then
+        found%error = found%error/now%scale
+        found%least = max(found%least, BY_CHANCE*(now%peak/now%scale))
       end if
       if (with_attitude) then
-        found%least = max(found%least, 2.0_dp*likely_remainder(order, s%turns))
-        call turn_error(s, order, from_rest, error, s%lanes(1, :) + left(:3), &
-                        attitude)
+        found%least = max(found%least, (2.0_dp*BY_CHANCE)*attitude%peak)
+        found%way = 1.0_dp + 0.5_dp*now%scale*abs(t_end)
+        if (.not. attitude%worst <= found%error) found%error = attitude%worst
       end if
-      n_before = found%n_rows
-      call add_rows(s, order, h, at_end, error, left(:3), times, tolerance, now, attitude, rows, &
-                    n_attitudes, attitudes, found)
-      if (found%status /= COMPLETE) exit
-      call count_step(precise, found%n_rows > n_before, s%lanes, blocks)
-      if (blocks%steps == 0) then
-        ! Not at every step, to save time.
-        now%peak = max(now%peak, maxval(abs(error)))
-        if (with_attitude) attitude%peak = max(attitude%peak, sum(abs(attitude%error)))
-      end if
-      call add_change(s%change, now)
-      if (with_attitude) call turn_on(s, attitude)
-      found%steps = found%steps + 1
-      ! Where products overflow, a step may be accepted that has no meaning.
-      if (.not. now%scale > LARGEST) tries = 1
-      if (.not. all(abs(now%w) <= huge(h))) then
-        found%status = OVERFLOW
-        exit
-      end if
-      if (at_end) then
-        call add_last_row(s%lanes(1, :), order, tolerance, now, attitude, rows, n_attitudes, &
-                          attitudes, found)
-        exit
-      end if
-      now%since = merge(0, now%since + 1, now%since + 1 >= lasting)
-      if (now%since > 0) call turn_waves(waves)
-      call two_sum((now%t), h + now%t_low, now%t, now%t_low)
-      rest = (times(n_times) - now%t) - now%t_low
-      h = next
-      if (found%steps >= next_look) then
-        if (real(found%steps, dp) >= most_steps) then
-          ! Extrapolate the steps so far in proportion to the time, or faster if the motion becomes
-          ! faster.
-          found%ahead = 1.0_dp
-          if (found%steps > half_way .and. abs(now%t) > abs(t_half)) then
-            found%ahead = log(real(found%steps, dp)/real(half_way, dp))/log(now%t/t_half)
-          end if
-          found%ahead = merge(min(3.0_dp, found%ahead), 1.0_dp, found%ahead > GROWING)
-          found%ahead = real(found%steps, dp)*exp(found%ahead*log(1.0_dp + abs(rest/now%t)))
-          found%status = GAVE_UP
-        else if (found%steps == 1 .and. abs(rest) > (HOPELESS*most_steps)*abs(h)) then
-          found%ahead = abs(rest)/max(abs(h), tiny(h))
-          found%status = GAVE_UP
-        else if (found%steps > 1) then
-          if (interrupt_raised() /= 0) found%status = INTERRUPTED
-        end if
-        if (found%status /= COMPLETE) exit
-        next_look = min(found%steps + stride, max(found%steps + 1, int(most_steps, int64)))
-        if (found%steps == half_way) t_half = now%t
-        if (found%steps < half_way) next_look = min(next_look, half_way)
-      end if
-    end do
-    call growths_of(precise, s%lanes, blocks, found%growth, found%largest)
-    found%precise_steps = coupling*now%scale*abs(times(n_times))/A_PRECISE_STEP
-    found%scale = now%scale
-    found%error = now%worst
-    if (.not. maxval(abs(s%lanes(1, :))) <= found%error) found%error = maxval(abs(s%lanes(1, :)))
-    if (now%scale > 0.0_dp) then
-      found%error = found%error/now%scale
-      found%least = max(found%least, BY_CHANCE*(now%peak/now%scale))
-    end if
-    if (with_attitude) then
-      found%least = max(found%least, (2.0_dp*BY_CHANCE)*attitude%peak)
-      found%way = 1.0_dp + 0.5_dp*now%scale*abs(times(n_times))
-      if (.not. attitude%worst <= found%error) found%error = attitude%worst
-    end if
-    if (.not. found%error <= NO_DIGIT) found%error = NO_DIGIT
+      if (.not. found%error <= NO_DIGIT) found%error = NO_DIGIT
+    end associate
   end subroutine march
 
   pure real(dp) function coupling_of(coefficients)

@@ -11,7 +11,7 @@ module taylor_plan
 
   real(dp), parameter :: ALIKE = 0.05_dp ! weight of a radian of a wave in the local tolerance
 
-  public :: add_wave_rates, plan, tolerance_and_step, steady_rates
+  public :: add_wave_rates, first_step, local_tolerance_of, plan, steady_rates
 
 contains
 
@@ -45,13 +45,9 @@ contains
     do n = 1, problem%n_cosines
       call add_wave_rates(problem%cosines(:, n), .false., coupling, time, gain, rate, turned)
     end do
-    if (with_attitude) then
-      call tolerance_and_step(max(coupling, 1.0_dp), scale, gain, rate, turned, tolerance, time, &
-                              local_tolerance, h)
-    else
-      call tolerance_and_step(coupling, scale, gain, rate, turned, tolerance, time, &
-                              local_tolerance, h)
-    end if
+    if (with_attitude) coupling = max(coupling, 1.0_dp)
+    h = first_step(rate, time)
+    local_tolerance = local_tolerance_of(coupling, scale, gain, turned, tolerance, time)
     order = order_for(local_tolerance)
   end subroutine plan
 
@@ -73,22 +69,26 @@ contains
     end if
   end subroutine steady_rates
 
-  elemental subroutine tolerance_and_step(coupling, scale, gain, rate, turned, tolerance, time, &
-                                          local_tolerance, h)
-    !! Compute the local tolerance and the first step. An error of omega becomes an error of phase,
-    !! which grows with time and affects all later phases. The weights come from random scenes.
-    !! Waves require more steps, whose errors may all have one sign.
-    real(dp), intent(in) :: coupling, scale, gain, rate, turned, tolerance, time
-    real(dp), intent(out) :: local_tolerance !! largest last terms over the scale
-    real(dp), intent(out) :: h              !! the first step, s
+  elemental real(dp) function first_step(rate, time)
+    !! Return the first step, s.
+    real(dp), intent(in) :: rate            !! rate of change, 1/s
+    real(dp), intent(in) :: time            !! time to go, s
+
+    first_step = time
+    if (rate*abs(time) > 0.5_dp) first_step = sign(0.5_dp/rate, time)
+  end function first_step
+
+  elemental real(dp) function local_tolerance_of(coupling, scale, gain, turned, tolerance, time)
+    !! Return the local tolerance: the largest last terms over the scale. An error of omega becomes
+    !! an error of phase, which grows with time and affects all later phases. The weights come from
+    !! random scenes. Waves require more steps, whose errors may all have one sign.
+    real(dp), intent(in) :: coupling, scale, gain, turned, tolerance, time
     real(dp) :: way                         ! weighted rotation of the body, rad
 
-    h = time
-    if (rate*abs(time) > 0.5_dp) h = sign(0.5_dp/rate, time)
     way = coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain)
-    local_tolerance = tolerance/(8.0_dp + way + way*(way/14.0_dp) + ALIKE*turned)
-    local_tolerance = max(local_tolerance, LEAST_LOCAL_TOLERANCE)
-  end subroutine tolerance_and_step
+    local_tolerance_of = tolerance/(8.0_dp + way + way*(way/14.0_dp) + ALIKE*turned)
+    local_tolerance_of = max(local_tolerance_of, LEAST_LOCAL_TOLERANCE)
+  end function local_tolerance_of
 
   pure subroutine add_wave_rates(wave, is_sine, coupling, time, gain, rate, turned)
     !! Add the contributions of one wave to the omega that may be added and to the rate of change.

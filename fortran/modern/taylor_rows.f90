@@ -4,9 +4,10 @@ module taylor_rows
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
+  use problem, only: request_t, solution_t
   use statuses, only: INTERRUPTED, OVERFLOW
   use taylor_attitude, only: add_attitude_row, attitude_t
-  use taylor_error, only: rise
+  use taylor_error, only: blocks_t, rise
   use taylor_series, only: evaluate, series_t
   implicit none(type, external)
   private
@@ -27,10 +28,17 @@ module taylor_rows
     integer :: since      ! steps since the sines of waves were computed; 0: compute them
   end type state_t
 
-  ! The outcome of an integration.
+  ! Working storage of an integration. A type aligns columns of four to the loads of a register,
+  ! which Fortran cannot request of a variable.
+  type, public :: room_t
+    type(series_t) :: s
+    type(blocks_t) :: blocks
+    type(state_t) :: now
+    type(attitude_t) :: attitude
+  end type room_t
+
+  ! The outcome of an integration, beside its rows and status.
   type, public :: outcome_t
-    integer :: status
-    integer :: n_rows
     integer(int64) :: steps
     real(dp) :: error    ! largest of a row, relative, before it was subtracted
     real(dp) :: least    ! lower bound, for estimates that are too small, relative
@@ -47,84 +55,77 @@ module taylor_rows
 
 contains
 
-  subroutine add_rows(s, order, h, at_end, before, left, times, tolerance, now, attitude, rows, &
-                      n_attitudes, attitudes, found)
+  subroutine add_rows(room, order, h, at_end, before, left, request, solution)
     !! Compute the rows within the step, except the last of all, from its terms. The error between
     !! the ends of the step follows Hermite's cubic.
-    type(series_t), intent(in) :: s
+    type(room_t), intent(inout) :: room     !! its state and attitude note the largest error
     integer, intent(in) :: order
     real(dp), intent(in) :: h               !! s
     logical, intent(in) :: at_end
     real(dp), intent(in) :: before(3)       !! error at the step's beginning, rad/s
     real(dp), intent(in) :: left(3)         !! truncation error of the step, rad/s
-    real(dp), intent(in) :: times(:)        !! s
-    real(dp), intent(in) :: tolerance
-    type(state_t), intent(inout) :: now
-    type(attitude_t), intent(inout) :: attitude
-    real(dp), intent(inout) :: rows(:, :)
-    integer, intent(in) :: n_attitudes
-    real(dp), intent(inout) :: attitudes(4, 0:n_attitudes)
-    type(outcome_t), intent(inout) :: found !! n_rows and status change
+    type(request_t), intent(in) :: request
+    type(solution_t), intent(inout) :: solution
     real(dp) :: rises(3, 2)  ! rate of the error at either end, times the step
     real(dp) :: carried(3)   ! propagated error at the end, without truncation, rad/s
     real(dp) :: change(4)    ! of omega, rad/s
     real(dp) :: part, to_go
     integer :: last
 
-    last = size(times)
-    if (at_end) last = last - 1
-    if (found%n_rows >= last) return
-    if (abs(times(found%n_rows + 1) - now%t) > abs(h)) return
-    rises(:, 1) = rise(s%factors(:3), now%w(:3), before)
-    carried = s%lanes(1, :) + left
-    rises(:, 2) = rise(s%factors(:3), now%w(:3) + s%change(:3), carried)
-    do while (found%n_rows < last)
-      if (abs(times(found%n_rows + 1) - now%t) > abs(h)) exit
-      part = ((times(found%n_rows + 1) - now%t) - now%t_low)/h
-      to_go = 1.0_dp - part
-      change = evaluate(order, s%terms, part)
-      call add_row(now%w(:3), now%w_low(:3) + change(:3), &
-                   (to_go*to_go)*((1.0_dp + 2.0_dp*part)*before + part*rises(:, 1)) &
-                   + (part*part)*((1.0_dp + 2.0_dp*to_go)*carried - to_go*rises(:, 2)) &
-                   - part**(order + 1)*left, tolerance, now, rows(:, found%n_rows + 1))
-      if (.not. all(abs(rows(:, found%n_rows + 1)) <= huge(h))) then
-        found%status = OVERFLOW
-        return
-      end if
-      if (n_attitudes > 0) then
-        call add_attitude_row(attitude%q_low + evaluate(order, s%turns, part), order, part, &
-                              min(LINEAR, tolerance), attitude, &
-                              attitudes(:, found%n_rows + 1))
-      end if
-      found%n_rows = found%n_rows + 1
-      if (mod(found%n_rows, ROWS_BETWEEN_LOOKS) == 0) then
-        if (interrupt_raised() /= 0) then
-          found%status = INTERRUPTED
+    associate (s => room%s, now => room%now, attitude => room%attitude, times => request%times)
+      last = size(times)
+      if (at_end) last = last - 1
+      if (solution%n_rows >= last) return
+      if (abs(times(solution%n_rows + 1) - now%t) > abs(h)) return
+      rises(:, 1) = rise(s%factors(:3), now%w(:3), before)
+      carried = s%lanes(1, :) + left
+      rises(:, 2) = rise(s%factors(:3), now%w(:3) + s%change(:3), carried)
+      do while (solution%n_rows < last)
+        if (abs(times(solution%n_rows + 1) - now%t) > abs(h)) exit
+        part = ((times(solution%n_rows + 1) - now%t) - now%t_low)/h
+        to_go = 1.0_dp - part
+        change = evaluate(order, s%terms, part)
+        call add_row(now%w(:3), now%w_low(:3) + change(:3), &
+                     (to_go*to_go)*((1.0_dp + 2.0_dp*part)*before + part*rises(:, 1)) &
+                     + (part*part)*((1.0_dp + 2.0_dp*to_go)*carried - to_go*rises(:, 2)) &
+                     - part**(order + 1)*left, &
+                     request%tolerance, now, solution%rows(:, solution%n_rows + 1))
+        if (.not. all(abs(solution%rows(:, solution%n_rows + 1)) <= huge(h))) then
+          solution%status = OVERFLOW
           return
         end if
-      end if
-    end do
+        if (associated(solution%attitudes)) then
+          call add_attitude_row(attitude%q_low + evaluate(order, s%turns, part), order, part, &
+                                min(LINEAR, request%tolerance), attitude, &
+                                solution%attitudes(:, solution%n_rows + 1))
+        end if
+        solution%n_rows = solution%n_rows + 1
+        if (mod(solution%n_rows, ROWS_BETWEEN_LOOKS) == 0) then
+          if (interrupt_raised() /= 0) then
+            solution%status = INTERRUPTED
+            return
+          end if
+        end if
+      end do
+    end associate
   end subroutine add_rows
 
-  pure subroutine add_last_row(error, order, tolerance, now, attitude, rows, n_attitudes, &
-                               attitudes, found)
+  pure subroutine add_last_row(room, order, request, solution)
     !! Compute the row at the end of the last step, after omega and attitude have been advanced.
-    real(dp), intent(in) :: error(3)        !! rad/s
+    type(room_t), intent(inout) :: room     !! its state and attitude note the largest error
     integer, intent(in) :: order
-    real(dp), intent(in) :: tolerance
-    type(state_t), intent(inout) :: now
-    type(attitude_t), intent(inout) :: attitude
-    real(dp), intent(inout) :: rows(:, :)
-    integer, intent(in) :: n_attitudes
-    real(dp), intent(inout) :: attitudes(4, 0:n_attitudes)
-    type(outcome_t), intent(inout) :: found !! n_rows changes
+    type(request_t), intent(in) :: request
+    type(solution_t), intent(inout) :: solution
 
-    found%n_rows = size(rows, 2)
-    call add_row(now%w(:3), now%w_low(:3), error, tolerance, now, rows(:, found%n_rows))
-    if (n_attitudes > 0) then
-      call add_attitude_row(attitude%q_low, order, 1.0_dp, min(LINEAR, tolerance), attitude, &
-                            attitudes(:, found%n_rows))
-    end if
+    solution%n_rows = size(solution%rows, 2)
+    associate (now => room%now, n => solution%n_rows)
+      call add_row(now%w(:3), now%w_low(:3), room%s%lanes(1, :), request%tolerance, now, &
+                   solution%rows(:, n))
+      if (associated(solution%attitudes)) then
+        call add_attitude_row(room%attitude%q_low, order, 1.0_dp, min(LINEAR, request%tolerance), &
+                              room%attitude, solution%attitudes(:, n))
+      end if
+    end associate
   end subroutine add_last_row
 
   pure subroutine add_row(w, small, error, tolerance, now, row)

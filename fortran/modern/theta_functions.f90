@@ -140,16 +140,19 @@ contains
     if (theta%kind == HYPERBOLIC) theta%drift = 2.0_dp*e/PI
   end subroutine take_exponentials
 
-  pure subroutine start_of_phase(theta, k, comodulus, slope, cn, sn, dn, phase, phase_low)
+  pure subroutine start_of_phase(theta, k, comodulus, slope, values, phase, phase_low)
     !! Compute the phase that has these functions, by Landen's transformation, and its rounding
     !! error, by the difference that the series then show; near the separatrix it counts.
     type(theta_t), intent(in) :: theta
     real(dp), intent(in) :: k, comodulus
     real(dp), intent(in) :: slope       !! v over u; x over u on the separatrix
-    real(dp), intent(in) :: cn, sn, dn  !! cn and dn are not negative
+    real(dp), intent(in) :: values(3)   !! cn, sn, dn; cn and dn are not negative
     real(dp), intent(out) :: phase, phase_low
-    real(dp) :: s, c, delta, part, found(3)
+    real(dp) :: cn, sn, dn, s, c, delta, part, found(3)
 
+    cn = values(1)
+    sn = values(2)
+    dn = values(3)
     if (theta%kind == ENDLESS) then
       phase = sign(0.5_dp*log((1.0_dp + abs(sn))/dn), sn)
     else

@@ -24,17 +24,21 @@ module torque_free_attitude
   real(dp), parameter :: LAST = 1e-17_dp      ! last term; the means then differ by less
   real(dp), parameter :: FAINT = 1e-240_dp    ! squares of smaller perturbations would underflow
 
+  ! Differences that determine an orbit, without sign.
+  type :: gaps_t
+    type(pair_t) :: d12, d13, d23  ! of the moments
+    type(pair_t) :: e1, e2, e3     ! d13 omega1**2 I1 + d23 omega2**2 I2 and so on
+  end type gaps_t
+
   public :: torque_free_attitude_rows
 
 contains
 
-  subroutine torque_free_attitude_rows(moments, moments_low, omega0, attitude0, n_times, times, &
-                                       rows, attitudes, n_rows, status)
+  subroutine torque_free_attitude_rows(moments, start, n_times, times, rows, attitudes, n_rows, &
+                                       status)
     !! Compute angular velocity and attitude of a torque-free body at each of `times`.
-    real(dp), intent(in) :: moments(3)       !! kg m2, or in any unit
-    real(dp), intent(in) :: moments_low(3)   !! low-order parts of the moments (double-double)
-    real(dp), intent(in) :: omega0(3)        !! at time 0, rad/s, finite
-    real(dp), intent(in) :: attitude0(4)     !! at time 0, any norm
+    real(dp), intent(in) :: moments(3, 2)    !! in any unit; column 2: low parts (double-double)
+    real(dp), intent(in) :: start(7)         !! omega, rad/s, finite, and attitude of any norm
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)   !! s, in any order, finite
     real(dp), intent(out) :: rows(3, n_times) !! rad/s
@@ -45,7 +49,7 @@ contains
     integer :: i
 
     n_rows = 0
-    call prepare(moments, moments_low, omega0, attitude0, orbit, status)
+    call prepare(moments(:, 1), moments(:, 2), start(:3), start(4:), orbit, status)
     if (status /= COMPLETE) return
     do i = 1, n_times
       call evaluate(orbit, times(i), rows(:, i), attitudes(:, i), status)
@@ -68,9 +72,9 @@ contains
     real(dp) :: moment(3)   ! moments along the axes of the orbit, scaled to near 1
     real(dp) :: w(3)        ! angular velocity along them
     type(pair_t) :: exact(3) ! the moments in double-double
-    type(pair_t) :: d12, d13, d23  ! differences of the moments, without sign
     type(pair_t) :: energies(3)    ! I omega**2
-    type(pair_t) :: e1, e2, e3     ! d13 omega1**2 I1 + d23 omega2**2 I2 and so on
+    type(gaps_t) :: gaps
+    type(pair_t) :: d12
     integer :: i, power
 
     status = REFUSED
@@ -93,37 +97,38 @@ contains
     do i = 1, 3
       exact(i) = pair_t(moment(i), scale(moments_low(orbit%axes(i)), -power))
     end do
-    d12 = unsigned(exact(1) - exact(2))
-    d13 = unsigned(exact(1) - exact(3))
-    d23 = unsigned(exact(2) - exact(3))
+    gaps%d12 = unsigned(exact(1) - exact(2))
+    gaps%d13 = unsigned(exact(1) - exact(3))
+    gaps%d23 = unsigned(exact(2) - exact(3))
     energies = [product_of(w(1), w(1))*exact(1), product_of(w(2), w(2))*exact(2), &
                 product_of(w(3), w(3))*exact(3)]
-    e2 = energies(3)*d23 - energies(1)*d12
-    if (abs(e2%high) <= CANCELLED*energies(3)%high*d23%high) then
-      e2 = narrow_gap(exact, w, energies, d12, d23)
+    gaps%e2 = energies(3)*gaps%d23 - energies(1)*gaps%d12
+    if (abs(gaps%e2%high) <= CANCELLED*energies(3)%high*gaps%d23%high) then
+      gaps%e2 = narrow_gap(exact, w, energies, gaps%d12, gaps%d23)
     end if
-    if (e2%high < 0.0_dp) then
+    if (gaps%e2%high < 0.0_dp) then
       ! Omega about the other extreme axis keeps its sign.
       orbit%axes = orbit%axes([3, 2, 1])
       exact = exact([3, 2, 1])
       w = w([3, 2, 1])
       energies = energies([3, 2, 1])
-      e1 = d12
-      d12 = d23
-      d23 = e1
-      e2 = pair_t(-e2%high, -e2%low)
+      d12 = gaps%d12
+      gaps%d12 = gaps%d23
+      gaps%d23 = d12
+      gaps%e2 = pair_t(-gaps%e2%high, -gaps%e2%low)
     end if
-    e1 = energies(1)*d13 + energies(2)*d23
-    e3 = energies(3)*d13 + energies(2)*d12
+    gaps%e1 = energies(1)*gaps%d13 + energies(2)*gaps%d23
+    gaps%e3 = energies(3)*gaps%d13 + energies(2)*gaps%d12
     call take_signs(w, orbit)
 
-    if (.not. d23%high*e3%high > 0.0_dp .or. .not. max(abs(w(1)), abs(w(3))) > 0.0_dp) then
+    if (.not. gaps%d23%high*gaps%e3%high > 0.0_dp &
+        .or. .not. max(abs(w(1)), abs(w(3))) > 0.0_dp) then
       call prepare_steady(w, orbit)
-    else if (energies(3)%high*d13%high <= FAINT*e3%high) then
+    else if (energies(3)%high*gaps%d13%high <= FAINT*gaps%e3%high) then
       ! About the middle axis, except for a negligible perturbation.
       status = REFUSED
     else
-      call prepare_orbit(exact, w, energies, d12, d13, d23, e1, e2, e3, orbit)
+      call prepare_orbit(exact, w, energies, gaps, orbit)
     end if
   end subroutine prepare
 
@@ -189,11 +194,12 @@ contains
     orbit%direction = w/speed%high
   end subroutine prepare_steady
 
-  pure subroutine prepare_orbit(exact, w, energies, d12, d13, d23, e1, e2, e3, orbit)
+  pure subroutine prepare_orbit(exact, w, energies, gaps, orbit)
     !! Compute rates, phase and theta series of a motion that is not steady.
     type(pair_t), intent(in) :: exact(3) !! moments
     real(dp), intent(in) :: w(3)
-    type(pair_t), intent(in) :: energies(3), d12, d13, d23, e1, e2, e3
+    type(pair_t), intent(in) :: energies(3)
+    type(gaps_t), intent(in) :: gaps
     type(orbit_t), intent(inout) :: orbit
     real(dp) :: moment(3)   ! in double precision
     real(dp) :: largest(3)  ! largest omega during the motion
@@ -207,17 +213,19 @@ contains
     moment = exact%high
     momentum = root(energies(1)*exact(1) + energies(2)*exact(2) + energies(3)*exact(3))
     inertia = root(exact(1)*exact(2)*exact(3))
-    pole = [d12%high*moment(3)/(d23%high*moment(1)), e1%high*moment(1)/(e3%high*moment(3))]
+    pole = [gaps%d12%high*moment(3)/(gaps%d23%high*moment(1)), &
+            gaps%e1%high*moment(1)/(gaps%e3%high*moment(3))]
     k = sqrt(pole(1)*pole(2))
-    largest = sqrt([e1%high/(moment(1)*d13%high), e1%high/(moment(2)*d23%high), &
-                    e3%high/(moment(3)*d13%high)])
+    largest = sqrt([gaps%e1%high/(moment(1)*gaps%d13%high), &
+                    gaps%e1%high/(moment(2)*gaps%d23%high), &
+                    gaps%e3%high/(moment(3)*gaps%d13%high)])
     orbit%sense = sign(1.0_dp, moment(3) - moment(1))
     orbit%direction = moment/momentum%high
-    scales(1) = root(d23*e3)
-    if (e2%high > 0.0_dp) then
-      scales(2) = root(d13*e2)
+    scales(1) = root(gaps%d23*gaps%e3)
+    if (gaps%e2%high > 0.0_dp) then
+      scales(2) = root(gaps%d13*gaps%e2)
       comodulus = scales(2)%high/scales(1)%high
-      call take_rates(exact, momentum, inertia, scales, d12, d13, d23, e1, e3, pole, orbit)
+      call take_rates(exact, momentum, inertia, scales, gaps, pole, orbit)
     else
       comodulus = 0.0_dp
       orbit%frequency = scales(1)/inertia*0.5_dp
@@ -226,13 +234,13 @@ contains
     slope = orbit%frequency%high*inertia%high/scales(1)%high
     call theta_series(pole, k, comodulus, orbit%theta)
     if (orbit%theta%kind == HYPERBOLIC) then
-      call take_ratio(scales(1), root(d12*e1), orbit%frequency*inertia, orbit%theta%ratio)
+      call take_ratio(scales(1), root(gaps%d12*gaps%e1), orbit%frequency*inertia, orbit%theta%ratio)
     end if
     orbit%start = pair_t(0.0_dp, 0.0_dp)
-    if (e1%high > FAINT*e3%high) then
-      call start_of_phase(orbit%theta, k, comodulus, slope, w(1)/largest(1), &
-                          orbit%sense*w(2)/largest(2), w(3)/largest(3), orbit%start%high, &
-                          orbit%start%low)
+    if (gaps%e1%high > FAINT*gaps%e3%high) then
+      call start_of_phase(orbit%theta, k, comodulus, slope, &
+                          [w(1)/largest(1), orbit%sense*w(2)/largest(2), w(3)/largest(3)], &
+                          orbit%start%high, orbit%start%low)
     else
       ! About axis 3, except for a negligible perturbation.
       largest(1:2) = 0.0_dp
@@ -241,13 +249,14 @@ contains
     call take_before(orbit)
   end subroutine prepare_orbit
 
-  pure subroutine take_rates(exact, momentum, inertia, scales, d12, d13, d23, e1, e3, pole, orbit)
+  pure subroutine take_rates(exact, momentum, inertia, scales, gaps, pole, orbit)
     !! Compute the mean rates. The rate of the phase comes from the arithmetic-geometric mean. The
     !! rate of the rotation about the angular momentum is an integral of the third kind, by the sum
     !! that accompanies the mean (Gauss).
     type(pair_t), intent(in) :: exact(3) !! moments
     real(dp), intent(in) :: pole(2)
-    type(pair_t), intent(in) :: momentum, inertia, scales(2), d12, d13, d23, e1, e3
+    type(pair_t), intent(in) :: momentum, inertia, scales(2)
+    type(gaps_t), intent(in) :: gaps
     type(orbit_t), intent(inout) :: orbit
     type(pair_t) :: a, g, p, total, share, part, mean
     logical :: by_moments ! use the first pole, else the second: the one nearer to 0
@@ -256,9 +265,9 @@ contains
 
     by_moments = pole(1) < pole(2)
     if (by_moments) then
-      p = root(d13*e3*exact(2)/exact(1))
+      p = root(gaps%d13*gaps%e3*exact(2)/exact(1))
     else
-      p = momentum*root(d13*d23/exact(3))
+      p = momentum*root(gaps%d13*gaps%d23/exact(3))
     end if
     a = scales(1)
     g = scales(2)
@@ -281,11 +290,11 @@ contains
     mean%low = mean%low - half*half/(4.0_dp*mean%high)
     orbit%frequency = mean/inertia
     if (by_moments) then
-      part = exact(2)*2.0_dp - d12*total*orbit%sense
+      part = exact(2)*2.0_dp - gaps%d12*total*orbit%sense
       orbit%half_rate = momentum*part/(exact(1)*exact(2)*4.0_dp) &
                         - orbit%frequency*(0.5_dp*orbit%sense)
     else
-      part = momentum*momentum*2.0_dp + e1*total*orbit%sense
+      part = momentum*momentum*2.0_dp + gaps%e1*total*orbit%sense
       orbit%half_rate = part/(momentum*(exact(3)*4.0_dp))
     end if
   end subroutine take_rates

@@ -90,12 +90,10 @@ contains
     fours_of = (order + 11)/4
   end function fours_of
 
-  pure subroutine torque_terms_at(constant, rate, t, t_low, h, order, longest, fresh, waves, torque)
+  pure subroutine torque_terms_at(steady, t, h, order, longest, fresh, waves, torque)
     !! Compute the terms of omega around t that the torque adds, rad/s.
-    real(dp), intent(in) :: constant(4) !! 1/s2, the fourth 0
-    real(dp), intent(in) :: rate(4)    !! 1/s3
-    real(dp), intent(in) :: t          !! s
-    real(dp), intent(in) :: t_low      !! rounding error of t, s
+    real(dp), intent(in) :: steady(4, 2) !! constant torque, 1/s2, and rate, 1/s3; the fourth 0
+    real(dp), intent(in) :: t(2)       !! time and its rounding error, s
     real(dp), intent(in) :: h          !! step, s
     integer, intent(in) :: order
     real(dp), intent(in) :: longest    !! largest angle that needs no call of sine and cosine, rad
@@ -106,12 +104,12 @@ contains
     integer :: i, j, n
 
     do n = 1, size(waves)
-      call weigh(t, t_low, h, order, longest, fresh, waves(n))
+      call weigh(t(1), t(2), h, order, longest, fresh, waves(n))
     end do
     ! The constant and the linear torque start two of the sums.
     do i = 1, 4
-      p(i) = h*(constant(i) + rate(i)*t + rate(i)*t_low)
-      q(i) = (0.5_dp*h)*(h*rate(i))
+      p(i) = h*(steady(i, 1) + steady(i, 2)*t(1) + steady(i, 2)*t(2))
+      q(i) = (0.5_dp*h)*(h*steady(i, 2))
     end do
     do j = 1, merge((order + 3)/4, 1, size(waves) > 0)
       r = 0.0_dp

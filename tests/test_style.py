@@ -1,10 +1,15 @@
 """`tests/style.py`: what it reads of each kind of file, and what it leaves alone."""
 
+import re
 from pathlib import Path
 
 import pytest
 
-from tests.style import TERMS, files, findings
+from tests.style import ROOT, TERMS, files, findings
+
+_PROCEDURE = re.compile(
+    r"^(?!\s*end\b)[^!\n]*\b(?:subroutine|function)\s+(\w+)\s*\(([^)]*)\)", re.M
+)
 
 
 @pytest.mark.parametrize(
@@ -40,3 +45,14 @@ def test_each_expression_has_its_replacement() -> None:
 
 def test_sources_and_documents_of_every_language_are_read() -> None:
     assert {path.suffix for path in files()} == {".py", ".f90", ".fypp", ".c", ".js", ".md"}
+
+
+def test_kernels_have_at_most_eight_arguments() -> None:
+    """More of them go into a type. f2py reads the api files, which have none."""
+    found = {}
+    for path in (ROOT / "fortran").glob("*/*.f*"):
+        joined = re.sub(r"&\s*\n\s*&?", "", path.read_text())
+        for name, arguments in _PROCEDURE.findall(joined):
+            found[f"{path.name}: {name}"] = len(arguments.split(","))
+    assert len(found) > 200
+    assert {name: count for name, count in found.items() if count > 8} == {}

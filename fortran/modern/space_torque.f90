@@ -267,8 +267,8 @@ contains
       call two_sum((t(1)), h + t(2), t(1), t(2))
       rest = (t_end - t(1)) - t(2)
       if (found%steps >= next_look) then
-        next_look = min(found%steps + attempt%stride, max(found%steps + 1, &
-                                                  int(min(COUNTABLE, attempt%most_steps), int64)))
+        next_look = max(found%steps + 1, int(min(COUNTABLE, attempt%most_steps), int64))
+        next_look = min(found%steps + attempt%stride, next_look)
         if (found%steps == half_way) t_half = t(1)
         if (found%steps < half_way) next_look = min(next_look, half_way)
         ! Extrapolate the steps so far in proportion to the time, or faster if the motion becomes

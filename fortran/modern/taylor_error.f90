@@ -58,7 +58,7 @@ contains
     real(dp), intent(out) :: left(4)   !! truncation error, rad/s
     real(dp), dimension(4) :: uu, vv, uv, ux, vx ! products of the terms
     real(dp) :: x, u, v, w
-    real(dp) :: a, b, determinant
+    real(dp) :: a, b
     integer :: i
 
     do i = 1, 4

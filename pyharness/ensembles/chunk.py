@@ -14,7 +14,7 @@ def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
     """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)
-    found = solve_points(sweep, points(sweep, box))
+    found = solve_points(sweep, points(box))
     return {name: each.reshape(*shape, *each.shape[1:]) for name, each in found.items()}
 
 

@@ -25,7 +25,6 @@ _LONGEST = 60.0  # s
 # Number of distinct values in a sample along a dimension for which all scenes of a batch have the
 # same value.
 _PLACES = 5
-_PACE = 3e8  # bytes that are compressed and written in a second
 _FILES = 20  # largest number of chunks that are solved, or written and read, for a measurement
 
 

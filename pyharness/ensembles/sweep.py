@@ -120,7 +120,7 @@ class Sweep:
         )
 
 
-def points(sweep: Sweep, box: tuple[slice, ...]) -> list[Indices]:
+def points(box: tuple[slice, ...]) -> list[Indices]:
     """Return the indices of all scenes in a part of the grid, an array for each dimension.
 
     `box` is the part of the grid, a slice for each dimension. In the result, the index along the

@@ -22,7 +22,7 @@ def test_chunks_change_no_bit(axes: tuple[str, ...], method: str, tmp_path: Path
         axes = tuple(each for each in axes if each != TIME)
     solve = f'[solve]\nmethod = "{method}"'
     sweep = read_sweep(written(tmp_path, text(*axes, solve)))
-    every = points(sweep, tuple(slice(0, n) for n in sweep.shape))
+    every = points(tuple(slice(0, n) for n in sweep.shape))
     whole = solve_points(sweep, every)
     for size in (1, 2, 3, 7, 64):
         for first in range(0, sweep.n_scenes, size):

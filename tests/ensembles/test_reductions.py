@@ -149,7 +149,7 @@ def test_programs_side_by_side_have_the_bits_of_single_runs(axis: str, tmp_path:
     sweep = read_sweep(written(tmp_path, PROGRAM + axis))
     kinds = set()
     for chunk in range(sweep.n_chunks):
-        for _, batch in batches(sweep, points(sweep, sweep.box(chunk))):
+        for _, batch in batches(sweep, points(sweep.box(chunk))):
             at = [1, 7, batch.scene.steps]
             found = batch.run(at)
             assert batch.listing is not None

@@ -75,7 +75,7 @@ def test_chunks_cover_the_grid_once_and_hold_one_listing(tmp_path: Path) -> None
     count = np.zeros(sweep.shape, dtype=int)
     for chunk in range(sweep.n_chunks):
         count[sweep.box(chunk)] += 1
-        (held,) = {batch.listing for _, batch in batches(sweep, points(sweep, sweep.box(chunk)))}
+        (held,) = {batch.listing for _, batch in batches(sweep, points(sweep.box(chunk)))}
         assert held is not None
     assert (count == 1).all()
 
@@ -98,7 +98,7 @@ values = ["adopted", "do-variable"]
 def test_words_along_one_dimension_go_together(tmp_path: Path) -> None:
     """The four-term program has no DO variable, so a grid of the two dimensions is refused."""
     sweep = read_sweep(written(tmp_path, READINGS))
-    where = points(sweep, tuple(slice(0, n) for n in sweep.shape))
+    where = points(tuple(slice(0, n) for n in sweep.shape))
     listings = [batch.listing for _, batch in batches(sweep, where)]
     assert [(each.program, set(each.readings)) for each in listings if each] == [
         ("four-term", set()),
@@ -115,7 +115,7 @@ def test_height_and_longitude_go_over_the_sphere(tmp_path: Path) -> None:
         '[[axis]]\nfield = "omega.magnitude"\nvalues = [10.0]',
     )
     sweep = read_sweep(written(tmp_path, text(*axes)))
-    ((_, batch),) = batches(sweep, points(sweep, tuple(slice(0, n) for n in sweep.shape)))
+    ((_, batch),) = batches(sweep, points(tuple(slice(0, n) for n in sweep.shape)))
     wanted = [[0.0, 0.0, -10.0], [0.0, 0.0, -10.0], [8.0, 0.0, 6.0], [0.0, 8.0, 6.0]]
     assert np.abs(batch.omega0 - wanted).max() < 1e-14
 
@@ -149,7 +149,7 @@ def test_draws_are_what_they_are_called(how: str) -> None:
 def test_every_body_of_the_square_is_real_and_as_asked(tmp_path: Path) -> None:
     other = SQUARE.replace("square.1", "square.2").replace("0.2", "0.0")
     sweep = read_sweep(written(tmp_path, text(SQUARE, other, TILT)))
-    where = points(sweep, sweep.box(0))
+    where = points(sweep.box(0))
     ((_, batch),) = batches(sweep, where)
     low, middle, high = batch.arrays["moments"].T
     assert (low <= middle).all()
@@ -170,7 +170,7 @@ def test_fields_reach_the_scenes(tmp_path: Path) -> None:
         '[[axis]]\nfield = "tolerance"\nvalues = [1e-6, 1e-9]',
     ]
     sweep = read_sweep(written(tmp_path, text(*axes)))
-    found = list(batches(sweep, points(sweep, sweep.box(0))))
+    found = list(batches(sweep, points(sweep.box(0))))
     assert [batch.solver.tolerance for _, batch in found] == [1e-9, 1e-6]
     batch = found[0][1]
     assert len(batch.omega0) == 8

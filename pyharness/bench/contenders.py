@@ -14,7 +14,7 @@ from pyharness.compare.candidates import (
 )
 from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS
 from pyharness.model.errors import InputError
-from pyharness.model.listing import corrected, original
+from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.original.programs import PROGRAM_REGISTRY
 
@@ -71,7 +71,7 @@ def own() -> list[SceneContender]:
         name: (prepared_candidate(name, 1.0), METHODS[name].order) for name in (*FIXED_STEP, *GAUSS)
     }
     for name, program in PROGRAM_REGISTRY.items():
-        for listing in (original(name), corrected(name)):
+        for listing in (Listing.original(name), Listing.corrected(name)):
             candidate = program_candidate(listing, velocity=False)
             in_steps[candidate.name] = candidate, program.order
     return found + [

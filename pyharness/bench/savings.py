@@ -13,7 +13,7 @@ import numpy as np
 
 from pyharness.compare.timing import seconds
 from pyharness.methods.prepared import prepare
-from pyharness.model.listing import PROGRAMS, corrected
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled
@@ -62,7 +62,7 @@ def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
     one, other = (partial(rows.trajectory, constant.omega, each) for each in (times, times[-1:]))
     found.append(measured_saving("dense output", "Case 5: 100 rows", one, other))
     for program in PROGRAMS:
-        one = partial(compiled.run, replace(constant, steps=1000), corrected(program))
+        one = partial(compiled.run, replace(constant, steps=1000), Listing.corrected(program))
         found.append(
             measured_saving("velocity", f"{program}, 1000 steps", one, partial(one, velocity=False))
         )

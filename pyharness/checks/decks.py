@@ -17,7 +17,7 @@ import numpy as np
 from pyharness.checks.cells import of_cell
 from pyharness.checks.check import Check, Name
 from pyharness.checks.selection import Selection
-from pyharness.model.listing import PROGRAMS, Listing, corrected, names_of, original, switches
+from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.original.cells import cell_name
 from pyharness.original.decks import Run, compiler, deck_text, run_deck, solver_object
@@ -34,11 +34,11 @@ def listings(program: str) -> list[Listing]:
     The change activates or corrects a single defect or conjecture, or activates a single reading.
     """
     names = frozenset(switches(program))
-    found = [original(program), corrected(program)]
+    found = [Listing.original(program), Listing.corrected(program)]
     found += [Listing(program, frozenset([name])) for name in switches(program)]
     found += [Listing(program, names - {name}) for name in switches(program)]
     for reading in names_of("reading", program):
-        found += [original(program, [reading]), Listing(program, [reading])]
+        found += [Listing.original(program, [reading]), Listing(program, [reading])]
     return list(dict.fromkeys(found))
 
 

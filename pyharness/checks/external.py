@@ -23,7 +23,7 @@ from pyharness.methods.registry import METHODS, REGISTRY
 from pyharness.methods.solve import finest
 from pyharness.model.attitude import angle_between
 from pyharness.model.errors import InputError
-from pyharness.model.listing import PROGRAMS, corrected
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.original.programs import PROGRAM_REGISTRY
@@ -254,7 +254,7 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
     accuracy = finest_print * UNITS[problem.unit]
-    run = program_candidate(corrected(program), may_stop=False, velocity=False).rows
+    run = program_candidate(Listing.corrected(program), may_stop=False, velocity=False).rows
     order = PROGRAM_REGISTRY[program].order
     result, before, steps, ended = None, None, _FEWEST_STEPS, ""
     previous = 0.0

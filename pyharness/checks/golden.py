@@ -25,7 +25,7 @@ from pyharness.compare.candidates import method_candidate, program_candidate
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError
-from pyharness.model.listing import PROGRAMS, corrected, original
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.pipes import read_input
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene, toml_of
@@ -54,7 +54,9 @@ class Recorded:
     def run(self) -> Trajectory:
         """Run the program or method on the scene, and return the trajectory."""
         if self.source in PROGRAMS:
-            listing = (original if self.name.endswith("original") else corrected)(self.source)
+            listing = (Listing.original if self.name.endswith("original") else Listing.corrected)(
+                self.source
+            )
             return program_candidate(listing).rows(self.scene)
         return method_candidate(self.source, self.tolerance or 1.0).rows(self.scene)
 

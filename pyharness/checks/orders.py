@@ -17,7 +17,7 @@ from pyharness.compare.candidates import method_candidate, program_candidate
 from pyharness.compare.orders import Order, measured_order, order_of
 from pyharness.methods.registry import FIXED_STEP, METHODS
 from pyharness.methods.solve import finest
-from pyharness.model.listing import PROGRAMS, corrected
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
@@ -51,13 +51,15 @@ def orders(chosen: Selection) -> Iterator[Attempt]:
 
 
 def _of_program(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
-    program, listing = PROGRAM_REGISTRY[name.subject], corrected(name.subject)
+    program, listing = PROGRAM_REGISTRY[name.subject], Listing.corrected(name.subject)
     return judged_order(name, measured_order(scene, program, listing, truth(), _PAIRS))
 
 
 def _of_velocity(scene: Scene, truth: Callable[..., Reference], name: Name) -> Check:
     def run(scene: Scene) -> Array:
-        velocity = program_candidate(corrected(name.subject), may_stop=False).rows(scene).velocity
+        velocity = (
+            program_candidate(Listing.corrected(name.subject), may_stop=False).rows(scene).velocity
+        )
         # A run without velocity counts as a run without rows, for which no order can be determined.
         return np.empty((0, 3)) if velocity is None else velocity
 

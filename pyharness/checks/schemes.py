@@ -14,7 +14,7 @@ import numpy as np
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.methods import cases
 from pyharness.checks.selection import Selection
-from pyharness.model.listing import PROGRAMS, corrected
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
@@ -55,7 +55,7 @@ def schemes(chosen: Selection) -> Iterator[Attempt]:
 
 def _held(scene: Scene, name: Name) -> Check:
     program = name.subject
-    run = PROGRAM_REGISTRY[program].run(scene, corrected(program), may_stop=False)
+    run = PROGRAM_REGISTRY[program].run(scene, Listing.corrected(program), may_stop=False)
     if not is_whole(scene, run):
         return name.judged(False, f"{run.ended}, or no velocity", limit=1.0)
     due, rounding = _scheme(program, scene, run)

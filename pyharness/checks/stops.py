@@ -16,7 +16,7 @@ from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.methods import cases
 from pyharness.checks.schemes import Stage, is_whole, rows, stages
 from pyharness.checks.selection import Selection
-from pyharness.model.listing import Listing, corrected, names_of
+from pyharness.model.listing import Listing, names_of
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
@@ -63,7 +63,7 @@ def _run(scene: Scene) -> tuple[Trajectory, Stages | None]:
 
     The stages are None if the run has no row for every step.
     """
-    run = PROGRAM_REGISTRY[_PROGRAM].run(scene, corrected(_PROGRAM), may_stop=False)
+    run = PROGRAM_REGISTRY[_PROGRAM].run(scene, Listing.corrected(_PROGRAM), may_stop=False)
     return run, stages(scene, run) if is_whole(scene, run) else None
 
 

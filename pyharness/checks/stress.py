@@ -6,14 +6,14 @@ from functools import partial
 from importlib import import_module
 
 from pyharness.checks.check import Attempts, Check, Name, run_suites, severity
-from pyharness.model.listing import PROGRAMS, corrected, original
+from pyharness.model.listing import PROGRAMS, Listing
 
 # Each trial is a module of pyharness.checks.trials, loaded when it is requested.
 TRIALS = (
     *("separatrix", "near-symmetry", "shapes", "scales", "torque", "length", "step-size"),
     *("regions", "invariance", "attitude", "matrices", "threads"),
 )
-LISTINGS = tuple(f(program) for program in PROGRAMS for f in (original, corrected))
+LISTINGS = tuple(f(program) for program in PROGRAMS for f in (Listing.original, Listing.corrected))
 
 named = partial(Name, command="stress")
 """Return the name of a check of a trial: a `Name` whose command is the verb `stress`.

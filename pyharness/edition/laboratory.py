@@ -10,7 +10,7 @@ import numpy as np
 
 from pyharness.checks.port_protocol import asked_scene
 from pyharness.model.facts import facts
-from pyharness.model.listing import PROGRAMS, flagged, original, switches
+from pyharness.model.listing import PROGRAMS, Listing, flagged, switches
 from pyharness.model.report import short
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
@@ -100,7 +100,7 @@ def _first() -> dict[str, Any]:
     """
     scene = case_scene(DEFAULTS["case"])
     program = DEFAULTS["program"]
-    run = run_program(scene, original(program), "python")
+    run = run_program(scene, Listing.original(program), "python")
     truth = reference(scene, scene.times()).omega
     error = np.abs(run.omega - truth[: run.steps])
     told = ending(run)

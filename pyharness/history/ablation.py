@@ -14,7 +14,7 @@ from pyharness.compare.agreement import accuracy
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
-from pyharness.model.listing import Listing, corrected, names_of, original, subset, switches
+from pyharness.model.listing import Listing, names_of, subset, switches
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Stop
@@ -112,9 +112,9 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
     """
     known = entry(name)
     for program in known["programs"]:
-        first, last = original(program), corrected(program)
+        first, last = Listing.original(program), Listing.corrected(program)
         if known["kind"] == "reading":
-            listings = original(program, [name]), first, Listing(program, [name]), last
+            listings = Listing.original(program, [name]), first, Listing(program, [name]), last
         elif known["kind"] == "conjecture":
             with_it, without = first.conjectures | {name}, first.conjectures - {name}
             listings = (

@@ -12,7 +12,7 @@ import numpy as np
 
 from pyharness.history.limits import limit_solution
 from pyharness.model.facts import facts
-from pyharness.model.listing import Listing, corrected, original
+from pyharness.model.listing import Listing
 from pyharness.model.records import build_record
 from pyharness.model.report import Picture, Report, Table, numbers, words
 from pyharness.model.scene import Scene
@@ -24,7 +24,7 @@ from pyharness.truth.reference import Reference, reference
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SETS = {"original": original, "corrected": corrected}
+SETS = {"original": Listing.original, "corrected": Listing.corrected}
 ENDINGS = ("svg", "png", "csv")
 _NUMBERS = "curve listing time recorded_time omega1 omega2 omega3"
 # Curves differ also without colour: in dash, width, marker, and position of the markers.

@@ -14,7 +14,7 @@ import numpy as np
 
 from pyharness.model.effort import advice
 from pyharness.model.errors import InputError
-from pyharness.model.listing import PROGRAMS, names_of, original, subset
+from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.records import scene_record
 from pyharness.model.report import Column, Report, Section, Table, digits, short
 from pyharness.model.scene import Scene
@@ -99,7 +99,9 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
     found = []
     for parts in (2**k for k in range(halvings + 1)):
         finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
-        run = run_program(finer, original(program), may_stop=False, velocity=False, effort=effort)
+        run = run_program(
+            finer, Listing.original(program), may_stop=False, velocity=False, effort=effort
+        )
         omega = run.omega[parts - 1 :: parts]
         complete = run.ended == "complete"
         distances = (
@@ -246,7 +248,7 @@ def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
     """
     found = {}
     for program in PROGRAMS:
-        before = run_program(scene, original(program))
+        before = run_program(scene, Listing.original(program))
         names = []
         for name in names_of("defect", program):
             after = run_program(scene, subset(program, "original", fix=[name]))

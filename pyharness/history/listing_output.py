@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, replace
 from itertools import zip_longest
 
 from pyharness.model.errors import InputError
-from pyharness.model.listing import Listing, corrected, original
+from pyharness.model.listing import Listing
 from pyharness.model.pipes import read_input
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.report import Column, Report, Section, Table, words
@@ -106,7 +106,7 @@ def fits(
             begins = any(list(lines[at : at + len(head)]) == head for at in range(len(lines)))
             if not (begins and theirs):
                 continue
-            for listing in (original(program), corrected(program)):
+            for listing in (Listing.original(program), Listing.corrected(program)):
                 for word in WORD_NAMES:
                     progress(len(found), every, f"{program}, case {case}, {word}")
                     found.append(_fit(theirs, listing, case, word))
@@ -125,7 +125,9 @@ def _form(program: str, case: int) -> tuple[list[list[str]], int]:
     The page is that of the program `program` in the case `case`.
     """
     scene = replace(case_scene(case), steps=1)
-    *head, row = _numbers(page(scene, program, run_program(scene, original(program), "python")))
+    *head, row = _numbers(
+        page(scene, program, run_program(scene, Listing.original(program), "python"))
+    )
     return head, len(row)
 
 

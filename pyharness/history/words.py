@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import zip_longest
 
 from pyharness.compare.agreement import accuracy
-from pyharness.model.listing import PROGRAMS, Listing, corrected, original
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
@@ -114,7 +114,7 @@ def cells(
         (case, listing)
         for case in cases
         for program in programs
-        for listing in (original(program), corrected(program))
+        for listing in (Listing.original(program), Listing.corrected(program))
     ]
     every, done = len(chosen) * (len(words) + 2), 0
     for case, listing in chosen:

@@ -45,7 +45,9 @@ class Listing:
     >>> from pyharness import Listing
     >>> Listing("two-term", {"dt-accumulates"}).label
     'custom'
-    >>> Listing("two-term", ()).label
+    >>> Listing.original("two-term").label
+    'original'
+    >>> Listing.corrected("two-term").label
     'corrected'
     """
 
@@ -102,6 +104,19 @@ class Listing:
         """The active names as the bit mask, an integer, that the compiled programs take."""
         return sum(1 << entry["flag"] for entry in flagged() if entry["id"] in self.active)
 
+    @classmethod
+    def original(cls, program: str, readings: Iterable[str] = ()) -> "Listing":
+        """Return the listing of the original program, with all its defects active.
+
+        The conjectures that `switches` returns, and the given `readings`, are active too.
+        """
+        return cls(program, frozenset(switches(program)), frozenset(readings))
+
+    @classmethod
+    def corrected(cls, program: str) -> "Listing":
+        """Return the listing of the corrected program: no defects, readings or conjectures."""
+        return cls(program, frozenset())
+
     def has(self, name: str) -> bool:
         """Return whether the defect, reading or conjecture with this name is active."""
         return name in self.active
@@ -152,19 +167,6 @@ def switches(program: str) -> tuple[str, ...]:
     )
 
 
-def original(program: str, readings: Iterable[str] = ()) -> Listing:
-    """Return the listing of the original program, with all its defects active.
-
-    The conjectures that `switches` returns, and the given `readings`, are active too.
-    """
-    return Listing(program, frozenset(switches(program)), frozenset(readings))
-
-
-def corrected(program: str) -> Listing:
-    """Return the listing of the corrected program, without defects, readings or conjectures."""
-    return Listing(program, frozenset())
-
-
 def subset(
     program: str,
     base: str | None = None,
@@ -194,7 +196,7 @@ def subset(
         form under every reading.
     conjectures : iterable of str, optional
         The assumptions to make where no card exists, or ``none`` for no assumption. The default is
-        the conjectures of the listing that `original` returns. If the base is `corrected`, only
+        the conjectures of `Listing.original`. If the base is `corrected`, only
         `keep` activates a conjecture.
 
     Returns

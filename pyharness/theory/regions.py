@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pyharness.model.listing import corrected, original, subset
+from pyharness.model.listing import Listing, subset
 from pyharness.model.trajectory import Array
 from pyharness.theory.amplification import Amplification, amplification
 
@@ -58,9 +58,11 @@ def matrices() -> dict[str, Amplification]:
     programs and methods that have the matrix.
     """
     return {
-        "two-term and four-term, original and corrected": amplification(corrected("two-term")),
-        "runge-kutta corrected, rk4": amplification(corrected("runge-kutta")),
-        "runge-kutta original": amplification(original("runge-kutta")),
+        "two-term and four-term, original and corrected": amplification(
+            Listing.corrected("two-term")
+        ),
+        "runge-kutta corrected, rk4": amplification(Listing.corrected("runge-kutta")),
+        "runge-kutta original": amplification(Listing.original("runge-kutta")),
         "runge-kutta, stage-base alone": amplification(subset("runge-kutta", keep=["stage-base"])),
         "runge-kutta, base-not-restored alone": amplification(
             subset("runge-kutta", keep=["base-not-restored"])

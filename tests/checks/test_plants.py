@@ -9,7 +9,7 @@ import pytest
 from pyharness.checks.plants.planted_twins import plant_in_twin
 from pyharness.compare.agreement import differences
 from pyharness.compare.orders import measured_order
-from pyharness.model.listing import PROGRAMS, corrected
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled
 from pyharness.truth.reference import Reference, reference
@@ -67,7 +67,7 @@ def test_fault_in_a_twin_is_caught(name: str, tmp_path: Path) -> None:
     """The bits show every fault; the truth shows those that are larger than rounding."""
     program, file, old, new, shows_in_truth = TWIN_PLANTS[name]
     planted = plant_in_twin(program, file, old, new, tmp_path)
-    listing = corrected(program)
+    listing = Listing.corrected(program)
     found = differences(compiled.run(_SCENE, listing), planted.run(_SCENE, listing))
     assert bool(found) == (old != new), "bits"
     order = measured_order(_SCENE, planted, listing, _truth())

@@ -21,7 +21,7 @@ from pyharness.checks.port import differences, port, port_cells
 from pyharness.checks.port_process import PortError, PortProcess
 from pyharness.checks.port_protocol import Answer, read_answer, request
 from pyharness.cli.main import main
-from pyharness.model.listing import PROGRAMS, corrected, original
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_numbers
 from pyharness.original.cells import all_cells
 from tests.ports import SAMPLE, WEB, documented, node, sample
@@ -85,7 +85,7 @@ def test_one_bit_is_found_where_it_is(tmp_path: Path, capsys: Capture) -> None:
 
 
 def _found(change: dict[str, Any], program: str = "runge-kutta", case: int = 3) -> list[str]:
-    twin = run_program(case_scene(case), original(program), "python")
+    twin = run_program(case_scene(case), Listing.original(program), "python")
     assert twin.velocity is not None
     rows = np.column_stack([twin.recorded_time, twin.omega, twin.velocity])
     ier = None if twin.ier is None else twin.ier.tolist()
@@ -93,7 +93,7 @@ def _found(change: dict[str, Any], program: str = "runge-kutta", case: int = 3) 
 
 
 def test_endings_count_as_rows_do() -> None:
-    twin = run_program(case_scene(3), original("runge-kutta"), "python")
+    twin = run_program(case_scene(3), Listing.original("runge-kutta"), "python")
     assert twin.stop is not None
     assert _found({}) == []
     assert _found({"stop": replace(twin.stop, step=3)})[0].startswith("stop: Stop(step=3")
@@ -254,7 +254,7 @@ def test_a_port_and_what_it_started_are_ended(tmp_path: Path) -> None:
 
 def test_requests_give_the_floats_back() -> None:
     for case in case_numbers():
-        asked = json.loads(request(case_scene(case), corrected("runge-kutta")))
+        asked = json.loads(request(case_scene(case), Listing.corrected("runge-kutta")))
         assert tuple(asked["scene"]["body"]["moments"]) == case_scene(case).moments
         assert asked["scene"]["masses"] == [100.0, 110.0, 120.0]
         assert asked["lipschitz"] == 500.0

@@ -16,7 +16,7 @@ from pyharness import run_program
 from pyharness.checks.port import differences, port
 from pyharness.checks.port_process import PortProcess
 from pyharness.checks.port_protocol import ENDINGS, read_answer, request
-from pyharness.model.listing import PROGRAMS, corrected, original
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene, TorqueLaw, Wave
 from pyharness.scenes.random_scenes import draw
 from tests.ports import WEB, node, sample
@@ -49,7 +49,7 @@ def test_a_torque_of_waves_alone_acts(program: str, waves: str) -> None:
     wave: Wave = ((0.3, -0.2, 0.5), 1.7)
     law = TorqueLaw(**{waves: [wave]})  # type: ignore[arg-type]
     scene = Scene("waves", (0.1, 0.2, 0.3), moments=(3, 2, 4), torque=law, step_size=0.1, steps=20)
-    for listing in (original(program), corrected(program)):
+    for listing in (Listing.original(program), Listing.corrected(program)):
         twin = run_program(scene, listing, "python", may_stop=False)
         with PortProcess(node(WEB)) as process:
             line = process.ask(request(scene, listing, may_stop=False))

@@ -10,7 +10,7 @@ import pytest
 
 from pyharness.checks.pictures import regions_picture
 from pyharness.cli.main import main
-from pyharness.model.listing import corrected, original
+from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.original import collocation
 from pyharness.original.linear_solver import leqt1f
@@ -78,20 +78,23 @@ def test_condition_is_that_of_numpy() -> None:
 
 def test_polynomials_are_those_of_the_schemes() -> None:
     """Classical Runge-Kutta has the first five terms of exp, one correction the first three."""
-    (((*exponential,),),) = amplification(corrected("runge-kutta")).coefficients
+    (((*exponential,),),) = amplification(Listing.corrected("runge-kutta")).coefficients
     assert exponential == [Fraction(1, math.factorial(k)) for k in range(5)]
     for program in ("two-term", "four-term"):
-        for listing in (original(program), corrected(program)):
+        for listing in (Listing.original(program), Listing.corrected(program)):
             for step in (1, 10, 100):
                 (((*found,),),) = amplification(listing, step).coefficients
                 assert found == [1, 1, Fraction(1, 2), 0, 0], "moved points change no straight line"
-    before = amplification(original("runge-kutta"))
+    before = amplification(Listing.original("runge-kutta"))
     assert before.text() == "[1 + 1/2 z, 0; z + 5/6 z^2 + 7/24 z^3 + 1/24 z^4, 1]"
 
 
 def test_boundaries_are_the_known_ones() -> None:
     """Hairer and Wanner 1996, IV.2: 2.785 and the root of 8 for order 4; 2 and 0 for order 2."""
-    fourth, second = amplification(corrected("runge-kutta")), amplification(corrected("two-term"))
+    fourth, second = (
+        amplification(Listing.corrected("runge-kutta")),
+        amplification(Listing.corrected("two-term")),
+    )
     distance, slope = boundary(fourth, -1.0)
     assert distance == pytest.approx(2.785293563405282, rel=1e-12)
     growth = abs(sum((-distance) ** k / math.factorial(k) for k in range(4)))
@@ -99,22 +102,24 @@ def test_boundaries_are_the_known_ones() -> None:
     assert boundary(fourth, 1j)[0] == pytest.approx(math.sqrt(8.0), rel=1e-12)
     assert boundary(second, -1.0)[0] == pytest.approx(2.0, rel=1e-12)
     assert boundary(second, 1j)[0] == 0.0
-    assert boundary(amplification(original("runge-kutta")), -1.0)[0] == pytest.approx(4.0)
+    assert boundary(amplification(Listing.original("runge-kutta")), -1.0)[0] == pytest.approx(4.0)
 
 
 def test_the_limit_of_the_punched_runge_kutta_is_in_its_matrix() -> None:
     """A decaying solution ends near minus its initial value: 2 y(t/2) - y(0) with y(t/2) near 0."""
-    matrix = amplification(original("runge-kutta")).at(np.array(-0.01)).real
+    matrix = amplification(Listing.original("runge-kutta")).at(np.array(-0.01)).real
     end = np.linalg.matrix_power(matrix, 5000) @ np.ones(2)
     assert end[1] == pytest.approx(-1.0, abs=0.02)
 
 
 def test_weights_of_moved_points() -> None:
     """Two points extrapolate s**2 to -2/9 of t**2 (derived in docs/explanation/findings.md)."""
-    assert weight_of_squares(corrected("two-term"), 50) == Fraction(5, 18)
+    assert weight_of_squares(Listing.corrected("two-term"), 50) == Fraction(5, 18)
     for n in (1, 7, 100):
-        assert weight_of_squares(original("two-term"), n) == Fraction(n, 2) - Fraction(2 * n * n, 9)
-        assert weight_of_squares(original("four-term"), n) == Fraction(1, 3)
+        assert weight_of_squares(Listing.original("two-term"), n) == Fraction(n, 2) - Fraction(
+            2 * n * n, 9
+        )
+        assert weight_of_squares(Listing.original("four-term"), n) == Fraction(1, 3)
 
 
 def test_the_stored_picture_is_current(tmp_path: Path) -> None:

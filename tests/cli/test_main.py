@@ -21,7 +21,7 @@ from pyharness.cli.main import VERBS, main
 from pyharness.cli.parser import Parser
 from pyharness.model import extension
 from pyharness.model.errors import NotBuiltError
-from pyharness.model.listing import original
+from pyharness.model.listing import Listing
 from pyharness.model.report import short
 from pyharness.original import compiled
 from tests.conftest import Printed
@@ -96,7 +96,7 @@ def test_run_json_is_as_contracted(printed: Printed) -> None:
     assert record["schema"] == 1
     assert record["stop"] == {"step": 24, "variable": "V2", "quotient": record["stop"]["quotient"]}
     assert record["ended"] == "stopped"
-    wanted = compiled.run(case_scene(3), original("runge-kutta"))
+    wanted = compiled.run(case_scene(3), Listing.original("runge-kutta"))
     trajectory = record["trajectory"]
     np.testing.assert_array_equal(trajectory["omega"], wanted.omega)
     np.testing.assert_array_equal(trajectory["velocity"], wanted.velocity)
@@ -175,7 +175,7 @@ def test_run_csv_round_trips_and_both_implementations_agree(printed: Printed) ->
     fortran, python = (printed(f"{command} {each}") for each in ("fortran", "python"))
     assert fortran == python
     rows = list(csv.DictReader(fortran.splitlines()))
-    wanted = compiled.run(case_scene(3), original("two-term"))
+    wanted = compiled.run(case_scene(3), Listing.original("two-term"))
     assert [float(row["omega2"]) for row in rows] == wanted.omega[:, 1].tolist()
 
 

@@ -10,7 +10,7 @@ from pyharness.compare.candidates import (
     program_candidate,
     unstopped,
 )
-from pyharness.model.listing import PROGRAMS, corrected, original
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.original.programs import IMPLEMENTATIONS
 
 SCENE = case_scene(5)
@@ -20,7 +20,7 @@ END = SCENE.step_size * SCENE.steps
 @pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_end_of_a_program_is_its_last_row(program: str, implementation: str) -> None:
-    candidate = program_candidate(corrected(program), implementation, may_stop=False)
+    candidate = program_candidate(Listing.corrected(program), implementation, may_stop=False)
     rows, end = candidate.rows(SCENE), candidate.end(SCENE, END)
     np.testing.assert_array_equal(end.omega, rows.omega[-1])
     assert (end.ended, end.steps, end.evaluations) == ("complete", rows.steps, rows.evaluations)
@@ -30,7 +30,10 @@ def test_a_twin_enters_no_compiled_program(monkeypatch: pytest.MonkeyPatch) -> N
     """The bits are the same, so only the module that computed them distinguishes the two."""
     for room in ("compare.candidates", "original.compiled"):
         monkeypatch.setattr(f"pyharness.{room}.extension", lambda: pytest.fail("compiled"))
-    assert program_candidate(original("two-term"), "python").end(SCENE, END).ended == "complete"
+    assert (
+        program_candidate(Listing.original("two-term"), "python").end(SCENE, END).ended
+        == "complete"
+    )
 
 
 def test_end_of_a_method_is_that_of_its_rows() -> None:
@@ -40,7 +43,7 @@ def test_end_of_a_method_is_that_of_its_rows() -> None:
 
 def test_what_a_candidate_has_not_is_refused() -> None:
     with pytest.raises(InputError, match=r"its last step ends at 1 s, not at 2 s"):
-        unstopped(original("two-term")).end(SCENE, 2.0)
+        unstopped(Listing.original("two-term")).end(SCENE, 2.0)
     with pytest.raises(InputError, match="the state at one time only"):
         prepared_candidate("quick", 1e-3).rows(SCENE)
 

@@ -19,7 +19,7 @@ from pyharness.compare.report import comparison_report, verdict
 from pyharness.methods.registry import SCIPY_METHODS
 from pyharness.methods.report import trajectory_report
 from pyharness.model.attitude import product
-from pyharness.model.listing import Listing, corrected, original
+from pyharness.model.listing import Listing
 from pyharness.model.trajectory import Trajectory, turned_to_space
 from pyharness.original.programs import PROGRAM_REGISTRY, Program
 from pyharness.truth.reference import reference
@@ -222,7 +222,7 @@ def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.Monk
         ),
     ):
         monkeypatch.setattr(Program, "run", planted)
-        found = compare_programs(case_scene(3), [corrected("runge-kutta")])
+        found = compare_programs(case_scene(3), [Listing.corrected("runge-kutta")])
         assert len(found.unexpected) == 1
         assert found.unexpected[0].startswith(words)
         assert found.programs[0].ulps == (planted is off_by_one_bit)
@@ -261,7 +261,7 @@ def test_picture_and_its_numbers(case_2: room.Comparison) -> None:
 def test_a_reading_that_is_not_adopted_is_not_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     """A reading has no expected order, and its time per step counts the steps that were run."""
     monkeypatch.setattr(room, "timed", lambda *_: [1.0])
-    listings = [Listing("two-term", ["c1-for-c"]), original("runge-kutta")]
+    listings = [Listing("two-term", ["c1-for-c"]), Listing.original("runge-kutta")]
     reading, before = compare_programs(case_scene(2), listings).programs
     assert reading.listing.label == "custom"
     assert reading.order is None
@@ -270,7 +270,7 @@ def test_a_reading_that_is_not_adopted_is_not_judged(monkeypatch: pytest.MonkeyP
 
 
 def test_bits_of_all_that_a_program_returns_are_held() -> None:
-    run = PROGRAM_REGISTRY["runge-kutta"].run(case_scene(2), original("runge-kutta"))
+    run = PROGRAM_REGISTRY["runge-kutta"].run(case_scene(2), Listing.original("runge-kutta"))
     assert run.velocity is not None
     assert run.stop is not None
     assert differences(run, run) == []
@@ -288,13 +288,13 @@ def test_bits_of_all_that_a_program_returns_are_held() -> None:
         assert distance(run, changed) == ulp
     shorter = _trajectory(np.ones((3, 3)))
     assert distance(shorter, _trajectory(np.ones((2, 3)))) == math.inf
-    printed = PROGRAM_REGISTRY["two-term"].run(case_scene(2), corrected("two-term"))
+    printed = PROGRAM_REGISTRY["two-term"].run(case_scene(2), Listing.corrected("two-term"))
     assert printed.ier is not None
     assert differences(printed, replace(printed, ier=printed.ier + 129)) == ["IER"]
 
 
 def test_record_of_a_run_has_the_time_that_the_program_recorded() -> None:
-    listing = original("two-term")
+    listing = Listing.original("two-term")
     run = PROGRAM_REGISTRY["two-term"].run(case_scene(5), listing)
     report = trajectory_report(case_scene(5), "two-term", listing, "", run)
     found = report.record()["trajectory"]

@@ -14,7 +14,7 @@ from pyharness.compare.comparison import compare_programs
 from pyharness.compare.orders import Order, measured_order, order_of
 from pyharness.compare.report import comparison_report
 from pyharness.model.errors import InputError
-from pyharness.model.listing import PROGRAMS, Listing, corrected
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
@@ -32,7 +32,7 @@ def _steps(case: int, step_size: float, steps: int) -> Scene:
 def _order(scene: Scene, program: str | Program, listing: Listing | None = None) -> Order:
     judged = PROGRAM_REGISTRY[program] if isinstance(program, str) else program
     truth = reference(scene, scene.times())
-    return measured_order(scene, judged, listing or corrected(judged.name), truth)
+    return measured_order(scene, judged, listing or Listing.corrected(judged.name), truth)
 
 
 WAVE = TorqueLaw(sines=(((1.0, 0.0, 0.0), 1e4),))
@@ -185,7 +185,7 @@ def test_a_motion_whose_conditioning_is_unknown_is_not_judged(
 
 
 def test_compare_tells_what_it_does_not_judge() -> None:
-    found = compare_programs(_steps(5, 1e-5, 100), [corrected("four-term")])
+    found = compare_programs(_steps(5, 1e-5, 100), [Listing.corrected("four-term")])
     report = comparison_report(found)
     table = render(report, "table")
     assert found.unexpected == ()
@@ -195,6 +195,6 @@ def test_compare_tells_what_it_does_not_judge() -> None:
 
 
 def test_compare_names_rounding() -> None:
-    found = compare_programs(case_scene(1), [corrected("two-term")])
+    found = compare_programs(case_scene(1), [Listing.corrected("two-term")])
     assert "orders rounding (expected 2)" in render(comparison_report(found), "table")
     assert found.not_judged == ()

@@ -13,7 +13,7 @@ import pytest
 
 from pyharness import case_scene
 from pyharness.model.extension import COMPLETE, GAVE_UP, OVERFLOW
-from pyharness.model.listing import original
+from pyharness.model.listing import Listing
 from pyharness.model.trajectory import Stop
 from pyharness.original import compiled
 from tests import traps
@@ -29,7 +29,7 @@ def test_contributing_has_the_number_of_runs_that_are_compared() -> None:
 
 
 def test_digest_sees_every_bit_and_every_counter() -> None:
-    run = compiled.run(case_scene(3), original("two-term"))
+    run = compiled.run(case_scene(3), Listing.original("two-term"))
     assert run.velocity is not None
     assert run.ier is not None
     changed = [
@@ -48,7 +48,7 @@ def test_digest_sees_every_bit_and_every_counter() -> None:
     ]
     words = [digest(each) for each in (run, *changed)]
     assert len(set(words)) == len(words)
-    assert digest(compiled.run(case_scene(3), original("two-term"))) == words[0]
+    assert digest(compiled.run(case_scene(3), Listing.original("two-term"))) == words[0]
     nan = np.full_like(run.velocity, np.nan)
     assert digest(replace(run, velocity=nan)) == digest(replace(run, velocity=-nan))
 

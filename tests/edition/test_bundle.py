@@ -11,7 +11,7 @@ import pytest
 from pyharness import case_scene, run_program
 from pyharness.checks.port_protocol import asked_scene
 from pyharness.edition.bundle import bundle
-from pyharness.model.listing import PROGRAMS, original
+from pyharness.model.listing import PROGRAMS, Listing
 from tests.ports import WEB, engine
 
 
@@ -46,11 +46,11 @@ def test_the_bundled_programs_have_the_twins_bits(tmp_path: Path) -> None:
         (program, asked_scene(case_scene(number)), [*listing.defects, *listing.conjectures])
         for number in (2, 7)
         for program in PROGRAMS
-        for listing in [original(program)]
+        for listing in [Listing.original(program)]
     ]
     found = json.loads(_run(bundle(entry), asked=asked))
     for (program, scene, _), rows in zip(asked, found, strict=True):
-        twin = run_program(case_scene(scene["case"]), original(program), "python")
+        twin = run_program(case_scene(scene["case"]), Listing.original(program), "python")
         assert [row[1:4] for row in rows] == twin.omega.tolist()
 
 

@@ -15,7 +15,7 @@ from pyharness.history.claims.ledger import claim, claims, outcome
 from pyharness.history.claims.verdicts import FALSE, NOT_TESTABLE, REPRODUCED
 from pyharness.history.limits import limit
 from pyharness.model.facts import facts, shipped
-from pyharness.model.listing import PROGRAMS, Listing, corrected, names_of, original, switches
+from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
 from pyharness.model.scene_file import case_scene
 from pyharness.original.cards import deck
 from pyharness.original.cells import subsets
@@ -116,7 +116,7 @@ def test_both_together_tend_to_the_limit_that_is_told(case: int) -> None:
 
 
 def test_the_run_that_the_thesis_reports_is_stopped_by_a_velocity() -> None:
-    stop = run_program(case_scene(MECHANISM["case"]), original(MECHANISM["program"])).stop
+    stop = run_program(case_scene(MECHANISM["case"]), Listing.original(MECHANISM["program"])).stop
     assert stop is not None
     assert {"step": stop.step, "variable": stop.variable} == MECHANISM["stopped"]
     assert stop.variable in STATEMENTS["stop"]["text"]
@@ -173,7 +173,7 @@ def test_findings_have_the_numbers_of_the_claims() -> None:
     assert f"differ from ours by at most {apart:.0e} rad/s" in _document(
         "docs/explanation/findings.md"
     )
-    run = run_program(case_scene(2), original("runge-kutta"))
+    run = run_program(case_scene(2), Listing.original("runge-kutta"))
     away = np.abs(run.omega[:, 0] - 2.0 * np.sin(2.5 * run.time)).max()
     assert f"its omega1 is within {away:.4f} rad/s" in _document("docs/explanation/findings.md")
 
@@ -217,7 +217,7 @@ def test_emulated_words_are_told_of_where_they_are_had() -> None:
 def test_numbers_of_readme_home_page_and_reconstruction_are_those_of_runs_and_cards() -> None:
     scene = case_scene(3)
     printed, mended = (
-        run_program(scene, each("runge-kutta")) for each in (original, corrected)
+        run_program(scene, each("runge-kutta")) for each in (Listing.original, Listing.corrected)
     )  # fmt: skip
     assert printed.stop is not None
     truth = reference(scene, scene.times()).omega

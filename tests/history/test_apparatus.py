@@ -8,7 +8,7 @@ import pytest
 
 from pyharness.history.ablation import entries, entry
 from pyharness.model.facts import facts
-from pyharness.model.listing import PROGRAMS, original, subset
+from pyharness.model.listing import PROGRAMS, Listing, subset
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.original.cards import chosen, deck, numbers
 from pyharness.original.programs import PROGRAM_REGISTRY, run_program
@@ -30,7 +30,10 @@ def test_with_one_mass_whichever_case_2_stops_at_step_26(mass: float) -> None:
     stops = [
         run_program(given, listing).stop
         for given in (case_scene(2), scene)
-        for listing in (original("runge-kutta"), subset("runge-kutta", fix=["three-masses"]))
+        for listing in (
+            Listing.original("runge-kutta"),
+            subset("runge-kutta", fix=["three-masses"]),
+        )
     ]
     assert [each and each.step for each in stops] == [25, 26, 26, 26]
     assert "step 26" in entry("three-masses")["why"]
@@ -57,7 +60,7 @@ def test_omega_does_not_change_by_a_bit_without_the_translational_block(program:
     for case in case_numbers():
         with_it, without = (
             PROGRAM_REGISTRY[program]
-            .run(case_scene(case), original(program), may_stop=False, velocity=velocity)
+            .run(case_scene(case), Listing.original(program), may_stop=False, velocity=velocity)
             .omega
             for velocity in (True, False)
         )

@@ -14,7 +14,7 @@ from pyharness import InputError, Scene, case_scene
 from pyharness.cli.main import main
 from pyharness.history.family.members import WEIGHTINGS, Member, march, predicted_order, run
 from pyharness.history.family.orders import SCHEMES, SLACK, family_members, order_table
-from pyharness.model.listing import corrected
+from pyharness.model.listing import Listing
 from pyharness.model.report import short
 from pyharness.model.trajectory import Array
 from pyharness.original import compiled
@@ -36,7 +36,7 @@ ROUNDING = 1.1e-12
 @pytest.mark.parametrize(("program", "terms"), [("two-term", 2), ("four-term", 4)])
 def test_mended_programs_are_members(program: str, terms: int, case: int) -> None:
     scene = case_scene(case)
-    wanted = compiled.run(scene, corrected(program))
+    wanted = compiled.run(scene, Listing.corrected(program))
     found = run(scene, Member("collocation", terms))
     scale = np.abs(wanted.omega).max()
     np.testing.assert_allclose(found.omega, wanted.omega, rtol=0, atol=ROUNDING * scale)

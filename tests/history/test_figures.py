@@ -14,7 +14,7 @@ from pyharness import case_scene
 from pyharness.cli.main import main
 from pyharness.history import figures
 from pyharness.history.figures import Curve, FigureFinding, curve_numbers
-from pyharness.model.listing import PROGRAMS, original
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.original import compiled
 from pyharness.truth.reference import reference
 from pyharness.views import pictures
@@ -111,7 +111,7 @@ def test_numbers_are_those_of_the_trajectories(found: dict[str, FigureFinding]) 
 
 def test_lines_are_drawn_to_their_end_which_is_marked(found: dict[str, FigureFinding]) -> None:
     """Check what matplotlib receives: the curve's points, a cross at the last one, the label."""
-    run = compiled.run(case_scene(2), original("runge-kutta"))
+    run = compiled.run(case_scene(2), Listing.original("runge-kutta"))
     for row, axes in enumerate(figures.figure_picture(found["figure-07"]).figure.axes):
         (stopped,) = (each for each in axes.lines if "runge-kutta (" in str(each.get_label()))
         (cross,) = (each for each in axes.lines if each.get_marker() == "X")
@@ -132,7 +132,9 @@ def test_limit_of_figure_7_is_twice_a_slow_sine(found: dict[str, FigureFinding])
 def test_curve_that_diverges_leaves_the_picture(found: dict[str, FigureFinding]) -> None:
     """The two-term program of Case 6 original reaches 1e111; the other curves stay legible."""
     finding = found["figure-11"]
-    wild = Curve(original("two-term"), compiled.run(finding.scene, original("two-term")))
+    wild = Curve(
+        Listing.original("two-term"), compiled.run(finding.scene, Listing.original("two-term"))
+    )
     assert np.abs(wild.trajectory.omega).max() > 1e100
     beside = replace(finding, curves=(wild, *finding.curves))
     for row in range(3):

@@ -10,7 +10,7 @@ import pytest
 from pyharness import case_scene
 from pyharness.cli.main import main
 from pyharness.history.limits import NOTHING, Limit, invisible, limit
-from pyharness.model.listing import original
+from pyharness.model.listing import Listing
 from pyharness.original import compiled
 
 
@@ -41,7 +41,7 @@ def test_four_term_tends_to_the_truth(case: int) -> None:
 def test_runge_kutta_in_case_2_is_twice_a_slow_sine() -> None:
     """2 y(t/2) - y(0) = (2 sin 2.5 t, 2 cos 2.5 t - 1, 10) exceeds the sine, as V.2 saw."""
     scene = replace(case_scene(2), step_size=1e-4, steps=10_000)
-    run = compiled.run(scene, original("runge-kutta"), may_stop=False)
+    run = compiled.run(scene, Listing.original("runge-kutta"), may_stop=False)
     t = run.time
     wanted = np.column_stack([2 * np.sin(2.5 * t), 2 * np.cos(2.5 * t) - 1, np.full_like(t, 10.0)])
     assert np.abs(run.omega - wanted).max() < 2e-3

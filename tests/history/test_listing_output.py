@@ -7,7 +7,7 @@ import pytest
 from pyharness import InputError, case_scene, run_program
 from pyharness.cli.main import main
 from pyharness.history.listing_output import Difference, fits, read_page
-from pyharness.model.listing import corrected, original
+from pyharness.model.listing import Listing
 from pyharness.original.printer import page
 
 MACHINE = Path(__file__).parents[2] / "docs" / "machine"
@@ -15,7 +15,7 @@ PAGES = sorted(MACHINE.glob("*.txt"))
 
 
 def printed(folder: Path, program: str, case: int, word: str, *, mended: bool = False) -> str:
-    listing = (corrected if mended else original)(program)
+    listing = (Listing.corrected if mended else Listing.original)(program)
     scene = case_scene(case)
     run = run_program(scene, listing, "python", word=word)
     path = folder / "page.txt"
@@ -86,7 +86,7 @@ def test_shipped_pages_are_what_is_printed(path: Path) -> None:
     case, _, word = rest.partition("-")
     scene = case_scene(int(case))
     assert path.read_text() == page(
-        scene, program, run_program(scene, original(program), "python", word=word)
+        scene, program, run_program(scene, Listing.original(program), "python", word=word)
     )
 
 

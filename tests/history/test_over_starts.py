@@ -13,7 +13,7 @@ from pyharness.history.claims.over_starts import FAILS, HOLDS, IN_PART, JUDGED, 
 from pyharness.history.claims.verdicts import IN_PART as PARTLY
 from pyharness.history.claims.verdicts import REPRODUCED
 from pyharness.methods.batch import Batch, Solver
-from pyharness.model.listing import Listing, corrected, original, subset
+from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Triple
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
@@ -60,7 +60,7 @@ def test_claims_of_section_v_that_hang_on_starts_are_there() -> None:
 @pytest.mark.parametrize("identity", JUDGED)
 def test_verdicts_are_those_of_the_ledger(identity: str) -> None:
     few = STARTS[:10] if identity.startswith("v3") else STARTS[:18]
-    solved = _solved(few, original("two-term"))
+    solved = _solved(few, Listing.original("two-term"))
     found = getattr(over_starts, identity)(solved)
     assert found.dtype == np.int8
     assert found.tolist() == _codes(identity, Laboratory(True), few)
@@ -75,15 +75,15 @@ def test_verdicts_are_those_of_the_ledger_elsewhere(identity: str) -> None:
         found = over_starts.codes(identity, _solved(few, listing))
         chosen = Assumptions(readings=frozenset([reading]))
         assert found.tolist() == _codes(identity, Laboratory(True, chosen), few)
-    found = over_starts.codes(identity, _solved(few, corrected("four-term")))
+    found = over_starts.codes(identity, _solved(few, Listing.corrected("four-term")))
     assert found.tolist() == _codes(identity, Laboratory(False), few)
     steps = 200 if "steps" in claim(identity)["assumptions"] else 100
-    found = over_starts.codes(identity, _solved(few, original("four-term"), 200))
+    found = over_starts.codes(identity, _solved(few, Listing.original("four-term"), 200))
     assert found.tolist() == _codes(identity, Laboratory(True, Assumptions(steps=steps)), few)
 
 
 def test_silent_of_what_the_thesis_does_not_speak_of() -> None:
-    listing = original("runge-kutta")
+    listing = Listing.original("runge-kutta")
     starts = np.array(STARTS)
     others = [
         _solved(STARTS, listing, arrays={"omega0": starts, "moments": np.ones((len(STARTS), 3))}),

@@ -9,7 +9,7 @@ from scipy.io import FortranFile
 from pyharness import case_scene
 from pyharness.cli.main import main
 from pyharness.history.tape5 import records
-from pyharness.model.listing import PROGRAMS, original
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.original import compiled
 
 
@@ -18,7 +18,7 @@ def test_tape_is_read_back_bit_for_bit(program: str, tmp_path: Path) -> None:
     out = tmp_path / "tape"
     arguments = ["run", "--case", "5", "--format", "tape5", "--program", program]
     assert main([*arguments, "--out", str(out)]) == 0
-    run = compiled.run(case_scene(5), original(program))
+    run = compiled.run(case_scene(5), Listing.original(program))
     assert run.velocity is not None
     wanted = np.hstack([run.recorded_time[:, None], run.omega, run.velocity])
     with FortranFile(out, "r", header_dtype="<u4") as tape:
@@ -34,7 +34,7 @@ def test_tape_goes_through_a_pipe_and_not_to_a_terminal(
 ) -> None:
     arguments = ["run", "--case", "3", "--program", "runge-kutta", "--format", "tape5"]
     assert main(arguments) == 0
-    wanted = records(compiled.run(case_scene(3), original("runge-kutta")))
+    wanted = records(compiled.run(case_scene(3), Listing.original("runge-kutta")))
     assert capsysbinary.readouterr().out == wanted
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     assert main(arguments) == 2

@@ -15,7 +15,7 @@ from pyharness.methods.batch import Solver
 from pyharness.methods.plan import plan
 from pyharness.methods.registry import METHODS, REGISTRY, SCIPY_METHODS, requested_tolerance
 from pyharness.methods.solver import PREPARED
-from pyharness.model.listing import original
+from pyharness.model.listing import Listing
 from pyharness.scenes.random_scenes import draw
 from tests.conftest import Printed
 
@@ -91,7 +91,7 @@ def test_command_line_takes_the_default_of_the_method(printed: Printed) -> None:
 
 
 def test_comparison_takes_the_defaults_of_its_methods() -> None:
-    found = compare_programs(draw("defaults", 0).scene, [original("two-term")])
+    found = compare_programs(draw("defaults", 0).scene, [Listing.original("two-term")])
     taken = {each.method: each.tolerance for each in found.methods}
     assert taken == {name: REGISTRY[name].default for name in SCIPY_METHODS}
     assert found.tolerance == min(taken.values())

@@ -19,7 +19,7 @@ from pyharness.methods.prepared import prepare
 from pyharness.methods.solve import solve
 from pyharness.model import extension as room
 from pyharness.model.extension import extension
-from pyharness.model.listing import PROGRAMS, corrected
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene, TorqueLaw, Wave
 from pyharness.original.compiled import run
 from pyharness.original.many import run_many
@@ -60,7 +60,7 @@ def _linear() -> object:
 def _many(program: str, threads: int) -> object:
     starts = np.full((64, 3), BUSY.omega)
     return run_many(
-        BUSY, corrected(program), omega0=starts, may_stop=False, threads=threads, effort=1e9
+        BUSY, Listing.corrected(program), omega0=starts, may_stop=False, threads=threads, effort=1e9
     )
 
 
@@ -87,7 +87,7 @@ LONG: dict[str, Callable[[], object]] = {
     "gauss-1": _method(DRIVEN, "gauss-1", 1e3, 1e-8),
     "gauss-8": _method(CROWDED, "gauss-8", 1e5),
     "sphere": lambda: solve(SPHERE, TIMES, "closed-form", 1e-12, effort=1e6),
-    **{name: partial(run, BUSY, corrected(name), may_stop=False) for name in PROGRAMS},
+    **{name: partial(run, BUSY, Listing.corrected(name), may_stop=False) for name in PROGRAMS},
     **{f"many-{name}": partial(_many, name, 1) for name in PROGRAMS},
     "many-threads": partial(_many, "four-term", 2),
     **{f"bodies-{name}": partial(_bodies, name, 1) for name in ("taylor", "rk4", "gauss-2")},

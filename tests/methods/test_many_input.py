@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, prepare, run_many, solve_many
-from pyharness.model.listing import corrected
+from pyharness.model.listing import Listing
 
 TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
-LISTING = corrected("two-term")
+LISTING = Listing.corrected("two-term")
 READ_ONLY = np.zeros((2, 3))
 READ_ONLY.flags.writeable = False
 

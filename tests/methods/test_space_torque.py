@@ -26,7 +26,7 @@ from pyharness.methods.sensitivity import motion_growth
 from pyharness.methods.solver import PREPARED
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.inertia import principal_axes
-from pyharness.model.listing import corrected
+from pyharness.model.listing import Listing
 from pyharness.model.trajectory import Array, turned_to_space
 from pyharness.scenes.random_scenes import draw
 from pyharness.theory.conditioning import along
@@ -340,8 +340,8 @@ def test_plan_says_that_the_attitude_is_needed_and_why() -> None:
 
 REFUSED = "about the axes of space, and this takes one about those of the body"
 ELSEWHERE: dict[str, Callable[[Scene], object]] = {
-    "program": lambda scene: run_program(scene, corrected("two-term")),
-    "twin": lambda scene: run_program(scene, corrected("runge-kutta"), "python"),
+    "program": lambda scene: run_program(scene, Listing.corrected("two-term")),
+    "twin": lambda scene: run_program(scene, Listing.corrected("runge-kutta"), "python"),
     "comparison": compare_programs,
     "reference": lambda scene: reference(scene, [1.0]),
     "integer series": lambda scene: integer_series(scene, [1.0]),

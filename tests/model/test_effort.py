@@ -17,7 +17,7 @@ from pyharness.methods.solve import solve
 from pyharness.methods.solver import PREPARED
 from pyharness.model.effort import suggested
 from pyharness.model.errors import InputError, TimedError
-from pyharness.model.listing import corrected
+from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene, TorqueLaw, Wave
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.programs import run_program
@@ -42,7 +42,7 @@ def _method(
 
 def _program(scene: Scene, name: str, implementation: str) -> tuple[Run, str]:
     def run(effort: float) -> Trajectory:
-        return run_program(scene, corrected(name), implementation, effort=effort)
+        return run_program(scene, Listing.corrected(name), implementation, effort=effort)
 
     return run, f"{name} \\({implementation}\\)"
 
@@ -128,7 +128,7 @@ def test_effort_is_a_number_above_0(effort: float) -> None:
     for call in (
         lambda: solve(FREE, [1.0], effort=effort),
         lambda: prepare(FREE, effort=effort),
-        lambda: run_program(FREE, corrected("two-term"), effort=effort),
+        lambda: run_program(FREE, Listing.corrected("two-term"), effort=effort),
     ):
         with pytest.raises(
             InputError, match=r"^effort: .*(above 0|where a number belongs|too large for binary64)$"

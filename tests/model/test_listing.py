@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from pyharness import InputError, Listing, subset
+from pyharness import InputError, subset
 from pyharness.model.facts import facts
-from pyharness.model.listing import PROGRAMS, corrected, flagged, names_of, original, switches
+from pyharness.model.listing import PROGRAMS, Listing, flagged, names_of, switches
 
 
 def test_names_are_those_of_the_fortran_and_the_bits_agree() -> None:
@@ -37,11 +37,11 @@ def test_programs_have_the_defects_of_the_apparatus() -> None:
 
 def test_labels() -> None:
     for program in PROGRAMS:
-        assert original(program).label == "original"
-        assert corrected(program).label == "corrected"
+        assert Listing.original(program).label == "original"
+        assert Listing.corrected(program).label == "corrected"
     assert subset("two-term", conjectures=["none"]).label == "custom"
     assert subset("two-term", "corrected", keep=["torque-held"]).label == "custom"
-    assert subset("two-term", conjectures=["torque-held"]) == original("two-term")
+    assert subset("two-term", conjectures=["torque-held"]) == Listing.original("two-term")
 
 
 def test_conjectures_are_known_among_defects() -> None:
@@ -52,7 +52,7 @@ def test_conjectures_are_known_among_defects() -> None:
     assert found.has("torque-held")
     assert Listing("two-term", ["c1-for-c"]).readings == {"c1-for-c"}
     others = Listing("two-term", ["x3-reads-acl2", "three-masses"])
-    assert found.flags == original("two-term").flags - others.flags
+    assert found.flags == Listing.original("two-term").flags - others.flags
 
 
 def test_options_of_the_command_line() -> None:
@@ -71,13 +71,13 @@ def test_no_reading_or_conjecture_changes_a_corrected_listing() -> None:
     given: dict[str, Any] = {
         "readings": ["do-variable"], "conjectures": ["torque-held", "initial-torque"],
     }  # fmt: skip
-    assert subset("runge-kutta", "corrected", **given) == corrected("runge-kutta")
+    assert subset("runge-kutta", "corrected", **given) == Listing.corrected("runge-kutta")
     kept = subset("runge-kutta", keep=["do-variable"], **given)
     assert kept.label == "custom"
     assert kept.active == {"do-variable"}
     assert subset("runge-kutta", "original", readings=["do-variable"]).label == "original"
     fixed = subset("runge-kutta", fix=["do-variable", "initial-torque"], **given)
-    assert fixed == original("runge-kutta")
+    assert fixed == Listing.original("runge-kutta")
     everything = [*switches("runge-kutta"), "do-variable"]
     assert subset("runge-kutta", fix=everything, **given).active == {"initial-torque"}
 

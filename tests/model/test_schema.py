@@ -18,7 +18,7 @@ from pyharness.edition.report import MARK
 from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
-from pyharness.model.listing import original
+from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene, read_scene, scene_text
 from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.original.vectors import OURS, answers
@@ -91,7 +91,7 @@ def edition(folder: Path) -> Reader:
 
 def port_request(folder: Path) -> Reader:
     path = folder / "request"
-    path.write_bytes(request(case_scene(1), original("two-term")) + b"\n")
+    path.write_bytes(request(case_scene(1), Listing.original("two-term")) + b"\n")
 
     def read() -> None:
         with path.open("rb") as asked:

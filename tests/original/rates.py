@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness.model.extension import extension
-from pyharness.model.listing import PROGRAMS, Listing, corrected, original
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.original.compiled import program_arguments
 from pyharness.original.many import ProgramEnsemble, run_many
@@ -58,7 +58,7 @@ def main(arguments: Sequence[str]) -> int:
         extension().choose_instructions(level)
         print(f"{LEVELS[level]}: ns a step of one body, by itself / side by side = ratio")
         for program in PROGRAMS:
-            for listing in (original(program), corrected(program)):
+            for listing in (Listing.original(program), Listing.corrected(program)):
                 cells = []
                 for steps in (100, 300, 10_000):
                     alone, among = single(listing, steps), side_by_side(listing, steps)

@@ -16,7 +16,7 @@ from pyharness.compare.agreement import differences
 from pyharness.compare.comparison import compare_programs
 from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, REFUSED, extension
-from pyharness.model.listing import PROGRAMS, Listing, corrected, original
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
@@ -56,7 +56,7 @@ def differing(scene: Scene, listing: Listing, word: str, *options: Any) -> list[
 def test_fortran_and_twin_agree_in_every_word(program: str, word: str) -> None:
     """Test some steps of a few cells; `verify --only words` tests every cell over all steps."""
     for case in (3, 6, 7):
-        for listing in (original(program), corrected(program)):
+        for listing in (Listing.original(program), Listing.corrected(program)):
             assert differing(replace(case_scene(case), steps=12), listing, word) == []
     # Case 2 has its own torque in the first step, and ends by the stop test.
     for index, listing in enumerate(all_listings(program)):
@@ -69,20 +69,20 @@ def test_fortran_and_twin_agree_in_every_word(program: str, word: str) -> None:
 @pytest.mark.parametrize("name", EXTREMES)
 def test_extremes_agree(name: str, word: str) -> None:
     for program in PROGRAMS:
-        for listing in (original(program), corrected(program)):
+        for listing in (Listing.original(program), Listing.corrected(program)):
             for options in ((500.0, True), (0.0, True), (math.inf, False)):
                 assert differing(EXTREMES[name], listing, word, *options) == []
 
 
 def test_runs_end_as_their_word_has_it() -> None:
     """The wider the range, the later a run overflows; a stop's quotient is returned as a float."""
-    scene, listing = EXTREMES["overflow"], original("two-term")
+    scene, listing = EXTREMES["overflow"], Listing.original("two-term")
     names = sorted(HERE, key=lambda name: WORDS[name].p)
     runs = [compiled_in_word.run(scene, listing, WORDS[name]) for name in names]
     assert {run.ended for run in runs} == {"overflow"}
     assert sorted({run.steps for run in runs}) == [run.steps for run in runs]
     for name in HERE:
-        run = compiled_in_word.run(case_scene(2), original("runge-kutta"), WORDS[name])
+        run = compiled_in_word.run(case_scene(2), Listing.original("runge-kutta"), WORDS[name])
         assert run.stop is not None
         assert (run.stop.step, run.stop.variable) == (25, "V2")
         assert isinstance(run.stop.quotient, float)
@@ -90,13 +90,13 @@ def test_runs_end_as_their_word_has_it() -> None:
 
 def test_binary64_by_bytes_is_the_run_in_floats() -> None:
     for program in PROGRAMS:
-        scene, listing = case_scene(7), original(program)
+        scene, listing = case_scene(7), Listing.original(program)
         by_bytes = compiled_in_word.run(scene, listing, WORDS["binary64"])
         assert differences(run_program(scene, listing), by_bytes) == []
 
 
 def test_public_call_runs_both_languages() -> None:
-    scene, listing = case_scene(5), corrected("four-term")
+    scene, listing = case_scene(5), Listing.corrected("four-term")
     for word in HERE:
         runs: list[Trajectory] = [
             run_program(scene, listing, each, word=word) for each in ("fortran", "python")
@@ -106,7 +106,7 @@ def test_public_call_runs_both_languages() -> None:
 
 
 def test_words_that_are_not_here_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, listing = case_scene(5), corrected("two-term")
+    scene, listing = case_scene(5), Listing.corrected("two-term")
     with pytest.raises(InputError, match="run in binary64, binary32, binary128 alone"):
         run_program(scene, listing, word="cdc48")
     with pytest.raises(InputError, match=r"two-term \(binary32\).* would take too long"):
@@ -252,7 +252,7 @@ def test_names_of_words() -> None:
 @pytest.mark.parametrize("word", HERE)
 def test_compare_holds_fortran_against_the_twin(word: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(case_scene(4), steps=20)
-    listings = [original("two-term"), corrected("runge-kutta")]
+    listings = [Listing.original("two-term"), Listing.corrected("runge-kutta")]
     found = compare_programs(scene, listings, word=word)
     assert [each.ulps for each in found.programs] == [0.0, 0.0]
     assert not found.unexpected

@@ -13,7 +13,7 @@ from pyharness.checks.port_protocol import read_answer, request
 from pyharness.cli.main import main
 from pyharness.compare.agreement import differences
 from pyharness.compare.orders import Order, measured_order
-from pyharness.model.listing import PROGRAMS, Listing, corrected, names_of, subset
+from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.original.cells import subsets
 from pyharness.original.programs import PROGRAM_REGISTRY, run_program
@@ -117,7 +117,7 @@ def test_laboratory_has_the_same_listing(program: str) -> None:
     )  # fmt: skip
     for found in json.loads(done.stdout):
         assert found["problems"] == []
-        assert Listing(program, found["state"]["active"]) == corrected(program)
+        assert Listing(program, found["state"]["active"]) == Listing.corrected(program)
 
 
 @pytest.mark.parametrize("case", case_numbers())

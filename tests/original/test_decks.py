@@ -9,7 +9,7 @@ from pyharness.cli.main import main
 from pyharness.history.claims.laboratory import Laboratory
 from pyharness.model.errors import InputError
 from pyharness.model.facts import facts
-from pyharness.model.listing import PROGRAMS, corrected, names_of, original, subset
+from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.original.cards import deck
@@ -30,14 +30,16 @@ def _cards(text: str) -> dict[int, str]:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_text_of_1982_is_that_of_the_cards(program: str) -> None:
-    text = deck_text(original(program))
+    text = deck_text(Listing.original(program))
     assert all(len(line) == 80 for line in text.splitlines())
     assert _cards(text) == {n: card.text.rstrip() for n, card in deck(program).cards.items()}
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_corrected_deck_differs_by_the_alterations_alone(program: str) -> None:
-    before, after = (_cards(deck_text(listing(program))) for listing in (original, corrected))
+    before, after = (
+        _cards(deck_text(listing(program))) for listing in (Listing.original, Listing.corrected)
+    )
     altered = [
         each for each in facts("cards/alterations")["alteration"]
         if each["program"] == program and "dialect" not in each
@@ -55,7 +57,7 @@ def test_corrected_deck_differs_by_the_alterations_alone(program: str) -> None:
 
 @pytest.mark.parametrize("case", [1, 5, 7])
 def test_case_stands_on_the_cards_of_the_deck(case: int) -> None:
-    cards = _cards(deck_text(original("two-term"), case_scene(case)))
+    cards = _cards(deck_text(Listing.original("two-term"), case_scene(case)))
     scene = case_scene(case)
     assert scene.moments is not None
     shown = [float(cards[n].partition("=")[2]) for n in (200, 210, 220)]
@@ -70,7 +72,7 @@ def test_case_stands_on_the_cards_of_the_deck(case: int) -> None:
 @pytest.mark.parametrize("rounds", [False, True])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_job_for_ftn_has_the_cards_as_they_are(program: str, rounds: bool, system: str) -> None:
-    listing = original(program)
+    listing = Listing.original(program)
     job = job_text(deck_text(listing, None, "ftn"), system, rounds)
     control, _, rest = job.partition("~eor\n")
     assert rest.startswith(deck_text(listing))
@@ -87,14 +89,14 @@ def test_job_for_ftn_has_the_cards_as_they_are(program: str, rounds: bool, syste
 
 
 def test_job_for_ftn_has_the_torque_of_case_7() -> None:
-    deck = deck_text(original("two-term"), case_scene(7), "ftn")
+    deck = deck_text(Listing.original("two-term"), case_scene(7), "ftn")
     assert "SIN(100.*TIME)" in deck
     assert "OPEN(" not in deck
-    assert "I=2 " not in deck_text(original("runge-kutta"), None, "ftn")
+    assert "I=2 " not in deck_text(Listing.original("runge-kutta"), None, "ftn")
 
 
 def test_dialect_of_today_adds_marked_lines_alone() -> None:
-    listing = original("runge-kutta")
+    listing = Listing.original("runge-kutta")
     old, new = (deck_text(listing, None, dialect).splitlines() for dialect in ("1982", "gfortran"))
     marked = [line for line in new if line[72] == "+"]
     assert [line for line in new if line[72] == " "] == old[1:]
@@ -105,7 +107,7 @@ def test_dialect_of_today_adds_marked_lines_alone() -> None:
     assert "I=2  " not in deck_text(reading, None, "gfortran")
     # A corrected deck needs no rule for the variable of a DO, in any dialect.
     for dialect in DIALECTS:
-        text = deck_text(corrected("runge-kutta"), None, dialect)
+        text = deck_text(Listing.corrected("runge-kutta"), None, dialect)
         assert _cards(text)[930].strip() == "I=3"
         assert "I=2  " not in text
 
@@ -113,9 +115,9 @@ def test_dialect_of_today_adds_marked_lines_alone() -> None:
 @pytest.mark.parametrize(
     ("listing", "scene", "dialect", "told"),
     [
-        (original("two-term"), None, "1966", "--dialect"),
-        (original("two-term"), Scene("own", (1.0, 1.0, 1.0), moments=(3.0, 2.0, 2.0)), "1982",
-         "one of the cases"),
+        (Listing.original("two-term"), None, "1966", "--dialect"),
+        (Listing.original("two-term"), Scene("own", (1.0, 1.0, 1.0), moments=(3.0, 2.0, 2.0)),
+         "1982", "one of the cases"),
     ],
 )  # fmt: skip
 def test_what_no_deck_can_be_is_refused(
@@ -185,7 +187,7 @@ def test_model_of_four_terms_is_the_deck_but_for_its_points() -> None:
 @pytest.mark.parametrize("is_original", [True, False])
 def test_models_of_case_6_are_those_of_the_claims(terms: int, is_original: bool) -> None:
     """Compare the decks that V.2 used and did not print with the laboratory's models."""
-    listing = (original if is_original else corrected)("four-term")
+    listing = (Listing.original if is_original else Listing.corrected)("four-term")
     run = run_deck(deck_text(listing, case_scene(6), "gfortran", terms))
     wanted = Laboratory(is_original).models(6, terms)
     np.testing.assert_allclose(run.tape5[:, 1:4], wanted, rtol=1e-11, atol=1e-11)
@@ -196,4 +198,4 @@ def test_models_of_case_6_are_those_of_the_claims(terms: int, is_original: bool)
 )
 def test_models_that_no_deck_can_be_are_refused(program: str, terms: int, case: int) -> None:
     with pytest.raises(InputError, match="allowed"):
-        deck_text(original(program), case_scene(case), "gfortran", terms)
+        deck_text(Listing.original(program), case_scene(case), "gfortran", terms)

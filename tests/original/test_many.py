@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pyharness.model.listing import PROGRAMS, Listing, corrected, original, subset
+from pyharness.model.listing import PROGRAMS, Listing, subset
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled, many
@@ -68,8 +68,8 @@ def test_every_listing_has_the_bits_of_its_single_runs(program: str) -> None:
                 "at": range(1, scene.steps + 1),
             }
             assert_alike(run_many(scene, listing, **options), scene, listing, options)
-    conjectures = original(program).conjectures | {"initial-torque"}
-    for listing in (original(program), corrected(program)):
+    conjectures = Listing.original(program).conjectures | {"initial-torque"}
+    for listing in (Listing.original(program), Listing.corrected(program)):
         assumed = replace(listing, conjectures=conjectures)
         for body in (
             {},
@@ -95,7 +95,7 @@ def test_blocks_and_threads_change_no_bit(
         "velocity": True,
         "at": [3, 20],
     }
-    for listing in (original(program), corrected(program)):
+    for listing in (Listing.original(program), Listing.corrected(program)):
         one = run_many(scene, listing, **options)
         assert_alike(one, scene, listing, options)
         for threads in (2, 3):
@@ -126,7 +126,7 @@ def test_stops_of_the_thesis() -> None:
     """Section V.2: Case 2 ends after 25 steps, by V2; the other bodies of the batch don't."""
     cases = [case_scene(number) for number in (1, 2, 3)]
     found = run_many(
-        cases[1], original("runge-kutta"), omega0=[case.omega for case in cases],
+        cases[1], Listing.original("runge-kutta"), omega0=[case.omega for case in cases],
         moments=[case.moments or () for case in cases], at=[25, 26, 100],
         torque_constant=[case.torque.constant for case in cases],
     )  # fmt: skip
@@ -137,7 +137,7 @@ def test_stops_of_the_thesis() -> None:
     assert found.stop_quotient[1] > 500.0
     np.testing.assert_array_equal(np.isnan(found.omega[1, :, 0]), [False, True, True])
     for number, scene in enumerate(cases):
-        wanted = compiled.run(scene, original("runge-kutta"))
+        wanted = compiled.run(scene, Listing.original("runge-kutta"))
         assert found.n_rows[number] == wanted.steps
         if wanted.steps >= 25:
             assert same_bits(found.omega[number, 0], wanted.omega[24])
@@ -149,10 +149,10 @@ def test_bodies_that_overflow_spoil_no_other(program: str) -> None:
     scene = Scene("", (1.0, 1.0, 1.0), coefficients=(50.0, 60.0, 70.0), steps=40)
     options: Options = {"omega0": np.full((40, 3), 1.0), "at": range(1, 41), "may_stop": False}
     options["omega0"] *= (10.0 ** np.linspace(-2.0, 2.0, 40))[:, None]
-    found = run_many(scene, corrected(program), **options)
+    found = run_many(scene, Listing.corrected(program), **options)
     assert len(set(found.n_rows)) > 10
     assert set(found.status) == {0, 2}
-    assert_alike(found, scene, corrected(program), options)
+    assert_alike(found, scene, Listing.corrected(program), options)
 
 
 @pytest.mark.parametrize("program", ["two-term", "four-term"])
@@ -160,7 +160,7 @@ def test_steps_of_any_size_side_by_side(level: int, program: str) -> None:
     """In each lane a singular matrix leaves B unchanged; long steps have other rows for pivots."""
     scene = replace(case_scene(5), steps=12)
     step_size = np.tile([1e-17, 1e-9, 1e-3, 0.3, 1.0, 2.5, 40.0, 1e5, 1e200], 5)
-    for listing in (original(program), corrected(program)):
+    for listing in (Listing.original(program), Listing.corrected(program)):
         options: Options = {"step_size": step_size, "at": range(1, 13), "velocity": True}
         found = run_many(scene, listing, **options)
         assert found.ier is not None
@@ -173,36 +173,42 @@ def test_steps_of_any_size_side_by_side(level: int, program: str) -> None:
 
 def test_rows_in_the_order_asked_for() -> None:
     scene = case_scene(3)
-    every = run_many(scene, corrected("four-term"), at=range(1, 101))
-    some = run_many(scene, corrected("four-term"), at=[100, 3, 3, 50])
+    every = run_many(scene, Listing.corrected("four-term"), at=range(1, 101))
+    some = run_many(scene, Listing.corrected("four-term"), at=[100, 3, 3, 50])
     for name in ("omega", "ier"):
         np.testing.assert_array_equal(
             getattr(some, name)[0], getattr(every, name)[0, [99, 2, 2, 49]]
         )
     np.testing.assert_array_equal(some.recorded_time, every.recorded_time[[99, 2, 2, 49]])
     np.testing.assert_array_equal(some.at, [100, 3, 3, 50])
-    last = run_many(scene, corrected("four-term"))
+    last = run_many(scene, Listing.corrected("four-term"))
     np.testing.assert_array_equal(last.omega[:, 0], every.omega[:, -1])
-    none = run_many(scene, corrected("four-term"), at=[], omega0=np.ones((5, 3)))
+    none = run_many(scene, Listing.corrected("four-term"), at=[], omega0=np.ones((5, 3)))
     assert (none.omega.shape, none.n_rows.tolist()) == ((5, 0, 3), [100] * 5)
 
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_no_bodies_at_all(threads: int) -> None:
-    found = run_many(case_scene(3), corrected("two-term"), omega0=np.ones((0, 3)), threads=threads)
+    found = run_many(
+        case_scene(3), Listing.corrected("two-term"), omega0=np.ones((0, 3)), threads=threads
+    )
     assert (found.omega.shape, found.ier is not None) == ((0, 1, 3), True)
     assert np.isnan(found.recorded_time).all()
 
 
 def test_types_and_shapes_of_what_is_found() -> None:
     given: Options = {"omega0": np.ones((4, 3)), "at": [1, 2]}
-    found = run_many(case_scene(3), corrected("runge-kutta"), **given)
+    found = run_many(case_scene(3), Listing.corrected("runge-kutta"), **given)
     assert (found.omega.shape, found.recorded_time.shape) == ((4, 2, 3), (2,))
     assert (found.velocity, found.ier) == (None, None)
     kinds = found.n_rows.dtype, found.status.dtype, found.stop_variable.dtype
     assert [str(each) for each in kinds] == ["int32", "int8", "int8"]
     apart = run_many(
-        case_scene(3), corrected("two-term"), step_size=[1.0, 1.0, 1.0, 2.0], velocity=True, **given
+        case_scene(3),
+        Listing.corrected("two-term"),
+        step_size=[1.0, 1.0, 1.0, 2.0],
+        velocity=True,
+        **given,
     )
     assert apart.recorded_time.shape == (4, 2)
     assert apart.velocity is not None

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pyharness.model.errors import InputError
-from pyharness.model.listing import corrected
+from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene, TorqueLaw, most_steps
 from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled
@@ -19,7 +19,7 @@ from tests.original.single_runs import Options, assert_same, same_bits
 
 
 def test_numbers_of_any_type() -> None:
-    scene, listing = case_scene(3), corrected("two-term")
+    scene, listing = case_scene(3), Listing.corrected("two-term")
     starts = [[0.5, 1.0, 2.0], [0.5, -1.0, 2.0]]
     wanted = run_many(scene, listing, omega0=starts, moments=(4.0, 3.0, 2.0))
     kinds: list[tuple[Any, Any]] = [
@@ -69,24 +69,24 @@ BAD: dict[str, tuple[Options, str]] = {
 def test_what_is_refused(name: str) -> None:
     options, message = BAD[name]
     with pytest.raises(InputError, match=message):
-        run_many(case_scene(3), corrected("runge-kutta"), **options)
+        run_many(case_scene(3), Listing.corrected("runge-kutta"), **options)
 
 
 REFUSED: dict[str, tuple[Callable[[], object], str]] = {
-    "no scene": (lambda: run_many("case 3", corrected("two-term")), "scene is text"),  # type: ignore[arg-type]
+    "no scene": (lambda: run_many("case 3", Listing.corrected("two-term")), "scene is text"),  # type: ignore[arg-type]
     "no listing": (lambda: run_many(case_scene(3), "original"), "listing is text"),  # type: ignore[arg-type]
     "inertia": (
-        lambda: run_many(Scene("", (1, 2, 3), inertia=np.eye(3)), corrected("two-term")),
+        lambda: run_many(Scene("", (1, 2, 3), inertia=np.eye(3)), Listing.corrected("two-term")),
         "the scene has a full inertia matrix",
     ),
     "space": (
-        lambda: run_many(replace(case_scene(3), torque=SPACE), corrected("two-term"),
+        lambda: run_many(replace(case_scene(3), torque=SPACE), Listing.corrected("two-term"),
                          torque_constant=[[0.0, 0.0, 1.0]]),
         "the torque is about the axes of space",
     ),
     "memory": (
         lambda: run_many(
-            replace(case_scene(3), steps=1000), corrected("two-term"), at=range(1, 1001),
+            replace(case_scene(3), steps=1000), Listing.corrected("two-term"), at=range(1, 1001),
             omega0=np.ones((most_steps() // 1000 + 1, 3)), effort=1e9,
         ),
         "this machine's memory can hold",
@@ -104,13 +104,15 @@ def test_scenes_that_are_refused(name: str) -> None:
 def test_arrays_stand_in_for_what_a_scene_lacks() -> None:
     """With arrays the scene may have a full inertia matrix (not read) and a zero space torque."""
     scene = Scene("", (1.0, 2.0, 3.0), inertia=np.eye(3), torque=SPACE)
-    found = run_many(scene, corrected("two-term"), moments=(3.0, 2.0, 1.0))
+    found = run_many(scene, Listing.corrected("two-term"), moments=(3.0, 2.0, 1.0))
     plain = Scene("", (1.0, 2.0, 3.0), (3.0, 2.0, 1.0))
-    assert same_bits(found.omega[0, 0], compiled.run(plain, corrected("two-term")).omega[-1])
+    assert same_bits(
+        found.omega[0, 0], compiled.run(plain, Listing.corrected("two-term")).omega[-1]
+    )
 
 
 def test_an_effort_lets_more_bodies_run() -> None:
     run = functools.partial(
-        run_many, case_scene(3), corrected("two-term"), omega0=np.ones((200, 3))
+        run_many, case_scene(3), Listing.corrected("two-term"), omega0=np.ones((200, 3))
     )
     assert run(effort=1e-4).n_rows.tolist() == [100] * 200

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pyharness.model.listing import corrected, original
+from pyharness.model.listing import Listing
 from pyharness.original.operations import operations_per_step
 
 
@@ -11,7 +11,7 @@ def test_runge_kutta_is_counted_as_by_hand() -> None:
     stages = 2 * 6 * 3 + 6 * 2  # 860-910 twice, 1040-1090
     result = 6 * 7  # 1180-1230
     tests = 6 + 6 + 6  # 1270-1320, 1330-1380, 1410-1460
-    found = operations_per_step(original("runge-kutta"))
+    found = operations_per_step(Listing.original("runge-kutta"))
     assert found.written == 1 + rates + stages + result + tests
     # Counted once are .5*DT, DT/6., and the slopes of stage 2, which the program computes at J = 1
     # again.
@@ -20,7 +20,7 @@ def test_runge_kutta_is_counted_as_by_hand() -> None:
 
 def test_powers_and_literals() -> None:
     """Cards 850-960 and 1390-1560 of the four-term deck have powers; equal literals count once."""
-    four = operations_per_step(original("four-term"))
+    four = operations_per_step(Listing.original("four-term"))
     solver = 2 * _crout(4, 6)
     points = 1 + 4 + 1  # 710-750, 2250
     matrix = 2 * 4 * (1 + (1 + 1) + (1 + 2))  # 2T, 3T**2, 4T**3
@@ -37,14 +37,14 @@ def _crout(n: int, m: int) -> int:
 
 
 def test_what_a_correction_takes_off() -> None:
-    two, four = (operations_per_step(original(p)) for p in ("two-term", "four-term"))
-    assert operations_per_step(corrected("two-term")).written == two.written - 1  # 1660
-    assert operations_per_step(corrected("four-term")).written == four.written - 1  # 2250
+    two, four = (operations_per_step(Listing.original(p)) for p in ("two-term", "four-term"))
+    assert operations_per_step(Listing.corrected("two-term")).written == two.written - 1  # 1660
+    assert operations_per_step(Listing.corrected("four-term")).written == four.written - 1  # 2250
 
 
 def test_second_factors_of_the_matrix_are_those_of_the_first() -> None:
     """With the same literals and points, the second call saves all but its substitutions."""
-    found = operations_per_step(original("two-term"))
+    found = operations_per_step(Listing.original("two-term"))
     built_and_factored = 2 + _crout(2, 0)
     assert found.written - found.once >= built_and_factored
     assert found == (254, 225)
@@ -52,5 +52,5 @@ def test_second_factors_of_the_matrix_are_those_of_the_first() -> None:
 
 @pytest.mark.parametrize("program", ["two-term", "four-term"])
 def test_the_matrix_is_built_and_factored_twice(program: str) -> None:
-    found = operations_per_step(original(program))
+    found = operations_per_step(Listing.original(program))
     assert found.once < found.written

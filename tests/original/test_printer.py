@@ -14,7 +14,7 @@ import pytest
 from pyharness import case_scene
 from pyharness.cli.main import main
 from pyharness.model.facts import facts
-from pyharness.model.listing import PROGRAMS, original
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original import compiled
@@ -48,7 +48,7 @@ def test_page_of_a_program(
     above = 4 if collocation else 5
     assert lines[:3] == ["  40.00     100.00", "  30.00     200.00", "  20.00     150.00"]
     assert [word.start() for word in re.finditer(r"\w+", lines[above - 1])] == heads
-    run = compiled.run(case_scene(5), original(program))
+    run = compiled.run(case_scene(5), Listing.original(program))
     assert run.velocity is not None
     assert len(lines) == above + run.steps  # the last row is the step of the stop
     row = lines[above + 24]
@@ -62,7 +62,7 @@ def test_header_shows_the_torques_that_the_cards_set(capsys: Capture) -> None:
     """A case shows the deck's torques, and a user's scene the torques of its law."""
     assert _page("two-term", 6, capsys)[0] == " 200.00     100.00"
     mine = Scene("mine", (1.0, 2.0, 3.0), moments=(3.0, 2.0, 1.5), steps=1)
-    run = compiled.run(mine, original("four-term"))
+    run = compiled.run(mine, Listing.original("four-term"))
     assert page(mine, "four-term", run).splitlines()[0] == "   3.00       0.00"
 
 

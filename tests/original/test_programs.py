@@ -9,15 +9,7 @@ import pytest
 from pyharness.compare.agreement import differences, distance
 from pyharness.compare.orders import measured_order
 from pyharness.model.facts import facts
-from pyharness.model.listing import (
-    PROGRAMS,
-    Listing,
-    corrected,
-    names_of,
-    original,
-    subset,
-    switchable,
-)
+from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled
@@ -85,11 +77,11 @@ def test_nasty_scenes_agree_to_the_last_bit(program: str, name: str) -> None:
 
 def test_overflow_ends_with_the_rows_until_then() -> None:
     for program in PROGRAMS:
-        run = compiled.run(NASTY["explodes"], corrected(program), may_stop=False)
+        run = compiled.run(NASTY["explodes"], Listing.corrected(program), may_stop=False)
         assert run.ended == "overflow"
         assert 0 < run.steps == len(run.omega) < 100
         assert np.isfinite(run.omega).all()
-    run = compiled.run(NASTY["huge"], corrected("two-term"))
+    run = compiled.run(NASTY["huge"], Listing.corrected("two-term"))
     assert (run.ended, run.omega.shape) == ("overflow", (0, 3))
 
 
@@ -102,7 +94,7 @@ def test_every_defect_alone_changes_something() -> None:
             assert any(
                 differences(
                     compiled.run(case_scene(case), with_it, limit),
-                    compiled.run(case_scene(case), corrected(program), limit),
+                    compiled.run(case_scene(case), Listing.corrected(program), limit),
                 )
                 for case, limit in itertools.product((5, 7), (500.0, 60.0, 1.0))
             ), (program, name)
@@ -122,11 +114,11 @@ def test_readings_not_adopted_lose_an_order(reading: str) -> None:
 def test_recorded_time_is_what_tape5_got() -> None:
     """TIME grows quadratically in the original; corrected, it is a sum of equal steps."""
     scene = case_scene(3)
-    before = compiled.run(scene, original("four-term"))
+    before = compiled.run(scene, Listing.original("four-term"))
     n = np.arange(1, 101)
     np.testing.assert_allclose(before.recorded_time, 0.01 * n * (n + 1) / 2, rtol=1e-13)
     np.testing.assert_array_equal(before.time, n * 0.01)
-    after = compiled.run(scene, corrected("four-term"))
+    after = compiled.run(scene, Listing.corrected("four-term"))
     np.testing.assert_array_equal(after.recorded_time, np.cumsum(np.full(100, 0.01)))
 
 
@@ -134,7 +126,7 @@ def test_recorded_time_is_what_tape5_got() -> None:
 def test_lipschitz_constant_and_no_stop(velocity: bool) -> None:
     """Section V.2: terminated after only 25 steps, by the velocity, whether requested or not."""
     scene = case_scene(2)
-    listing = original("runge-kutta")
+    listing = Listing.original("runge-kutta")
     run = compiled.run(scene, listing, velocity=velocity)
     assert run.ended == "stopped"
     assert run.stop is not None
@@ -151,7 +143,7 @@ def test_norms_name_their_variable() -> None:
     scene = case_scene(5)
     keep = ["lipschitz-tests-velocity"]
     together = compiled.run(scene, subset("runge-kutta", "corrected", keep=keep), lipschitz=1e-3)
-    alone = compiled.run(scene, corrected("runge-kutta"), lipschitz=1e-3)
+    alone = compiled.run(scene, Listing.corrected("runge-kutta"), lipschitz=1e-3)
     assert together.stop is not None
     assert alone.stop is not None
     assert (together.stop.variable, alone.stop.variable) == ("UV", "U")
@@ -159,7 +151,8 @@ def test_norms_name_their_variable() -> None:
 
 def test_evaluations_count_right_hand_sides() -> None:
     counts = {
-        program: compiled.run(case_scene(3), corrected(program)).evaluations for program in PROGRAMS
+        program: compiled.run(case_scene(3), Listing.corrected(program)).evaluations
+        for program in PROGRAMS
     }
     assert counts == {"two-term": 300, "four-term": 500, "runge-kutta": 400}
 
@@ -181,7 +174,7 @@ def test_calls_release_the_gil_and_give_the_same_bits_from_many_threads() -> Non
     from concurrent.futures import ThreadPoolExecutor
 
     scene = case_scene(7)
-    listing = original("four-term")
+    listing = Listing.original("four-term")
     wanted = compiled.run(scene, listing)
     with ThreadPoolExecutor(4) as pool:
         runs = list(pool.map(lambda _: compiled.run(scene, listing), range(64)))
@@ -199,7 +192,7 @@ def test_overflow_of_any_one_component_ends_the_run(
     """The other two components are constant and finite, until they are combined with a NaN."""
     omega = [1e160 * (1.0 - each) for each in axis]
     scene = Scene("", omega, coefficients=axis, step_size=1.0, steps=3)
-    for listing in (original(program), corrected(program)):
+    for listing in (Listing.original(program), Listing.corrected(program)):
         fortran, twin = (
             PROGRAM_REGISTRY[program].run(scene, listing, language, may_stop=False)
             for language in IMPLEMENTATIONS
@@ -214,7 +207,7 @@ def test_overflow_of_any_one_component_ends_the_run(
 def test_ier_is_printed_where_the_matrix_is_singular(program: str) -> None:
     scene = replace(case_scene(5), step_size=1e-17, steps=3)
     fortran, twin = (
-        PROGRAM_REGISTRY[program].run(scene, corrected(program), language)
+        PROGRAM_REGISTRY[program].run(scene, Listing.corrected(program), language)
         for language in IMPLEMENTATIONS
     )
     assert differences(fortran, twin) == []
@@ -225,14 +218,14 @@ def test_ier_is_printed_where_the_matrix_is_singular(program: str) -> None:
 def test_sum_of_stages_may_overflow_where_no_stage_does(axis: tuple[float, float, float]) -> None:
     law = TorqueLaw([1e308 * each for each in axis])
     scene = Scene("", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), torque=law, step_size=0.5, steps=1)
-    run = compiled.run(scene, corrected("runge-kutta"), may_stop=False, velocity=False)
+    run = compiled.run(scene, Listing.corrected("runge-kutta"), may_stop=False, velocity=False)
     assert (run.ended, run.steps) == ("overflow", 0)
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_torque_that_table_1_gives_initially_acts_over_the_first_step(program: str) -> None:
     """By a conjecture, omega increases by N h / I, or not at all if the table has no torque."""
-    plain = original(program)
+    plain = Listing.original(program)
     assumed = replace(plain, conjectures=plain.conjectures | {"initial-torque"})
     scene = case_scene(7)
     with_it, without = (run_program(scene, each).omega for each in (assumed, plain))

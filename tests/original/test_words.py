@@ -13,7 +13,7 @@ import pytest
 from pyharness import run_program
 from pyharness.compare.agreement import differences
 from pyharness.model.errors import InputError
-from pyharness.model.listing import PROGRAMS, corrected, original
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.original import in_word
@@ -81,7 +81,7 @@ def test_pages_do_not_hang_on_how_literals_are_rounded() -> None:
     for program in PROGRAMS:
         for case in (2, 4, 7):
             scene = case_scene(case)
-            for listing in (original(program), corrected(program)):
+            for listing in (Listing.original(program), Listing.corrected(program)):
                 nearest, other = (in_word.run(scene, listing, each) for each in (CDC, cut))
                 assert page(scene, program, nearest) == page(scene, program, other)
 
@@ -168,7 +168,7 @@ SCENES = {
 def test_binary64_has_the_bits_and_the_page_of_floats(program: str, name: str) -> None:
     """Test a few scenes; `verify --only words` tests every cell."""
     scene = SCENES[name]
-    for listing in (original(program), corrected(program)):
+    for listing in (Listing.original(program), Listing.corrected(program)):
         floats = run_program(scene, listing, "python")
         ours = in_word.run(scene, listing, WORDS["binary64"])
         assert differences(floats, ours) == []
@@ -179,7 +179,7 @@ def test_binary64_has_the_bits_and_the_page_of_floats(program: str, name: str) -
 
 
 def test_trajectory_has_the_numbers_themselves() -> None:
-    run = run_program(case_scene(5), corrected("two-term"), "python", word="binary128")
+    run = run_program(case_scene(5), Listing.corrected("two-term"), "python", word="binary128")
     assert run.exact is not None
     assert run.exact.shape == (100, 8)
     np.testing.assert_array_equal(run.exact[:, 2:5].astype(float), run.omega)
@@ -192,7 +192,7 @@ def test_page_is_printed_from_the_exact_value() -> None:
     """A number nearer to a tie than any float is rounded to its own side of the tie."""
     wide = Word(113)
     tie = Fraction(5, 100_000)
-    scene, listing = case_scene(1), corrected("runge-kutta")
+    scene, listing = case_scene(1), Listing.corrected("runge-kutta")
     run = replace(run_program(scene, listing, "python"), ier=None)
     for offset, due in ((Fraction(1, 10**30), "0.0001"), (-Fraction(1, 10**30), "0.0000")):
         number = wide(tie + offset)
@@ -207,15 +207,17 @@ def test_words_change_what_they_should() -> None:
     assert tuple(WORDS) == WORD_NAMES
     scene = case_scene(2)
     for name in WORD_NAMES:
-        run = run_program(scene, original("runge-kutta"), "python", word=name)
+        run = run_program(scene, Listing.original("runge-kutta"), "python", word=name)
         assert run.stop is not None
         assert (run.stop.step, run.stop.variable) == (25, "V2")
         assert isinstance(run.stop.quotient, float)
-    single = run_program(scene, corrected("four-term"), "python", word="binary32")
+    single = run_program(scene, Listing.corrected("four-term"), "python", word="binary32")
     assert single.ier is not None
     assert (single.ier == 129).all()
     pages = {
-        name: page(scene, "two-term", run_program(scene, original("two-term"), "python", word=name))
+        name: page(
+            scene, "two-term", run_program(scene, Listing.original("two-term"), "python", word=name)
+        )
         for name in ("binary64", "cdc48", "cdc48-rounded")
     }
     assert pages["binary64"] == pages["cdc48-rounded"]
@@ -224,7 +226,7 @@ def test_words_change_what_they_should() -> None:
 
 
 def test_mistakes_are_one_line(tmp_path: Path) -> None:
-    scene, listing = case_scene(2), original("two-term")
+    scene, listing = case_scene(2), Listing.original("two-term")
     with pytest.raises(InputError, match="did you mean 'cdc48'"):
         run_program(scene, listing, "python", word="cdc47")
     with pytest.raises(

@@ -8,7 +8,7 @@ from functools import partial
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.hold import scene_of
 from pyharness.checks.stress import Trial, named
-from pyharness.model.listing import Listing, corrected, original
+from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled
 from pyharness.original.linear_solver import SINGULAR
@@ -33,7 +33,7 @@ def _attempts() -> Iterator[Attempt]:
         yield Attempt(named("matrices", program, "threshold"), _threshold)
         for step in _RUN_STEPS:
             scene = replace(case_scene(5), step_size=step, steps=300)
-            for listing in (original(program), corrected(program)):
+            for listing in (Listing.original(program), Listing.corrected(program)):
                 where = f"ier-{step:.0e}"
                 name = named("matrices", program, listing.label, where, scene=scene)
                 yield Attempt(name, partial(_counted, listing))

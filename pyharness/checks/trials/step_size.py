@@ -15,7 +15,7 @@ from pyharness.methods.fixed_step import fixed_step
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.extension import COMPLETE, extension
-from pyharness.model.listing import Listing, corrected
+from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
@@ -155,7 +155,7 @@ def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
     scene, method = case_scene(case), name.subject
     if listing is None:
         runner: Runner = partial(_rows, method)
-        scheme = corrected("runge-kutta" if SCHEMES[method].order == 4 else "two-term")
+        scheme = Listing.corrected("runge-kutta" if SCHEMES[method].order == 4 else "two-term")
     else:
         runner = unstopped(listing).rows
         scheme = listing

@@ -9,7 +9,7 @@ import numpy as np
 
 from pyharness.history.claims.rules import Runs, largest_error, largest_of, spread_of
 from pyharness.model.facts import facts
-from pyharness.model.listing import Listing, corrected, names_of, subset, switchable
+from pyharness.model.listing import Listing, names_of, subset, switchable
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
@@ -56,7 +56,7 @@ class Laboratory:
         on no assumption.
         """
         if not self.is_original:
-            return corrected(program)
+            return Listing.corrected(program)
         readings = self.assumptions.readings & set(names_of("reading", program))
         assumed = self.assumptions.conjectures
         fixed = self.fixed & set(switchable(program))

@@ -10,7 +10,7 @@ from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
 from pyharness.history.claims.verdicts import REPRODUCED, Judged
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
-from pyharness.model.listing import PROGRAMS, original
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Triple
 from pyharness.original.programs import BINARY64
 
@@ -125,7 +125,10 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
             yield "300 steps", Assumptions(steps=300)
         elif name.startswith("conjecture "):
             # A conjecture of the original listing is removed; any other conjecture is added.
-            conjecture, own = name.removeprefix("conjecture "), original(PROGRAMS[0]).conjectures
+            conjecture, own = (
+                name.removeprefix("conjecture "),
+                Listing.original(PROGRAMS[0]).conjectures,
+            )
             told = "without" if conjecture in own else "with"
             yield f"{told} {name}", Assumptions(conjectures=own ^ {conjecture})
         else:

@@ -20,7 +20,7 @@ import numpy as np
 from pyharness.history.claims import rules
 from pyharness.history.claims.laboratory import Laboratory, distance, largest, ranges, starts
 from pyharness.history.claims.rules import COLLOCATION
-from pyharness.model.listing import Listing, names_of, original
+from pyharness.model.listing import Listing, names_of
 from pyharness.model.scene import Triple
 from pyharness.original.cells import subsets
 
@@ -191,7 +191,7 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
     for each in every:
         other = lab.run_on(lab.scene(case), each).stop
         if other is not None and other.step == step:
-            mended = sorted(original(each.program).defects - each.defects)
+            mended = sorted(Listing.original(each.program).defects - each.defects)
             there.append(f"original but for {', '.join(mended)}" if mended else "original")
     numbers = {
         "stopped at step": found,

@@ -30,7 +30,7 @@ SOURCES = (
     "modern/two_words", "modern/torque_terms", "modern/taylor_plan", "many/many_circular",
     "many/many_columns", "many/many_free", "many/many_fixed", "many/many_slots", "many/many_taylor",
 )  # fmt: skip
-COMMON = ("kinds", "interruption", "modern/problem", "many/bodies")
+COMMON = ("kinds", "interruption", "modern/problem", "modern/torque_noise", "many/bodies")
 KINDS = {
     "fused": r"vfn?m(add|sub)\w+",
     "add": r"v(add|sub)pd",

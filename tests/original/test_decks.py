@@ -168,7 +168,7 @@ def test_without_a_compiler_verify_says_so(
         monkeypatch.setattr(f"pyharness.{room}.compiler", lambda: None)
     assert list(decks(Selection(only=["decks"]))) == []
     assert main(["verify", "--only", "decks"]) == 2
-    assert "no gfortran" in capsys.readouterr().err
+    assert "needs gfortran" in capsys.readouterr().err
     assert main(["verify", "--only", "decks,orders/rk4/case-5"]) == 0
     assert "decks: not run" in capsys.readouterr().out
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from pyharness.bench.contenders import Maker, SceneContender
 from pyharness.compare.candidates import End, Ready, not_finite
-from pyharness.compare.timing import seconds, silenced
+from pyharness.compare.timing import ended_after, seconds, silenced
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
@@ -34,6 +34,9 @@ _CASES, _LONG_CASES = (2, 3, 4, 5, 6, 7), (3, 4)
 _TURNING_CASES, _LONG_TURNING_CASES = (1, *_CASES), (1, 2, 3, 4, 5, 7)
 
 _LONGEST_CALL = 1.0  # s; settings for which a call would take longer are left out
+# Longest time (s) to prepare and try a setting. At a coarse tolerance a solver may leave the true
+# solution, and then take steps that never end.
+_LONGEST_FIRST = 30.0
 # Time (s) for the first calls of a contender in one case, by the quantity that is varied.
 _BUDGET = {"tolerance": 1.0, "steps": 0.15, "none": 1.0}
 _LARGEST_STEPS = 1 << 22  # largest number of steps of a call
@@ -282,7 +285,7 @@ def _first_calls(
             break
         try:
             begin = perf_counter()
-            with silenced():
+            with silenced(), ended_after(_LONGEST_FIRST):
                 warnings.simplefilter("error", UserWarning)
                 ready = make(load.horizon, setting)
                 ready.run()

@@ -2,6 +2,7 @@
 
 import contextlib
 import gc
+import signal
 import statistics
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -29,9 +30,9 @@ def seconds(
     In each of the `rounds` rounds, each function is called repeatedly for about `length` seconds. A
     first call before the rounds is not counted. If this call takes longer than `slow` (s), the
     function is timed in at most three rounds; if it takes longer than five times `slow`, in one
-    round. The result is the median of the
-    times of the rounds, or another `statistic`. `say` is called with a message at the beginning of
-    each round. `clocks` has a clock (s) for each function; by default it is the wall clock.
+    round. The result is the median of the times of the rounds, or another `statistic`. `say` is
+    called with a message at the beginning of each round. `clocks` has a clock (s) for each
+    function; by default it is the wall clock.
     """
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))
@@ -66,6 +67,26 @@ def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> floa
     for _ in repeat(None, calls):
         run()
     return (clock() - begin) / calls
+
+
+@contextlib.contextmanager
+def ended_after(limit: float) -> Iterator[None]:
+    """Raise RuntimeError in a block of Python code that takes longer than `limit` (s).
+
+    A call of a compiled function ends first. Only the main thread may use this, because only the
+    main thread receives signals.
+    """
+
+    def end(*_: object) -> None:
+        raise RuntimeError(f"ended after {limit:g} s")
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, limit)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 @contextlib.contextmanager

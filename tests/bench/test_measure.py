@@ -271,6 +271,20 @@ def test_slow_contenders_are_left_out_and_it_is_said(
     assert found.refused == [Refusal(SHORT, "slow", 1e-4, why)]
 
 
+def test_a_call_that_never_ends_is_ended(right: Array, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench, "_LONGEST_FIRST", 0.05)
+
+    def answer(setting: float) -> End:
+        while setting > 1e-4:
+            pass
+        return End(right)
+
+    endless = SceneContender("endless", "tolerance", _fake(answer), (1e-3, 1e-5))
+    found = measure([SHORT], [endless])
+    assert [row.setting for row in found.rows] == [1e-5]
+    assert found.refused == [Refusal(SHORT, "endless", 1e-3, "RuntimeError: ended after 0.05 s")]
+
+
 LAWS = [case_scene(n) for n in range(1, 8)]
 LAWS.append(
     Scene(

@@ -173,7 +173,9 @@ def measure(
             makers.clear()  # no random scene occurs twice
         for contender in contenders:
             if load.scene.attitude is not None and not contender.attitude:
-                found.refused.append(Refusal(load, contender.name, None, "carries no attitude"))
+                found.refused.append(
+                    Refusal(load, contender.name, None, "does not compute attitudes")
+                )
                 continue
             tell(contender.name)
             key = (load.scene.case or load.label, contender.name)

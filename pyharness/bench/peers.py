@@ -11,7 +11,7 @@ from pyharness.bench import compiled_peers as compiled
 from pyharness.bench.contenders import TOLERANCES, Maker, SceneContender, refuse_rounding
 from pyharness.bench.orekit_peer import orekit
 from pyharness.compare.candidates import End, Ready, not_finite
-from pyharness.methods.scipy_ivp import RightHandSide, state_of, turning
+from pyharness.methods.scipy_ivp import RightHandSide, state_of, with_attitude
 from pyharness.model.scene import Scene
 from pyharness.truth.reference import exact_coefficients
 
@@ -103,7 +103,7 @@ def _right_hand_side(scene: Scene) -> RightHandSide:
     It is for omega, or for omega and attitude if the scene has an attitude.
     """
     slopes = scene.right_hand_side()
-    return slopes if scene.attitude is None else turning(slopes)
+    return slopes if scene.attitude is None else with_attitude(slopes)
 
 
 def _absolute(scene: Scene) -> Any:

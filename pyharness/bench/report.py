@@ -143,12 +143,12 @@ def _record(finding: Finding) -> dict[str, Any]:
     drawn = _random(finding)
     found: dict[str, Any] = {
         "rows": [
-            _asked(row)
+            _settings_of(row)
             | {name: getattr(row, name) for name in ("seconds", "error", "evaluations", "kind")}
             | {"note": row.note or None}
             for row in finding.rows
         ],
-        "refused": [_asked(each) | {"reason": each.reason} for each in finding.refused],
+        "refused": [_settings_of(each) | {"reason": each.reason} for each in finding.refused],
         "compile_seconds": [
             {"scene" if drawn else "case": place, "method": method, "seconds": seconds}
             for (place, method), seconds in finding.preparation.items()
@@ -170,7 +170,7 @@ def _record(finding: Finding) -> dict[str, Any]:
     return found
 
 
-def _asked(each: Row | Refusal) -> dict[str, Any]:
+def _settings_of(each: Row | Refusal) -> dict[str, Any]:
     load = each.workload
     asked = {"case": load.scene.case} | ({"scene": load.scene.name} if load.kinds else {})
     return asked | {"horizon": load.horizon} | {"method": each.method, "setting": each.setting}

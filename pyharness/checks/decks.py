@@ -60,10 +60,10 @@ def decks(chosen: Selection) -> Iterator[Check]:
         return
     with TemporaryDirectory() as folder, ThreadPoolExecutor(_AT_ONCE) as pool:
         solver_object(Path(folder))
-        yield from pool.map(partial(_held, Path(folder)), asked)
+        yield from pool.map(partial(_compared, Path(folder)), asked)
 
 
-def _held(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
+def _compared(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
     name, listing, case = asked
     scene = case_scene(case)
     port = PROGRAM_REGISTRY[listing.program].run(scene, listing)

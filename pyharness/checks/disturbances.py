@@ -56,7 +56,7 @@ class Probe:
         return float(np.abs(self.found - self.derived).max())
 
 
-def held_steady(coefficients: Triple, omega: Triple, step: float) -> Scene:
+def steady_scene(coefficients: Triple, omega: Triple, step: float) -> Scene:
     """Return a scene of one `step` (s) in which a constant torque keeps `omega` (rad/s) steady.
 
     `coefficients` are A, B and C of Euler's equations. If all numbers have few binary digits, the

@@ -97,7 +97,7 @@ def golden(chosen: Selection) -> Iterator[Attempt]:
     same_library = libraries == {mathematics()}
     for each in due:
         name = Name("golden", each.source, each.name, options=options)
-        yield Attempt(name, partial(_held, each, entries.get(each.command), same_library))
+        yield Attempt(name, partial(_compared, each, entries.get(each.command), same_library))
     for command in sorted(set(entries) - {each.command for each in due}):
         rest = command.partition(" run ")[2].replace("--", "").replace(" ", "-")
         source = next(s for s, file in known.items() if entries[command] in file["trajectory"])
@@ -108,7 +108,9 @@ def _forgotten(name: Name) -> Check:
     return name.judged(False, "is recorded and no longer produced; verify --update forgets it")
 
 
-def _held(each: Recorded, entry: dict[str, Any] | None, same_library: bool, name: Name) -> Check:
+def _compared(
+    each: Recorded, entry: dict[str, Any] | None, same_library: bool, name: Name
+) -> Check:
     if entry is None:
         return name.judged(False, "is not recorded; verify --update records it")
     run = each.run()

@@ -14,8 +14,8 @@ import numpy as np
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.judge import (
     MOST,
+    MethodRun,
     Policy,
-    Tried,
     Truth,
     allowed,
     judge,
@@ -79,7 +79,7 @@ def _is_free(scene: Scene) -> bool:
 Judged = Callable[[Truth, float | None, Name], Iterable[Check]]
 
 
-def hold_all(
+def check_all(
     suite: str,
     held: Callable[[Name, float], Iterable[Attempt]] | None = None,
     has_programs: Callable[[Circumstance], bool] = lambda each: True,
@@ -148,7 +148,7 @@ def _steps(scene: Scene, time: float) -> int:
     return max(1, math.ceil(abs(time) / scene.step_size * (1.0 - 1e-6)))
 
 
-def refusable(tried: Tried, truth: Truth, why: str) -> bool:
+def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse a scene; every other refusal is a fault.
 
     `tried` has the method and the scene, and `truth` is the true solution. `why` is the message of
@@ -165,14 +165,14 @@ def refusable(tried: Tried, truth: Truth, why: str) -> bool:
     return method == "quick" or (method in _SERIES and radians > _TOO_MANY_RADIANS)
 
 
-def _derived(truth: Truth, tried: Tried) -> float | None:
+def _derived(truth: Truth, tried: MethodRun) -> float | None:
     """Return the limit of a method's error: promised errors and rounding, amplified by the flow.
 
     `tried` is the run of the method. The limit is relative to the largest omega. It is None if the
     method promises no error, and infinite if it would leave fewer than two digits of omega. The
     limit of a closed form is not amplified.
     """
-    made = made_on_the_way(tried, truth)
+    made = promised_sum(tried, truth)
     if truth.exact and tried.method in FORMS:
         # A closed form accumulates no errors of steps. To its own error only the rounding of A, B
         # and C is added.
@@ -189,7 +189,7 @@ DERIVED = Policy(_derived, refusable)
 """Policy whose limit is the promised error of a method plus rounding, amplified by the flow."""
 
 
-def _roundings(tried: Tried, truth: Truth) -> float:
+def _roundings(tried: MethodRun, truth: Truth) -> float:
     """Return the number of steps in which a run rounds omega without compensated summation.
 
     `tried` is the run, and `truth` is the true solution of the same scene.
@@ -205,11 +205,11 @@ def _roundings(tried: Tried, truth: Truth) -> float:
 def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check]:
     method, scene = name.subject, scene_of(name)
     ask = partial(run_method, method, scene, truth.end, tolerance)
-    tried = Tried(method, tolerance, scene, lambda: of_end(method, ask()))
+    tried = MethodRun(method, tolerance, scene, lambda: of_end(method, ask()))
     yield judge(name.of("error"), tried, truth, DERIVED)
     answer = tried.answer
     if truth.exact and answer.is_whole and not answer.refusal:
-        made = made_on_the_way(tried, truth)
+        made = promised_sum(tried, truth)
         lost = truth.flow.unamplified + _roundings(tried, truth) * ROUNDING
         if made is None:
             # Each step rounds omega, its sums, and the last iteration.
@@ -228,7 +228,7 @@ def scene_of(name: Name) -> Scene:
     return name.scene
 
 
-def made_on_the_way(tried: Tried, truth: Truth) -> float | None:
+def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
     """Return the bound that a method promises on the sum of the errors of its steps.
 
     The bound is relative to the largest omega. For a method with a fixed step in a scene without

@@ -65,7 +65,7 @@ def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answe
 
 
 @dataclass(frozen=True, eq=False)
-class Tried:
+class MethodRun:
     """A run of a method on a scene, which `ask` makes when the answer is first needed.
 
     `tolerance` is None if the method uses the scene's step size.
@@ -85,22 +85,24 @@ class Tried:
             return Answer(refusal=str(refusal))
 
 
-def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> Tried:
+def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
     """Return a deferred run of the method `method` by `solve`, with results at all `times` (s).
 
     The run is made when its answer is first needed.
     """
     ask = method_candidate(method, tolerance)
-    return Tried(method, tolerance, scene, lambda: of_rows(ask, scene, times))
+    return MethodRun(method, tolerance, scene, lambda: of_rows(ask, scene, times))
 
 
-def by_end(method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float) -> Tried:
+def by_end(
+    method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float
+) -> MethodRun:
     """Return a deferred run of a candidate, a method or a prepared solver, until one `time` (s).
 
     The run is made when its answer is first needed. `method` is the name of the method in the
     policy and in messages of refusal.
     """
-    return Tried(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
+    return MethodRun(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,8 +205,8 @@ class Policy:
     the message of the refusal.
     """
 
-    limit: Callable[[Truth, Tried], float | None]
-    may_refuse: Callable[[Tried, Truth, str], bool] = lambda *_: False
+    limit: Callable[[Truth, MethodRun], float | None]
+    may_refuse: Callable[[MethodRun, Truth, str], bool] = lambda *_: False
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
@@ -237,13 +239,13 @@ def linear(limit: float) -> float:
     return limit if limit <= LINEAR else math.inf
 
 
-def tolerance_of(tried: Tried) -> float:
+def tolerance_of(tried: MethodRun) -> float:
     """Return the tolerance of a run, which must have one."""
     assert tried.tolerance is not None
     return tried.tolerance
 
 
-def has_no_form(tried: Tried, truth: Truth, why: str) -> bool:
+def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse the scene of `tried` with the message `why`.
 
     `closed-form` may refuse a scene that has no closed form. `quick` may refuse a scene if one of
@@ -255,7 +257,7 @@ def has_no_form(tried: Tried, truth: Truth, why: str) -> bool:
     return tried.method == "closed-form" and closed_form(tried.scene) is None
 
 
-def _granting(factor: Callable[[float], float]) -> Callable[[Truth, Tried], float]:
+def _granting(factor: Callable[[float], float]) -> Callable[[Truth, MethodRun], float]:
     """Return the limit function of a policy: the tolerance times ``factor(K)``, plus rounding.
 
     K is the error amplification of the flow. The limit also contains the error of the true
@@ -277,7 +279,7 @@ AMPLIFIED = Policy(_granting(lambda growth: growth))
 """Policy whose limit is the tolerance plus rounding, both amplified by the flow."""
 
 
-def judge(name: Name, tried: Tried, truth: Truth, policy: Policy) -> Check:
+def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
     """Return the check that the error of a method's answer is within the limit of the policy.
 
     `tried` is the run that gives the answer, and `truth` is the true solution. If the method

@@ -12,7 +12,15 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
-from pyharness.checks.judge import AS_STATED, Tried, Truth, by_end, by_rows, judge, reference_truth
+from pyharness.checks.judge import (
+    AS_STATED,
+    MethodRun,
+    Truth,
+    by_end,
+    by_rows,
+    judge,
+    reference_truth,
+)
 from pyharness.checks.selection import Selection
 from pyharness.checks.tolerances import OF_CASES, of_case
 from pyharness.compare.agreement import ulps
@@ -90,7 +98,7 @@ def _solved(
     for method in names:
         for tolerance in of_case(method, thin):
             name = Name(suite, method, f"case-{case}", f"{tolerance:.1e}")
-            tried = partial(solve_tried, method, tolerance, scene, times)
+            tried = partial(run_of_solve, method, tolerance, scene, times)
             yield Attempt(name, partial(_judged, tried, truth))
 
 
@@ -105,11 +113,11 @@ def _prepared(
                 if method == "quick" and tolerance < FEW_DIGITS:
                     continue
                 own = replace(where, subject=name.subject + method, setting=f"{tolerance:.1e}")
-                tried = partial(call_tried, method, tolerance, scene, time)
+                tried = partial(run_of_call, method, tolerance, scene, time)
                 yield Attempt(own, partial(_judged, tried, truth))
 
 
-def solve_tried(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> Tried:
+def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
     """Return a deferred run of a method by `solve`, with results at all `times` (s).
 
     If the scene has an attitude and `tolerance` is too fine for a method of SciPy, the finest
@@ -121,7 +129,7 @@ def solve_tried(method: str, tolerance: float, scene: Scene, times: Sequence[flo
     return by_rows(method, tolerance, scene, times)
 
 
-def call_tried(method: str, tolerance: float, scene: Scene, time: float) -> Tried:
+def run_of_call(method: str, tolerance: float, scene: Scene, time: float) -> MethodRun:
     """Return a deferred call of a prepared solver with a result at one `time` (s).
 
     Before this call, the solver is called with another initial omega, which must not affect the
@@ -131,7 +139,7 @@ def call_tried(method: str, tolerance: float, scene: Scene, time: float) -> Trie
     return by_end(method, prepare(method, tolerance, primed=True), tolerance, scene, time)
 
 
-def _judged(tried: Callable[[], Tried], truth: Callable[[], Truth], name: Name) -> Check:
+def _judged(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Name) -> Check:
     return judge(name, tried(), truth(), AS_STATED)
 
 

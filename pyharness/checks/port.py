@@ -55,12 +55,12 @@ def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Ite
         with PortProcess(command, patience) as process:
             for cell, listing, case in cells:
                 name, again = of_cell("port", listing, case), f"{verb} --cell {cell}"
-                yield replace(_held(name, process, listing, case_scene(case)), again=again)
+                yield replace(_compared(name, process, listing, case_scene(case)), again=again)
     except PortError as error:
         yield replace(name.judged(False, str(error)), again=again)
 
 
-def _held(name: Name, process: PortProcess, listing: Listing, scene: Scene) -> Check:
+def _compared(name: Name, process: PortProcess, listing: Listing, scene: Scene) -> Check:
     answer = read_answer(process.ask(request(scene, listing)), scene.steps)
     twin = PROGRAM_REGISTRY[listing.program].run(scene, listing, "python")
     note = "; ".join(differences(twin, answer))

@@ -54,7 +54,7 @@ def request(
     asked = {
         "schema": SCHEMAS["port request"],
         "program": listing.program,
-        "scene": asked_scene(scene),
+        "scene": requested_scene(scene),
         "listing": listing_record(listing),
         "lipschitz": facts("cases")["deck"]["lipschitz"] if lipschitz is None else lipschitz,
         "may_stop": may_stop,
@@ -62,7 +62,7 @@ def request(
     return json.dumps(asked, allow_nan=False).encode()
 
 
-def asked_scene(scene: Scene) -> dict[str, Any]:
+def requested_scene(scene: Scene) -> dict[str, Any]:
     """Return a scene as the dictionary for the field `scene` of a request to a port."""
     return {
         **scene_record(scene),

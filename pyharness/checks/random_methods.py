@@ -17,8 +17,8 @@ from pyharness.checks.check import Attempt, Check, Name, Sample
 from pyharness.checks.judge import (
     IF_CALM,
     Answer,
+    MethodRun,
     Policy,
-    Tried,
     Truth,
     allowed,
     by_rows,
@@ -28,7 +28,7 @@ from pyharness.checks.judge import (
     reference_truth,
     tolerance_of,
 )
-from pyharness.checks.methods import START, call_tried, solve_tried
+from pyharness.checks.methods import START, run_of_call, run_of_solve
 from pyharness.checks.selection import Selection
 from pyharness.compare.candidates import prepared_candidate
 from pyharness.methods.problem import closed_form
@@ -53,7 +53,7 @@ _FINE = 1e-9
 _MORE_WORK = "allow more work"
 _EARLIER = 0.4  # fraction of the last time, to judge intermediate output too
 
-Entrances = Mapping[str, Callable[[], Tried]]
+Entrances = Mapping[str, Callable[[], MethodRun]]
 
 
 def truth_of(drawn: Draw) -> Truth:
@@ -71,7 +71,7 @@ def truth_of(drawn: Draw) -> Truth:
     return Truth(np.array(times), path.omega, 0.0, replace(flow, largest=largest))
 
 
-def may_refuse(tried: Tried, truth: Truth, why: str) -> bool:
+def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse the scene of `tried` with the message `why`.
 
     The automatic choice of a method may not refuse. A closed form may refuse only scenes near the
@@ -96,7 +96,7 @@ def may_refuse(tried: Tried, truth: Truth, why: str) -> bool:
     return finest(method, tried.scene, truth.end) > tolerance
 
 
-def _limit(truth: Truth, tried: Tried) -> float:
+def _limit(truth: Truth, tried: MethodRun) -> float:
     growth = truth.flow.amplification
     return tolerance_of(tried) * lively(growth) + ROUNDING * growth
 
@@ -149,9 +149,9 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
         times = (_EARLIER * drawn.time, drawn.time)
         tolerance = drawn.tolerance(tolerance_at)
         entrances: Entrances = {
-            "attitude-auto": partial(solve_tried, "auto", tolerance, scene, times),
-            "attitude-taylor": partial(solve_tried, "taylor", tolerance, scene, times),
-            "attitude-prepared": partial(call_tried, "auto", tolerance, scene, times[-1]),
+            "attitude-auto": partial(run_of_solve, "auto", tolerance, scene, times),
+            "attitude-taylor": partial(run_of_solve, "taylor", tolerance, scene, times),
+            "attitude-prepared": partial(run_of_call, "auto", tolerance, scene, times[-1]),
         }
         asked = _requested(chosen, number, entrances)
         try:
@@ -178,7 +178,7 @@ def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
     if number // 2 % _EVERY_SLOW == 0 and not thin:
         names += [*SCIPY_METHODS, "reference"]
     times = (_EARLIER * drawn.time, drawn.time)
-    found: dict[str, Callable[[], Tried]] = {}
+    found: dict[str, Callable[[], MethodRun]] = {}
     for name in names:
         tolerance = drawn.tolerance(REGISTRY[name].finest)
         found[f"solve-{name}"] = partial(by_rows, name, tolerance, drawn.scene, times)
@@ -187,7 +187,7 @@ def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
     return found
 
 
-def _prepared(name: str, drawn: Draw) -> Tried:
+def _prepared(name: str, drawn: Draw) -> MethodRun:
     tolerance = drawn.tolerance(REGISTRY[name].finest)
 
     def ask() -> Answer:
@@ -195,7 +195,7 @@ def _prepared(name: str, drawn: Draw) -> Tried:
         # Every end before the last time counts as a refusal.
         return of_end(name, end) if end.has_result else Answer(refusal=f"{name}: {end.ended}")
 
-    return Tried(name, tolerance, drawn.scene, ask)
+    return MethodRun(name, tolerance, drawn.scene, ask)
 
 
 def _sampled(
@@ -205,7 +205,7 @@ def _sampled(
         yield Attempt(chosen.drawn(number, subject), partial(_sample, tried, truth, policy))
 
 
-def _sample(tried: Callable[[], Tried], truth: Truth, policy: Policy, name: Name) -> Sample:
+def _sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: Name) -> Sample:
     """Run an entry point and return the check of its error, within the limit of the policy.
 
     `tried` makes the run. The check also has the tolerance and the error amplification of the run,

@@ -57,10 +57,10 @@ def summary(
     for name, members in groups.items():
         worst = max((severity(check)[1] for check in members if check.limit), default=None)
         rows.append([name, len(members), sum(not check.passed for check in members), worst])
-    return [title, told_singly(checks), [Table(_GROUPS, rows)], more, [verdict(checks)]]
+    return [title, listed_singly(checks), [Table(_GROUPS, rows)], more, [verdict(checks)]]
 
 
-def told_singly(checks: Sequence[Check]) -> list[str]:
+def listed_singly(checks: Sequence[Check]) -> list[str]:
     """Return lines that show each failed check, with the command that repeats it.
 
     At most `_MOST_FAILURES` failed checks are shown. If `checks` has at most `_FEW` elements, the

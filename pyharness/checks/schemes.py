@@ -49,11 +49,11 @@ def schemes(chosen: Selection) -> Iterator[Attempt]:
     for case in cases(chosen, (7,)):
         for program in PROGRAMS:
             yield Attempt(
-                Name("schemes", program, f"case-{case}"), partial(_held, case_scene(case))
+                Name("schemes", program, f"case-{case}"), partial(_compared, case_scene(case))
             )
 
 
-def _held(scene: Scene, name: Name) -> Check:
+def _compared(scene: Scene, name: Name) -> Check:
     program = name.subject
     run = PROGRAM_REGISTRY[program].run(scene, Listing.corrected(program), may_stop=False)
     if not is_whole(scene, run):

@@ -55,7 +55,7 @@ def stops(chosen: Selection) -> Iterator[Attempt]:
         for defects in subsets(ways):
             listing = Listing(_PROGRAM, defects)
             name = Name("stops", "", f"case-{case}", listing_name(listing))
-            yield Attempt(name, partial(_held, case_scene(case), listing, known))
+            yield Attempt(name, partial(_compared, case_scene(case), listing, known))
 
 
 def _run(scene: Scene) -> tuple[Trajectory, Stages | None]:
@@ -67,7 +67,7 @@ def _run(scene: Scene) -> tuple[Trajectory, Stages | None]:
     return run, stages(scene, run) if is_whole(scene, run) else None
 
 
-def _held(
+def _compared(
     scene: Scene,
     listing: Listing,
     known: Callable[[], tuple[Trajectory, Stages | None]],

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from pyharness.checks.check import Check, severity
-from pyharness.checks.report import checks_report, told_singly, verdict
+from pyharness.checks.report import checks_report, listed_singly, verdict
 from pyharness.checks.stress import Trial
 from pyharness.model.report import Column, Picture, Report, Section, Table, short, words
 
@@ -21,7 +21,7 @@ _NOTE = (
 
 def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
     """Return the report of `stress`: the failures, then a table and a picture for each trial."""
-    text: list[Section] = [told_singly(checks), [_NOTE]]
+    text: list[Section] = [listed_singly(checks), [_NOTE]]
     for each in trials:
         own = [check for check in checks if check.suite == each.name]
         if own:

@@ -65,7 +65,7 @@ class _Interruption:
     def _again(self, *_: object) -> None:
         # Code that has installed its own handler of SIGINT is not interrupted.
         is_ours = signal.getsignal(signal.SIGINT) == self.interrupt
-        if is_ours and not self.is_reported and not _is_on_its_way():
+        if is_ours and not self.is_reported and not _is_pending():
             raise KeyboardInterrupt
 
 
@@ -153,7 +153,7 @@ def leave(code: int) -> None:
     os._exit(code)
 
 
-def _is_on_its_way() -> bool:
+def _is_pending() -> bool:
     """Return whether a KeyboardInterrupt is being handled at present, for example by a cleanup."""
     error: BaseException | None = sys.exception()
     while error is not None:
@@ -182,8 +182,8 @@ def _quiet_of(hook: Callable[[Any], Any]) -> Callable[[Any], Any]:
     Any other exception is passed to `hook`.
     """
 
-    def told(unraisable: Any) -> None:
+    def report_unraisable(unraisable: Any) -> None:
         if not (came() and issubclass(unraisable.exc_type, KeyboardInterrupt)):
             hook(unraisable)
 
-    return told
+    return report_unraisable

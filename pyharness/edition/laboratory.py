@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.checks.port_protocol import asked_scene
+from pyharness.checks.port_protocol import requested_scene
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, flagged, switches
 from pyharness.model.report import short
@@ -61,8 +61,8 @@ def context() -> dict[str, Any]:
 def data() -> dict[str, Any]:
     """Return the data, as JSON values, with which the page's script runs any case and program."""
     return {
-        "scenes": [asked_scene(case_scene(number)) for number in case_numbers()],
-        "headings": {number: _told(case_scene(number)) for number in case_numbers()},
+        "scenes": [requested_scene(case_scene(number)) for number in case_numbers()],
+        "headings": {number: _described(case_scene(number)) for number in case_numbers()},
         "programs": list(PROGRAMS),
         "flags": [
             {
@@ -84,7 +84,7 @@ def data() -> dict[str, Any]:
     }
 
 
-def _told(scene: Scene) -> list[str]:
+def _described(scene: Scene) -> list[str]:
     """Return lines that describe the body and the torque of a case, with any remarks."""
     lines = heading(scene)
     body, torque, *_ = lines[1].split("; ")

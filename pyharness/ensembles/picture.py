@@ -129,7 +129,7 @@ def _panels(
                 values = np.take(values, each, axis=position)
             order = [d for d in store.sweep.dimensions if d in shown]
             assert order == shown
-            told = [_told(axis_of[d], i) for d, i in at.items()] + ([label] if label else [])
+            told = [_label_of(axis_of[d], i) for d, i in at.items()] + ([label] if label else [])
             found.append((", ".join(told), places, values))
     return found
 
@@ -198,7 +198,7 @@ def _limits(values: list[Array]) -> tuple[float, float]:
     return least, largest if largest > least else least + 1.0
 
 
-def _told(axis: Axis, index: int) -> str:
+def _label_of(axis: Axis, index: int) -> str:
     value = axis.coordinates()[index]
     return f"{value}" if axis.is_choice else f"{axis.field} {value:.4g}"
 

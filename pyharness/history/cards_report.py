@@ -155,8 +155,8 @@ def _block(card: Card) -> Section:
     missing = "-" if absent is None else f"none: {absent}"
     left = [*_named("card", [ours]), *_named("scan", [shown])]
     right = [
-        *_named("port", _told(found.port.get(card.number, [])) or [missing]),
-        *_named("twin", _told(found.twin.get(card.number, [])) or [missing]),
+        *_named("port", _texts_of(found.port.get(card.number, [])) or [missing]),
+        *_named("twin", _texts_of(found.twin.get(card.number, [])) or [missing]),
     ]
     pairs = zip_longest(left, right, fillvalue="")
     lines = [Line(f"{a.ljust(_HALF)}   {b}".rstrip()) for a, b in pairs]
@@ -173,7 +173,7 @@ def _block(card: Card) -> Section:
     ]
 
 
-def _told(places: Iterable[Place]) -> list[str]:
+def _texts_of(places: Iterable[Place]) -> list[str]:
     return [f"{each.file}:{each.line} {each.text}" for each in places]
 
 

@@ -96,14 +96,14 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
     the arithmetic. The result is infinite after an overflow.
     """
     given = scene if word == BINARY64 else scene_in(scene, WORDS[word])
-    omega = march(given, weighting, mistake)
+    omega = integrate(given, weighting, mistake)
     truth = reference(scene, scene.times()).omega
     with np.errstate(all="ignore"):
         error = np.abs(omega - truth).max()
     return float(error / np.abs(truth).max()) if np.isfinite(error) else np.inf
 
 
-def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
+def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
     """Integrate a scene of constant torque by one of the `WEIGHTINGS`, programmed with one mistake.
 
     `mistake` is the identifier of a mistake in `data/lost.toml`, or ``none``. Return omega (rad/s),

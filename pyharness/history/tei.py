@@ -91,41 +91,43 @@ def _header(root: xml.Element) -> None:
     header = xml.SubElement(root, "teiHeader")
     file = xml.SubElement(header, "fileDesc")
     titles = xml.SubElement(file, "titleStmt")
-    _said(titles, "title", f"{TITLE}: the three programs of the appendix, with an apparatus")
-    _said(titles, "author", AUTHOR)
-    _said(titles, "editor", "The pyharness authors")
-    _said(xml.SubElement(file, "editionStmt"), "edition", f"pyharness {pyharness.__version__}")
+    _with_text(titles, "title", f"{TITLE}: the three programs of the appendix, with an apparatus")
+    _with_text(titles, "author", AUTHOR)
+    _with_text(titles, "editor", "The pyharness authors")
+    _with_text(xml.SubElement(file, "editionStmt"), "edition", f"pyharness {pyharness.__version__}")
     publication = xml.SubElement(file, "publicationStmt")
-    _said(publication, "publisher", "The pyharness authors")
+    _with_text(publication, "publisher", "The pyharness authors")
     available = xml.SubElement(publication, "availability")
-    _said(available, "licence", "The edition: MIT", target="https://opensource.org/license/mit")
+    _with_text(
+        available, "licence", "The edition: MIT", target="https://opensource.org/license/mit"
+    )
     source = xml.SubElement(file, "sourceDesc")
     printed = xml.SubElement(source, "bibl")
-    _said(printed, "author", AUTHOR)
-    _said(printed, "title", TITLE)
-    _said(printed, "publisher", "AFWAL")
-    _said(printed, "date", "March 1982", when="1982-03")
-    _said(printed, "biblScope", "appendix", unit="section")
+    _with_text(printed, "author", AUTHOR)
+    _with_text(printed, "title", TITLE)
+    _with_text(printed, "publisher", "AFWAL")
+    _with_text(printed, "date", "March 1982", when="1982-03")
+    _with_text(printed, "biblScope", "appendix", unit="section")
     witnesses = xml.SubElement(source, "listWit")
     for each in edition["witness"]:
-        witness = _said(witnesses, "witness", each["what"], id=each["siglum"])
-        _said(witness, "idno", each["sha256"], type="SHA-256")
+        witness = _with_text(witnesses, "witness", each["what"], id=each["siglum"])
+        _with_text(witness, "idno", each["sha256"], type="SHA-256")
 
     encoding = xml.SubElement(header, "encodingDesc")
     declared = xml.SubElement(encoding, "editorialDecl")
     principles = edition["principles"]
-    _said(declared, "p", f"Kept: {principles['kept']}.")
-    _said(
+    _with_text(declared, "p", f"Kept: {principles['kept']}.")
+    _with_text(
         declared,
         "p",
         "A line of the listing is the number of a card, a dash, and its text: the num and the seg "
         "of an ab. The columns of seg are those of the card.",
     )
     correction = xml.SubElement(declared, "correction", method="markup")
-    _said(correction, "p", f"Emended: {principles['emended']}.")
-    _said(correction, "p", f"Conjectured: {principles['conjectured']}.")
+    _with_text(correction, "p", f"Emended: {principles['emended']}.")
+    _with_text(correction, "p", f"Conjectured: {principles['conjectured']}.")
     normalization = xml.SubElement(declared, "normalization", method="markup")
-    _said(normalization, "p", f"Normalized: {principles['normalized']}.")
+    _with_text(normalization, "p", f"Normalized: {principles['normalized']}.")
     xml.SubElement(encoding, "variantEncoding", method="parallel-segmentation", location="internal")
     classes = xml.SubElement(encoding, "classDecl")
     _taxonomy(classes, "kind", "kinds of entries", _KINDS.items())
@@ -141,7 +143,7 @@ def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]
     The elements are yielded in the order of the cards. They do not yet contain the card's text.
     """
     div = _named(body, "div", program, type="deck")
-    _said(div, "head", f"The {program} program")
+    _with_text(div, "head", f"The {program} program")
     cards = deck(program).cards
     lost = [n for n, card in cards.items() if card.lost]
     for page in sorted(_pages(program), key=lambda each: each.first):
@@ -157,10 +159,10 @@ def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]
                         yield _block(div, card), card
                     yield _block(div, cards[number]), cards[number]
             elif "furniture" in item:
-                _said(div, "fw", item["furniture"], type="furniture")
+                _with_text(div, "fw", item["furniture"], type="furniture")
             else:
                 line = xml.SubElement(div, "ab", type="phantom", corresp=f"#{item['entry']}")
-                _said(line, "surplus", item["phantom"])
+                _with_text(line, "surplus", item["phantom"])
 
 
 def _pages(program: str) -> list[_Page]:
@@ -204,13 +206,13 @@ def _fill(block: xml.Element, card: Card) -> None:
 
 def _app(parent: xml.Element, ours: str, scans: str, entry: str) -> xml.Element:
     app = xml.SubElement(parent, "app", corresp=f"#{entry}")
-    _said(app, "lem", ours, cert=_cert(entry))
-    _said(app, "rdg", scans, wit="#S")
+    _with_text(app, "lem", ours, cert=_cert(entry))
+    _with_text(app, "rdg", scans, wit="#S")
     return app
 
 
 def _apparatus(div: xml.Element) -> None:
-    _said(div, "head", "The apparatus")
+    _with_text(div, "head", "The apparatus")
     for entry in facts("apparatus")["entry"]:
         classes = [_class("kind", entry["kind"]), _class("certainty", entry["certainty"])]
         classes += [_class("ground", siglum) for siglum in entry["grounds"]]
@@ -220,7 +222,7 @@ def _apparatus(div: xml.Element) -> None:
             note.set("target", " ".join(f"#{each}" for each in _targets(entry)))
         for name in _TOLD:
             if name in entry:
-                _said(note, "seg", entry[name], type=name)
+                _with_text(note, "seg", entry[name], type=name)
         xml.SubElement(note, "certainty", locus="value", cert=_CERTAINTY[entry["certainty"]])
 
 
@@ -236,7 +238,7 @@ def _targets(entry: dict[str, Any]) -> Iterator[str]:
 
 
 def _places(div: xml.Element) -> None:
-    _said(div, "head", "Where the cards stand in the port and in the twin")
+    _with_text(div, "head", "Where the cards stand in the port and in the twin")
     for program in PROGRAMS:
         found = deck(program)
         for number, card in found.cards.items():
@@ -244,25 +246,25 @@ def _places(div: xml.Element) -> None:
                 for place in places.get(number, ()):
                     _place(xml.SubElement(div, "note", type=kind, target=f"#{_id(card)}"), place)
             if number in found.absent:
-                _said(div, "note", found.absent[number], type="absent", target=f"#{_id(card)}")
+                _with_text(div, "note", found.absent[number], type="absent", target=f"#{_id(card)}")
 
 
 def _place(note: xml.Element, place: Place) -> None:
     cited = xml.SubElement(note, "cit")
-    _said(cited, "quote", place.text)
+    _with_text(cited, "quote", place.text)
     where = xml.SubElement(cited, "bibl")
-    _said(where, "title", place.file)
-    _said(where, "biblScope", str(place.line), unit="line")
+    _with_text(where, "title", place.file)
+    _with_text(where, "biblScope", str(place.line), unit="line")
 
 
 def _taxonomy(
     classes: xml.Element, name: str, told: str, categories: Iterable[tuple[str, str]]
 ) -> None:
     taxonomy = _named(classes, "taxonomy", name)
-    _said(taxonomy, "desc", told)
+    _with_text(taxonomy, "desc", told)
     for each, what in categories:
         category = _named(taxonomy, "category", _class(name, each))
-        _said(category, "catDesc", f"{each}: {what}")
+        _with_text(category, "catDesc", f"{each}: {what}")
 
 
 def _named(parent: xml.Element, tag: str, id: str | None = None, **more: str) -> xml.Element:
@@ -270,7 +272,7 @@ def _named(parent: xml.Element, tag: str, id: str | None = None, **more: str) ->
     return xml.SubElement(parent, tag, {**named, **more})
 
 
-def _said(
+def _with_text(
     parent: xml.Element, tag: str, text: str, id: str | None = None, **more: str
 ) -> xml.Element:
     element = _named(parent, tag, id, **more)

@@ -121,7 +121,7 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
             yield Decision(name, False, product)
         else:
             # The kernels sum three products side by side in one register.
-            yield Decision(name, True, f"{product}: zero, beside the others for nothing")
+            yield Decision(name, True, f"{product}: zero; costs no time beside the others")
     yield Decision("torque", not law.is_zero, "zero" if law.is_zero else "acts")
     for name, waves in (("sines", law.sines), ("cosines", law.cosines)):
         acts = any(any(amplitude) for amplitude, _ in waves)
@@ -147,4 +147,4 @@ def _why_no_form(scene: Scene) -> str:
         return "its coefficients let it grow without bound"
     if scene.torque.in_space:
         return "its torque is fixed in space"
-    return "it has torque and is no sphere"
+    return "it has a torque and is not a sphere"

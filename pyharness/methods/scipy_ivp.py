@@ -124,7 +124,7 @@ def scipy_method(name: str) -> Integrator:
                 # The body is at rest, and no torque acts.
                 rest = np.tile(state_of(scene), (len(times), 1))
                 return _rows_of(times, rest, run.evaluations, len(times), "complete")
-            run.carry_attitude()
+            run.add_attitude()
             total = steps_sum(name, *ahead[1:])
             finest = _FINEST_STEP * total
             if tolerance < finest * (1.0 - 1e-9):
@@ -180,7 +180,7 @@ def state_of(scene: Scene) -> tuple[float, ...]:
     return (*scene.omega, *(scene.attitude or ()))
 
 
-def turning(slopes: RightHandSide) -> RightHandSide:
+def with_attitude(slopes: RightHandSide) -> RightHandSide:
     """Return the right-hand side of the equations of omega and attitude together.
 
     The unknowns are the three components of omega and the four of the attitude. `slopes` is the
@@ -242,11 +242,11 @@ class _Run:
         if name == "Radau":
             self.most //= _RADAU_SHARE
 
-    def carry_attitude(self) -> None:
+    def add_attitude(self) -> None:
         """Add the attitude to the unknowns of later integrations, if the scene has an attitude."""
         if self.scene.attitude is not None:
             self.start = state_of(self.scene)
-            self.slopes = turning(self.slopes)
+            self.slopes = with_attitude(self.slopes)
 
     def solved(
         self,

@@ -123,10 +123,10 @@ def solve(
     below = [t for t in values if t < 0.0]
     # The times on either side of 0, in order away from 0.
     sides = (below[::-1], values[len(below) :])
-    marches = [_march(chosen, scene, each, tolerance, effort) for each in sides if each]
+    parts = [_integrate(chosen, scene, each, tolerance, effort) for each in sides if each]
     if below:
-        marches[0] = _reversed(marches[0])
-    found = marches[0] if len(marches) == 1 else _joined(*marches)
+        parts[0] = _reversed(parts[0])
+    found = parts[0] if len(parts) == 1 else _joined(*parts)
     reported = None if chosen.is_fixed_step else tolerance
     found = replace(found, moments=scene.moments, tolerance=reported)
     if is_full:
@@ -174,7 +174,7 @@ def by_plan(
             raise refusal from None
 
 
-def _march(
+def _integrate(
     chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float
 ) -> Trajectory:
     """Return the trajectory by the method `chosen` at `times` (s), all on one side of 0.

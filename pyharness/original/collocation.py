@@ -24,7 +24,7 @@ k is the number of a collocation point, or 0 for the start of the interval.
 """
 
 
-def march(
+def integrate(
     scene: Scene,
     listing: Listing,
     points_of: Callable[[float], list[float]],

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.collocation import march
+from pyharness.original.collocation import integrate
 from pyharness.original.equations import Vector, accelerations, omega_rate, velocity_rate
 
 
@@ -27,4 +27,4 @@ def run(
         u, v = x[:3], x[3:]
         return omega_rate(coefficients, torques[k], u) + velocity_rate(acceleration, u, v)
 
-    return march(scene, listing, lambda dt: [dt * 0.2, dt * 0.4, dt * 0.6, dt * 0.8], rates)
+    return integrate(scene, listing, lambda dt: [dt * 0.2, dt * 0.4, dt * 0.6, dt * 0.8], rates)

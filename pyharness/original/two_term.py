@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.collocation import march
+from pyharness.original.collocation import integrate
 from pyharness.original.equations import Vector, accelerations, omega_rate, velocity_rate
 
 
@@ -34,4 +34,4 @@ def run(
         u, v = x[:3], x[3:]
         return omega_rate(coefficients, torques[k], u) + velocity_rate(forces, u, v)
 
-    return march(scene, listing, lambda dt: [dt / 3.0, 2.0 * dt / 3.0], rates)
+    return integrate(scene, listing, lambda dt: [dt / 3.0, 2.0 * dt / 3.0], rates)

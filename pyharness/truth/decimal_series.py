@@ -218,7 +218,7 @@ class _Equations:
                     rate -= _product(series[3 + m], backward[j])
                     rates.append(rate + (self._acceleration[i] if k == 0 else 0))
             if self._attitude:
-                rates += _turning(series[-4:], backward[:3])
+                rates += _attitude_rates(series[-4:], backward[:3])
             for each, rate in zip(series, rates, strict=True):
                 each.append(rate / (k + 1))
         return series
@@ -251,7 +251,7 @@ class _Equations:
         ]
 
 
-def _turning(q: list[Row], omega: list[Row]) -> Row:
+def _attitude_rates(q: list[Row], omega: list[Row]) -> Row:
     """Return Taylor coefficient k of q (0, omega)/2, the derivative of the quaternion q.
 
     The result is four numbers. The product is Hamilton's product, in which each product of two

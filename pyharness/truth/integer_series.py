@@ -64,7 +64,7 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
     power = _power_of(_guess(scene, abs(Fraction(times[-1]))))
     for _ in range(_MOST_GUESSES):
         try:
-            return _march(scene, times, power)
+            return _integrate(scene, times, power)
         except _OtherUnitError as other:
             power += other.power
     raise InputError("integer series: omega grows without bound")
@@ -89,7 +89,7 @@ def _power_of(size: Fraction) -> int:
     return size.numerator.bit_length() - size.denominator.bit_length() if size else 0
 
 
-def _march(scene: Scene, times: Sequence[float], power: int) -> Path:
+def _integrate(scene: Scene, times: Sequence[float], power: int) -> Path:
     """Return the solution at `times` (s), integrated with omega in units of 2**power rad/s.
 
     Raise _OtherUnitError if this unit is found to be too large or too small for omega.

@@ -21,7 +21,7 @@ import pytest
 from pyharness.checks import cells as verify_programs
 from pyharness.checks.check import Name, selected
 from pyharness.checks.golden import mathematics, read_record, recorded, update
-from pyharness.checks.judge import Answer, Tried
+from pyharness.checks.judge import Answer, MethodRun
 from pyharness.checks.kinds import KINDS, verify
 from pyharness.checks.orders import judged_order
 from pyharness.checks.plants import self_test
@@ -416,7 +416,7 @@ def test_in_a_plain_scene_only_few_may_refuse(
 ) -> None:
     drawn = draw("x", 0)
     truth = replace(truth_of(drawn), flow=replace(truth_of(drawn).flow, amplification=growth))
-    tried = Tried(method, tolerance, drawn.scene, Answer)
+    tried = MethodRun(method, tolerance, drawn.scene, Answer)
     assert may_refuse(tried, truth, why) == may
 
 

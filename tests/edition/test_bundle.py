@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pyharness import case_scene, run_program
-from pyharness.checks.port_protocol import asked_scene
+from pyharness.checks.port_protocol import requested_scene
 from pyharness.edition.bundle import bundle
 from pyharness.model.listing import PROGRAMS, Listing
 from tests.ports import WEB, engine
@@ -43,7 +43,7 @@ def test_the_bundled_programs_have_the_twins_bits(tmp_path: Path) -> None:
         "said = asked.map(([name, scene, on]) => runs[name](scene, new Set(on)).rows);\n"
     )
     asked = [
-        (program, asked_scene(case_scene(number)), [*listing.defects, *listing.conjectures])
+        (program, requested_scene(case_scene(number)), [*listing.defects, *listing.conjectures])
         for number in (2, 7)
         for program in PROGRAMS
         for listing in [Listing.original(program)]

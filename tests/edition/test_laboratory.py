@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene, run_program
-from pyharness.checks.port_protocol import asked_scene
+from pyharness.checks.port_protocol import requested_scene
 from pyharness.cli.main import main
 from pyharness.edition.laboratory import MOST_STEPS, context, data
 from pyharness.methods.solve import solve
@@ -88,7 +88,7 @@ def test_numbers_that_do_not_fit_are_printed_as_the_formats_have_it() -> None:
     body = """const rows = given.rows.map((row) => row.map(Number));
       const run = { rows, ier: given.ier };
       return P.printerPage(data.printer["two-term"], given.scene, run);"""
-    given = {"scene": asked_scene(scene), "rows": rows, "ier": ier.tolist()}
+    given = {"scene": requested_scene(scene), "rows": rows, "ier": ier.tolist()}
     assert ask(body, given) == page(scene, "two-term", changed)
 
 
@@ -230,7 +230,7 @@ def _motions() -> list[Scene]:
 
 def test_the_reference_is_the_decimal_one_to_rounding() -> None:
     scenes = _motions()
-    given = [{"scene": asked_scene(scene), "times": scene.times()} for scene in scenes]
+    given = [{"scene": requested_scene(scene), "times": scene.times()} for scene in scenes]
     body = "return given.map(({ scene, times }) => R.reference(scene, times));"
     for scene, rows in zip(scenes, ask(body, given), strict=True):
         truth = reference(scene, scene.times()).omega
@@ -242,7 +242,7 @@ def test_the_reference_is_the_decimal_one_to_rounding() -> None:
 
 def test_rounding_of_the_reference_does_not_add_up() -> None:
     scenes = [replace(case_scene(number), steps=MOST_STEPS) for number in (2, 3, 4)]
-    given = [{"scene": asked_scene(scene), "times": scene.times()} for scene in scenes]
+    given = [{"scene": requested_scene(scene), "times": scene.times()} for scene in scenes]
     body = "return given.map(({ scene, times }) => R.reference(scene, times));"
     for scene, rows in zip(scenes, ask(body, given), strict=True):
         truth = reference(scene, scene.times()).omega
@@ -255,7 +255,7 @@ def test_a_reference_that_would_take_too_long_or_leaves_every_bound_ends() -> No
         replace(case_scene(4), omega=(1e200, 1e200, 1e200)),
         replace(case_scene(4), omega=(0.0, 0.0, 0.0)),
     ]
-    given = [{"scene": asked_scene(scene), "times": scene.times()} for scene in scenes]
+    given = [{"scene": requested_scene(scene), "times": scene.times()} for scene in scenes]
     body = "return given.map(({ scene, times }) => R.reference(scene, times));"
     fast, without_bound, rest = ask(body, given)
     assert len(fast) < 100

@@ -34,7 +34,7 @@ MISTAKES = {
     text('[[axis]]\nfield = "longitude"\nvalues = [1.0]', TILT): "tilt beside longitude",
     text('[[axis]]\nfield = "height"\nvalues = [1.0]\n[[axis]]\nfield = "omega.1"\nvalues = [1.0]'):
         "omega.1 beside height",
-    text(TILT, TILT): "two axes vary it",
+    text(TILT, TILT): "two axes vary this field",
     text(
         '[[axis]]\nfield = "omega.1"\nvalues = [1.0]\ndimension = "both"',
         '[[axis]]\nfield = "omega.2"\nvalues = [1.0, 2.0]\ndimension = "both"',

@@ -12,7 +12,7 @@ import pytest
 
 from pyharness import InputError, Scene, case_scene
 from pyharness.cli.main import main
-from pyharness.history.family.members import WEIGHTINGS, Member, march, predicted_order, run
+from pyharness.history.family.members import WEIGHTINGS, Member, integrate, predicted_order, run
 from pyharness.history.family.orders import SCHEMES, SLACK, family_members, order_table
 from pyharness.model.listing import Listing
 from pyharness.model.report import short
@@ -97,7 +97,7 @@ def test_points_of_ones_own(points: tuple[float, ...], order: int) -> None:
     for each in order_table(case_scene(5), [member, turned]):
         assert each.predicted == order
         assert abs(each.deviation) <= SLACK
-    one, other = march(case_scene(5), [member, turned])
+    one, other = integrate(case_scene(5), [member, turned])
     np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
@@ -181,7 +181,7 @@ def test_torque_is_taken_at_true_times() -> None:
     """Gauss's order 2n is reached under torques whose phase advances by one radian a step."""
     scene = case_scene(7)
     members = Member("collocation", 5, "gauss", 8), Member("least-squares", 5, None, 8)
-    assert np.abs(march(scene, members) - reference(scene, scene.times()).omega).max() < 1e-14
+    assert np.abs(integrate(scene, members) - reference(scene, scene.times()).omega).max() < 1e-14
 
 
 @pytest.mark.parametrize("weighting", WEIGHTINGS)
@@ -196,7 +196,7 @@ def test_overflow_ends_the_rows(weighting: str) -> None:
 def test_side_by_side_is_as_alone() -> None:
     scene = case_scene(5)
     members = family_members(terms=(2, 5), corrections=(0, 1, 3))
-    for member, omega in zip(members, march(scene, members), strict=True):
+    for member, omega in zip(members, integrate(scene, members), strict=True):
         np.testing.assert_allclose(omega, run(scene, member).omega, rtol=1e-13)
 
 
@@ -204,7 +204,7 @@ def test_side_by_side_is_as_alone() -> None:
 @pytest.mark.parametrize("case", range(1, 7))
 def test_three_four_and_five_terms_are_one_method_after_one_correction(case: int) -> None:
     """Under constant torque f is a parabola after one estimate, which three terms can represent."""
-    omega = march(case_scene(case), family_members(terms=(3, 4, 5), corrections=(1,)))
+    omega = integrate(case_scene(case), family_members(terms=(3, 4, 5), corrections=(1,)))
     assert np.ptp(omega, axis=0).max() < ROUNDING * np.abs(omega).max()
 
 
@@ -214,7 +214,7 @@ def test_three_four_and_five_terms_are_one_method_after_one_correction(case: int
 def test_other_weightings_do_not_fail_and_rounding_is_not_to_blame(case: int, terms: int) -> None:
     scene = case_scene(case)
     members = [Member(weighting, terms) for weighting in WEIGHTINGS]
-    runs = march(scene, members)
+    runs = integrate(scene, members)
     errors = np.abs(runs - reference(scene, scene.times()).omega).max(axis=(1, 2))
     assert errors.max() < (2e-14 if case == 1 else min(2.1e-3, 1.01 * errors[0]))
     for member, omega, error in zip(members, runs, errors, strict=True):
@@ -239,7 +239,7 @@ def test_numbers_of_the_page_are_current() -> None:
     for case, corrections in itertools.product((5, 6), (1, 8)):
         scene = case_scene(case)
         members = [Member("collocation", n, None, corrections) for n in (2, 3, 4, 5)]
-        omega = march(scene, members)
+        omega = integrate(scene, members)
         errors = np.abs(omega - reference(scene, scene.times()).omega).max(axis=(1, 2))
         assert _row(*map(short, errors)) in PAGE
         apart = np.abs(np.diff(omega, axis=0)).max(axis=(1, 2))

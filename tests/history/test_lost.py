@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pyharness.history import lost
-from pyharness.history.lost import CASES, WEIGHTINGS, Ranked, halved, march, ranked
+from pyharness.history.lost import CASES, WEIGHTINGS, Ranked, halved, integrate, ranked
 from pyharness.model.facts import facts
 from pyharness.model.scene_file import case_scene
 from pyharness.original.in_word import WORDS, scene_in
@@ -39,7 +39,7 @@ def test_ranking_is_by_both_cases_then_by_either(found: dict[str, Ranked]) -> No
 
 def test_symmetric_matrix_does_not_mind_being_transposed() -> None:
     scene = case_scene(2)
-    same = march(scene, "least-squares", "transposed") == march(scene, "least-squares")
+    same = integrate(scene, "least-squares", "transposed") == integrate(scene, "least-squares")
     assert same.all()
 
 
@@ -47,10 +47,10 @@ def test_rounding_of_the_machine_makes_none_of_them_fail() -> None:
     """In 24 bits the error has the size of their rounding; on the CDC it is far below the print."""
     for weighting in WEIGHTINGS:
         for case in CASES:
-            floats = march(case_scene(case), weighting)
+            floats = integrate(case_scene(case), weighting)
             apart = {}
             for word in ("binary64", "cdc48", "cdc48-rounded", "binary32"):
-                found = march(scene_in(case_scene(case), WORDS[word]), weighting)
+                found = integrate(scene_in(case_scene(case), WORDS[word]), weighting)
                 apart[word] = np.abs(found - floats).max()
             assert apart["binary64"] < 1e-14
             assert 1e-15 < apart["cdc48-rounded"] < apart["cdc48"] < 1e-12
@@ -63,5 +63,8 @@ def test_mistakes_fail_in_a_word_where_they_fail() -> None:
     floats = replace(case_scene(2), steps=20)
     for mistake in ("matrix-used-up", "base-left-out", "unscaled-solver", "unit-interval"):
         for weighting in WEIGHTINGS:
-            found, expected = march(scene, weighting, mistake), march(floats, weighting, mistake)
+            found, expected = (
+                integrate(scene, weighting, mistake),
+                integrate(floats, weighting, mistake),
+            )
             assert np.allclose(found, expected, rtol=1e-9, atol=1e-9)

@@ -284,7 +284,7 @@ def test_prepared_solver_takes_another_start() -> None:
     assert np.isnan(attitude).all()
     with pytest.raises(InputError, match="all four numbers are 0"):
         solver((1.0, 2.0, 3.0), 1.0, (0.0, 0.0, 0.0, 0.0))
-    with pytest.raises(InputError, match="carries no attitude"):
+    with pytest.raises(InputError, match="does not compute attitudes"):
         prepare(scene, "rk4", 1.0, attitude=True)
     omega = prepare(replace(scene, torque=TorqueLaw((1.0, 0.0, 0.0))), attitude=False)
     assert omega((1.0, 2.0, 3.0), 1.0).shape == (3,)

@@ -340,7 +340,7 @@ def test_quick_call_is_inherited() -> None:
         ({"method": "dop853"}, "unknown method 'dop853'"),
         *(({"tolerance": each}, "allowed: 1e-15 to 1") for each in (1e-17, 2.0, float("nan"))),
         ({"method": "quick", "tolerance": 1e-13}, "is 1e-13; allowed for quick: 1e-12 to 1"),
-        ({"method": "closed-form"}, "has torque and is no sphere"),
+        ({"method": "closed-form"}, "has a torque and is not a sphere"),
     ],
 )
 def test_preparation_checks_once(arguments: dict[str, Any], words: str) -> None:

@@ -57,7 +57,7 @@ def test_solution_that_blows_up_returns_the_rows_until_then(method: str) -> None
 @pytest.mark.parametrize(
     ("times", "words"),
     [
-        ([], "none given"),
+        ([], "times is empty"),
         ([1.0, float("nan")], "not finite"),
         ([-1.0, 1.0, 0.0], "monotonic"),
         ([1.0, 1.0], "monotonic"),

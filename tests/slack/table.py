@@ -299,16 +299,16 @@ def kept(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @cache
-def _contenders() -> dict[str, length.Marcher]:
+def _contenders() -> dict[str, length.LongRun]:
     return {
         name: replace(each, run=kept(each.run), noise=kept(each.noise), revolutions=1e3, others=1e3)
-        for name, each in length.MARCHERS.items()
+        for name, each in length.LONG_RUNS.items()
     }
 
 
 def shorter() -> AbstractContextManager[Any]:
     """Follow only two starts, through a thousand revolutions."""
-    return patch.multiple(length, MARCHERS=_contenders(), STARTS=2)
+    return patch.multiple(length, LONG_RUNS=_contenders(), STARTS=2)
 
 
 def watched(error: Callable[[float, float], float]) -> Plant:

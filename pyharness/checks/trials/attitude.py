@@ -12,8 +12,8 @@ from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.hold import FORMS, refusable, scene_of
 from pyharness.checks.judge import (
     Answer,
+    MethodRun,
     Policy,
-    Tried,
     Truth,
     by_rows,
     judge,
@@ -94,7 +94,7 @@ TURNS = {
 }
 
 
-def _limit(truth: Truth, tried: Tried) -> float:
+def _limit(truth: Truth, tried: MethodRun) -> float:
     return linear(_allowed(tried.method, tolerance_of(tried), truth.flow, truth.end))
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from functools import partial
 
 from pyharness.checks.check import Attempt, Name
-from pyharness.checks.hold import FORMS, hold, hold_all, truth_of
+from pyharness.checks.hold import FORMS, check_all, hold, truth_of
 from pyharness.checks.judge import unknown_flow
 from pyharness.checks.stress import Trial
 from pyharness.scenes.extreme import LONG, SYMMETRIC_START
@@ -14,7 +14,7 @@ from pyharness.scenes.extreme import LONG, SYMMETRIC_START
 _UNKNOWN = unknown_flow(max(map(abs, SYMMETRIC_START)))
 
 
-def _held(name: Name, time: float) -> Iterator[Attempt]:
+def _compared(name: Name, time: float) -> Iterator[Attempt]:
     if time == LONG:
         return hold(name, time, FORMS, partial(truth_of, flow=_UNKNOWN))
     return hold(name, time)
@@ -24,5 +24,5 @@ TRIAL = Trial(
     "near-symmetry",
     "two moments, or all, that differ by 1e-1 to 1e-16 of their size, and equal ones",
     "as of the separatrix. The difference of two moments is exact, and so is no loss of digits.",
-    lambda only: hold_all("near-symmetry", _held, lambda each: each.time != LONG),
+    lambda only: check_all("near-symmetry", _compared, lambda each: each.time != LONG),
 )

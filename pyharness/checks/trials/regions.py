@@ -15,10 +15,10 @@ from pyharness.checks.disturbances import (
     complex_step,
     eigenvalues,
     first_step,
-    held_steady,
     later_steps,
     moving_step,
     observed_boundary,
+    steady_scene,
 )
 from pyharness.checks.hold import scene_of
 from pyharness.checks.stress import LISTINGS, Trial, named
@@ -60,7 +60,7 @@ def _parts(listing: Listing, name: Name) -> Iterator[Attempt]:
     yield Attempt(replace(name, setting="polynomial"), partial(_polynomial, listing))
     for kind, (coefficients, omega) in _STEADY.items():
         for step in _STEPS:
-            scene = held_steady(coefficients, omega, step)
+            scene = steady_scene(coefficients, omega, step)
             note = "z = " + ", ".join(f"{z:.3g}" for z in eigenvalues(scene))
             probe = partial(first_step, scene, listing)
             yield _probed(name, f"first-step-{kind}-{step:g}", probe, scene, note)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
-from pyharness.checks.hold import ALL, hold_all, run_method
+from pyharness.checks.hold import ALL, check_all, run_method
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.methods.registry import FIXED_STEP
@@ -41,7 +41,7 @@ def _undisturbed() -> Iterator[Attempt]:
 
 
 def _attempts() -> Iterator[Attempt]:
-    yield from hold_all("separatrix", has_programs=lambda each: not each.name.startswith("early"))
+    yield from check_all("separatrix", has_programs=lambda each: not each.name.startswith("early"))
     yield from _undisturbed()
 
 

@@ -1,6 +1,6 @@
 """Trial of extreme shapes: needles, coins, flat plates, and moments that no body can have."""
 
-from pyharness.checks.hold import hold_all
+from pyharness.checks.hold import check_all
 from pyharness.checks.stress import Trial
 
 TRIAL = Trial(
@@ -8,5 +8,5 @@ TRIAL = Trial(
     "moments in the ratio 1 : 1 : 1e-12 and 1 : 1e12 : 1e12, flat plates, impossible bodies",
     "as of the separatrix; energy and momentum weigh omega by moments, and are read as the "
     "error of omega that would change them so.",
-    lambda only: hold_all("shapes"),
+    lambda only: check_all("shapes"),
 )

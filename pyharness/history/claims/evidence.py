@@ -54,9 +54,9 @@ class Combination:
         start = given.start or ()
         return {
             "omega(0)": ",".join(f"{x:g}" for x in start) or "adopted",
-            **{f"reading {name}": _said(name in given.readings) for name in _names("reading")},
+            **{f"reading {name}": _yes_or_no(name in given.readings) for name in _names("reading")},
             **{
-                f"conjecture {name}": _said(name in (given.conjectures or ()))
+                f"conjecture {name}": _yes_or_no(name in (given.conjectures or ()))
                 for name in _names("conjecture")
             },
             "steps": str(given.steps),
@@ -158,5 +158,5 @@ def _subsets(names: tuple[str, ...]) -> list[tuple[str, ...]]:
     ]
 
 
-def _said(chosen: bool) -> str:
+def _yes_or_no(chosen: bool) -> str:
     return "yes" if chosen else "no"

@@ -51,8 +51,8 @@ def evidence_report(found: Sequence[Combination]) -> Report:
     spread = []
     for name in telling:
         by_verdict = {
-            verdict: sum(_told(each, name) == verdict for each in ordered)
-            for verdict in dict.fromkeys(_told(each, name) for each in ordered)
+            verdict: sum(_choice_of(each, name) == verdict for each in ordered)
+            for verdict in dict.fromkeys(_choice_of(each, name) for each in ordered)
         }
         told = ", ".join(f"{verdict} {number}" for verdict, number in by_verdict.items())
         spread.append([name, told])
@@ -88,7 +88,7 @@ def evidence_report(found: Sequence[Combination]) -> Report:
     )  # fmt: skip
 
 
-def _told(combination: Combination, name: str) -> str:
+def _choice_of(combination: Combination, name: str) -> str:
     return combination.verdicts.get(name, NOT_TESTABLE)
 
 
@@ -97,7 +97,7 @@ def _picture(ordered: Sequence[Combination], telling: Sequence[str]) -> Picture:
 
     figure = Figure(figsize=(11.0, 8.0), dpi=110, layout="constrained")
     scores, verdicts = figure.subplots(2, 1, sharex=True, height_ratios=[1, 3])
-    points = np.array([[POINTS.get(_told(e, name), 0.0) for e in ordered] for name in telling])
+    points = np.array([[POINTS.get(_choice_of(e, name), 0.0) for e in ordered] for name in telling])
     place = np.arange(1, len(ordered) + 1)
     scores.plot(place, [each.score for each in ordered], color="#1040a0", drawstyle="steps-mid")
     scores.set_ylabel("score")
@@ -111,7 +111,7 @@ def _picture(ordered: Sequence[Combination], telling: Sequence[str]) -> Picture:
     )
     axes = list(ordered[0].choices())
     rows = [
-        [k, *each.choices().values(), each.score, *(_told(each, name) for name in telling)]
+        [k, *each.choices().values(), each.score, *(_choice_of(each, name) for name in telling)]
         for k, each in enumerate(ordered, 1)
     ]
     names = ["place", *(axis.replace(" ", "_") for axis in axes), "score", *telling]

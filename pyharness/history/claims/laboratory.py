@@ -239,12 +239,12 @@ def by_literals(
     omega = np.array([each.omega for each in scenes])
     bodies = np.array([each.euler_coefficients for each in scenes])
     torque = np.array([each.normalized_torque(0.0) for each in scenes])
-    rows = march_models(omega, bodies, torque, terms, dt, end, growth, round(steps * h / end))
+    rows = integrate_models(omega, bodies, torque, terms, dt, end, growth, round(steps * h / end))
     every = round(h / end)
     return rows[:, every - 1 :: every]
 
 
-def march_models(
+def integrate_models(
     omega: Array, coefficients: Array, torque: Array, terms: int,
     dt: float, end: float, growth: float, steps: int,
 ) -> Array:  # fmt: skip

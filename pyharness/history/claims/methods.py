@@ -30,7 +30,7 @@ from pyharness.history.claims.verdicts import (
     judged,
 )
 from pyharness.history.family.members import WEIGHTINGS, Member, run
-from pyharness.history.lost import march
+from pyharness.history.lost import integrate
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene
@@ -336,10 +336,10 @@ def computer_error(
             numbers[f"{weighting}, step {scene.step_size:g}: rounding error (rad/s)"] = error
     # With products written out, runs in different arithmetics differ by rounding alone.
     for weighting in _OTHERS:
-        floats = {case: march(lab.scene(case), weighting) for case in cases}
+        floats = {case: integrate(lab.scene(case), weighting) for case in cases}
         for word in words:
             numbers[f"{weighting} in {word}: apart from binary64 (rad/s)"] = max(
-                distance(march(scene_in(lab.scene(case), WORDS[word]), weighting), floats[case])
+                distance(integrate(scene_in(lab.scene(case), WORDS[word]), weighting), floats[case])
                 for case in cases
             )
     return graded(numbers, max(numbers.values()) >= limit, otherwise=FALSE)

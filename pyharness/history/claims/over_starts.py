@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.history.claims import rules
-from pyharness.history.claims.laboratory import Assumptions, Laboratory, march_models
+from pyharness.history.claims.laboratory import Assumptions, Laboratory, integrate_models
 from pyharness.history.claims.ledger import claim, claims
 from pyharness.history.claims.rules import Runs
 from pyharness.methods.batch import Batch
@@ -45,7 +45,7 @@ class Starts:
     def __init__(self, one: Laboratory, omega0: Array) -> None:
         """Store the laboratory and the starts `omega0`, shape (n, 3), rad/s; nothing runs yet."""
         self._one, self._omega0 = one, omega0
-        self._solution = cache(self._marched)
+        self._solution = cache(self._integrated)
         self._error = cache(partial(rules.largest_error, self))
         self._kept = cache(self._run)
         self._models = cache(self._modelled)
@@ -115,7 +115,7 @@ class Starts:
             self._shaped(case, found.status == Statuses.OVERFLOW),
         )
 
-    def _marched(self, case: int) -> Array:
+    def _integrated(self, case: int) -> Array:
         scene, state = self.scene(case), self._starts(case)
         rows = np.empty((len(state), scene.steps, 3))
         for step in range(scene.steps):
@@ -130,7 +130,7 @@ class Starts:
         h = scene.step_size
         growth = h if self._one.is_original and "dt-accumulates" not in self._one.fixed else 0.0
         bodies, torque = np.array(scene.euler_coefficients), np.array(scene.normalized_torque(0.0))
-        rows = march_models(omega0, bodies, torque, terms, h, h, growth, scene.steps)
+        rows = integrate_models(omega0, bodies, torque, terms, h, h, growth, scene.steps)
         return self._shaped(case, rows)
 
 

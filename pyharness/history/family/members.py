@@ -132,7 +132,7 @@ def run(scene: Scene, member: Member) -> Trajectory:
     the step where they need the right-hand side. The global error is O(h**p), with the step size h
     and p from `predicted_order`. The rounding error is about one unit in the last place per step.
     """
-    omega = march(scene, [member])[0]
+    omega = integrate(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
     time = np.array(scene.times()[:rows])
     scheme = tableau(member.weighting, member.terms, member.points)
@@ -148,7 +148,7 @@ def run(scene: Scene, member: Member) -> Trajectory:
     )
 
 
-def march(scene: Scene, members: Sequence[Member]) -> Array:
+def integrate(scene: Scene, members: Sequence[Member]) -> Array:
     """Integrate a scene with several members of the family at once.
 
     Return omega (rad/s) in the order of `members`, shape (members, steps, 3). It is not finite from

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pyharness.history.family.members import Member, march, predicted_order
+from pyharness.history.family.members import Member, integrate, predicted_order
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
@@ -121,7 +121,7 @@ def order_table(
     progress(phases - 1, phases, "errors")
     rows = [place[time] for time in times]
     with np.errstate(all="ignore"):
-        errors = np.abs(march(scene, chosen) - truth.omega[rows]).max(axis=(1, 2))
+        errors = np.abs(integrate(scene, chosen) - truth.omega[rows]).max(axis=(1, 2))
     errors[~np.isfinite(errors)] = math.inf
     return [
         OrderFinding(each, predicted_order(each), order, doubt <= _SETTLED, float(error))
@@ -138,7 +138,7 @@ def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array)
     scale = float(np.abs(end).max()) or 1.0
     rungs = []
     for steps in _LADDER:
-        omega = march(replace(scene, step_size=horizon / steps, steps=steps), members)[:, -1]
+        omega = integrate(replace(scene, step_size=horizon / steps, steps=steps), members)[:, -1]
         with np.errstate(all="ignore"):
             rungs.append(np.sqrt(np.square(omega - end).sum(axis=1)) / scale)
         if (rungs[-1] < _SMALLEST).all():

@@ -104,3 +104,10 @@ def test_solutions_are_those_of_the_reference() -> None:
         assert np.abs(bench.solution(case)[0] - one.solution(case)).max() < 1e-11
     assert found.solution(5).shape == (100, 3)
     assert np.abs(found.solution(5) - one.solution(5)).max() < 1e-11
+
+
+def test_runs_end_by_the_stop_test_unless_told_otherwise() -> None:
+    bench = over_starts.Starts(Laboratory(True), np.array(STARTS[:2]))
+    stopped = bench.error("runge-kutta", 2)
+    assert np.array_equal(stopped, bench.error("runge-kutta", 2, True))
+    assert not np.array_equal(stopped, bench.error("runge-kutta", 2, False))

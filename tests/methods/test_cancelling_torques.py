@@ -173,6 +173,12 @@ def test_noise_is_what_the_terms_give_over_what_they_give_together() -> None:
     assert torque_noise(scene, scene.omega, 0.1, scale=1e-4) == pytest.approx(100.0, rel=0.1)
     assert torque_noise(scene, scene.omega, 0.1, scale=1.0) == 0.0
     assert torque_noise(scene, scene.omega, 0.0) == 0.0
+    # A cosine contributes all of t, and is rounded at its whole amplitude in every step.
+    law = TorqueLaw(cosines=[(amplitude, 1.0), ((-1.0, 0.0, 0.0), 1.0 + 1e-8)])
+    scene = replace(scene, torque=law)
+    assert torque_noise(scene, scene.omega, 0.1) == pytest.approx(0.2 / 1e-6, rel=0.1)
+    walk = torque_noise(scene, scene.omega, 0.1, 100.0) / torque_noise(scene, scene.omega, 0.1)
+    assert walk == pytest.approx(1.0 + 0.1, rel=0.02)
 
 
 def test_a_torque_in_space_that_cancels_is_told_of() -> None:

@@ -1,5 +1,6 @@
 """Attitudes as given and as printed; full inertia matrices."""
 
+import contextlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -99,6 +100,13 @@ def test_what_is_no_attitude_is_refused(text: str, told: str, tmp_path: Path) ->
 def test_what_is_no_inertia_is_refused(inertia: object, told: str) -> None:
     with pytest.raises(InputError, match=told):
         Scene("", (1.0, 2.0, 3.0), inertia=inertia)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("apart", "taken"), [(0.9e-12, True), (1.1e-12, False)])
+def test_rounding_alone_may_make_inertia_unsymmetric(apart: float, taken: bool) -> None:
+    inertia = ((2.0, 0.0, 0.0), (2.0 * apart, 2.0, 0.0), (0.0, 0.0, 2.0))
+    with contextlib.nullcontext() if taken else pytest.raises(InputError, match="not symmetric"):
+        Scene("", (1.0, 2.0, 3.0), inertia=inertia)
 
 
 def test_inertia_near_the_end_of_numbers_has_its_moments() -> None:

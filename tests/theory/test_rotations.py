@@ -243,6 +243,7 @@ def test_where_nothing_turns_about_a_stable_axis_no_time_is_told() -> None:
 
 
 def test_sphere_and_rest_are_left_as_they_are() -> None:
+    assert steady_rotations(SCENES["sphere"], 1e-3).told.endswith("every rotation is steady")
     for each in _rotations(SCENES["sphere"]):
         assert each.stable
         assert each.linear_until == math.inf

@@ -16,9 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 TERMS = tomllib.loads((Path(__file__).parent / "style.toml").read_text())
 _FOLDERS = ("pyharness", "fortran", "docs", "web/programs", "web/laboratory", "tests")
-# The history keeps its words; the benchmark's page quotes notes of a run of version 0.1.0; the last
-# is written by the build.
-_NOT = ("CHANGELOG.md", "benchmark.md", "_build.py")
+_NOT = ("_build.py",)  # written by the build
 _CODE = re.compile(
     r"```.*?```|``.*?``|`[^`]*`|\$[^$]*\$|\"[^\"\n]*\"|“[^”]*”|\]\([^)]*\)|(?<!\w)'[^'\n]+'(?!\w)"
     r"|^ *(>>>|\.\.\.) .*?$",

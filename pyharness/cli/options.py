@@ -33,17 +33,18 @@ SCENE = {
 LISTING = {
     "--listing L": "Version of the program: original (all its defects active) or corrected (none "
     "active); by default `compare` uses both, and other verbs use the original.",
-    "--fix NAME,...": "Correct only these defects, readings or conjectures of the original listing "
-    "(`pyharness defects` lists the names).",
-    "--keep NAME,...": "Keep only these defects, readings or conjectures active, and correct all "
-    "others (`pyharness defects` lists the names).",
-    "--reading NAME,...": "For these readings (ambiguous passages of the cards), use the "
-    "interpretation that this edition does not adopt (`pyharness defects` lists the names).",
-    "--conjecture NAME,...": "Activate these conjectures about missing cards; none activates no "
-    "conjecture (default: the conjectures of the original listing).",
-    "--lipschitz L": "Constant of the Runge-Kutta program's stop test, 1/s (default 500): a run "
-    "stops if the slopes change by more than L times the change of the variables.",
-    "--no-stop": "Run the Runge-Kutta program without its stop test (see --lipschitz).",
+    "--fix NAME,...": "Correct only these faults of the original program: defects, doubtful "
+    "readings or conjectures (`pyharness defects` lists and explains the names).",
+    "--keep NAME,...": "Keep only these faults of the original program, and correct all others "
+    "(`pyharness defects` lists and explains the names).",
+    "--reading NAME,...": "Read these ambiguous statements of the printed program in the way that "
+    "this edition does not adopt (`pyharness defects --kind reading` explains the names).",
+    "--conjecture NAME,...": "Assume these statements, for which the printed program has no cards; "
+    "none: assume nothing (`pyharness defects --kind conjecture` explains the names).",
+    "--lipschitz L": "Stop the Runge-Kutta program when the slopes change by more than L times the "
+    "change of the variables, L in 1/s (default 500, as printed).",
+    "--no-stop": "Run the Runge-Kutta program to its last step, without the test that stops a "
+    "diverging run.",
 }
 EFFORT = {
     "--effort F": "Multiply the limit of computational work by this factor, above 0 (default 1, "

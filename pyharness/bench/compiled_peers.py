@@ -23,10 +23,11 @@ RK4 = [[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6], [0
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Return a `Maker`, which prepares timed calls, for a fixed-step Runge-Kutta method on a scene.
+    """Return a function that prepares timed runs of a fixed-step Runge-Kutta method on a scene.
 
-    The method is compiled by numba. `method` is "rk4" for the classical method, or "dop8" for the
-    formula of order 8 of DOP853. The setting of a call is its number of steps.
+    The function takes the end time (s) and the number of steps, and returns an integration that is
+    ready to be timed. The method is compiled by numba. `method` is "rk4" for the classical method,
+    or "dop8" for the formula of order 8 of DOP853.
     """
     import numba
 
@@ -54,10 +55,11 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
 
 
 def numbalsoda(name: str, scene: Scene) -> Maker:
-    """Return a `Maker`, which prepares timed calls, for the package numbalsoda on a scene.
+    """Return a function that prepares timed runs of the package numbalsoda on a scene.
 
-    The right-hand side is compiled by numba. `name` is the solver of the package, "dop853" or
-    "lsoda". The setting of a call is its relative tolerance.
+    The function takes the end time (s) and the relative tolerance, and returns an integration that
+    is ready to be timed. `name` is the solver of numbalsoda, "dop853" or "lsoda". The right-hand
+    side is compiled by numba.
     """
     import numba
     import numbalsoda as package
@@ -102,7 +104,7 @@ def compiled_function(source: str) -> Any:
 def rates(
     scene: Scene, time: str, state: Sequence[str], coefficients: Sequence[float] = ()
 ) -> list[str]:
-    """Return the right-hand sides of a scene as Python source, one expression for each unknown.
+    """Return the right-hand side of each unknown of a scene, as expressions in Python source.
 
     `time` is the source text of the time. `state` has the names of the unknowns in the source. The
     first three are components of omega. If there are seven names, the other four are components of
@@ -140,16 +142,20 @@ def rates(
 
 
 def state_names(scene: Scene) -> str:
-    """Return a letter for each unknown of a scene: three for omega, and four for any attitude."""
+    """Return the names of a scene's unknowns, one letter for each, as a single string.
+
+    It is "xyz" for omega, or "xyzabcd" for omega and the attitude quaternion of a scene that has an
+    attitude.
+    """
     return "xyz" if scene.attitude is None else "xyzabcd"
 
 
 def end_of(state: Array, evaluations: int | None = None) -> End:
-    """Return the result of a call, an `End`, from the unknowns `state` at the end time.
+    """Return the unknowns `state` at the end time as an `End`, the common form of solvers' results.
 
     The unknowns are three components of omega and, if it was computed, the attitude quaternion.
-    `evaluations` is the number of evaluations of the right-hand side in the call, if it was
-    counted.
+    `evaluations` is the number of evaluations of the right-hand side in the call of the solver, if
+    it was counted.
     """
     found = plain(state)
     attitude = found[3:] if len(found) > 3 else None
@@ -161,8 +167,8 @@ def steps_source(scene: Scene, formula: Formula) -> str:
 
     `formula` has the stage coefficients, the weights and the nodes of the method. The arguments of
     the function are the initial omega, the end time (s), the number of equal steps, and an array
-    for the result. The function writes omega at the end time into this array. It has no loop over
-    stages or components.
+    for the result. The function writes omega at the end time into this array. In the source, all
+    stages and components are written out without loops.
     """
     stages, weights, nodes = formula
     lines = [
@@ -190,7 +196,7 @@ def _increment(factors: Sequence[float], name: str) -> str:
 
 
 def _callback_source(scene: Scene, counted: bool) -> str:
-    """Return the Python source of a scene's right-hand side for numbalsoda.
+    """Return the Python source of a scene's right-hand side, as the package numbalsoda calls it.
 
     If `counted`, the function counts its calls in the first element of its parameter `p`.
     """

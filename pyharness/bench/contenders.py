@@ -46,7 +46,11 @@ class Contender:
 
 @dataclass(frozen=True)
 class SceneContender(Contender):
-    """A contender (solver) that computes omega of one scene at a time T, or also the attitude."""
+    """A contender (solver in a benchmark) that integrates one scene from time 0 to a given time.
+
+    Its result is omega, the angular velocity at this time. Some contenders also compute the
+    attitude.
+    """
 
     # Function that returns a `Maker` for a scene. It makes all preparations, including compilation.
     prepare: Callable[[Scene], Maker]
@@ -57,9 +61,9 @@ class SceneContender(Contender):
 
 
 def own() -> list[SceneContender]:
-    """Return contenders for our methods, and for each program of the thesis in two versions.
+    """Return contenders (benchmarked solvers) for our methods and for the programs of the thesis.
 
-    The two versions are the original and the corrected program.
+    Each program is a contender in two versions, the original and the corrected program.
     """
     both = partial(SceneContender, attitude=True)
     found = [
@@ -83,9 +87,9 @@ def own() -> list[SceneContender]:
 def refuse_rounding(solver: str, setting: float) -> None:
     """Raise InputError if a tolerance is below 100 eps, the smallest that SciPy and LSODA accept.
 
-    `setting` is the relative tolerance, eps = 2**-52, and `solver` the name of the solver for the
-    message. With a smaller tolerance, SciPy would warn and use 100 eps, and LSODA
-    would reject it as illegal.
+    `setting` is the relative tolerance, and eps is 2**-52. `solver` is the name of the solver in
+    the message. With a smaller tolerance, SciPy would warn and use 100 eps, and LSODA would reject
+    it as illegal.
     """
     limit = 100 * 2.0**-52
     if setting < limit:

@@ -33,9 +33,10 @@ def numba_rk4(
 ) -> Callable[[], Array]:
     """Return a function that integrates all bodies of a load by RK4, compiled by numba.
 
-    If `in_blocks`, each step of RK4 is a loop over the bodies of a block; otherwise one body is
-    integrated after another. `setting` is the number of steps, and `threads` the number of threads.
-    The function returns omega of the bodies at `HORIZON` (rad/s), shape (n, 3).
+    A load is a set of bodies with their initial omegas and torques. If `in_blocks`, each step of
+    RK4 is a loop over the bodies of a block; otherwise one body is integrated after another.
+    `setting` is the number of steps, and `threads` the number of threads. The function returns
+    omega of the bodies at the end time `HORIZON` (rad/s), shape (n, 3).
     """
     blocks, bodies = _numba_kernels()
     kernel = blocks if in_blocks else bodies
@@ -125,9 +126,10 @@ def _numba_kernels() -> tuple[Any, Any]:
 def jax_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
     """Return a function that integrates all bodies of a load by RK4, compiled by JAX.
 
-    Each component of omega is an array with a value for each body. `setting` is the number of
-    steps. JAX chooses its threads itself, so that `threads` has no effect. The function returns
-    omega of the bodies at `HORIZON` (rad/s), shape (n, 3).
+    A load is a set of bodies with their initial omegas and torques. Each component of omega is an
+    array with a value for each body. `setting` is the number of steps. JAX chooses its threads
+    itself, so that `threads` has no effect. The function returns omega of the bodies at the end
+    time `HORIZON` (rad/s), shape (n, 3).
     """
     compiled, jnp = _jax_steps()
     steps = round(setting)
@@ -164,9 +166,10 @@ def _jax_steps() -> tuple[Any, Any]:
 def diffrax_vmap(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
     """Return a function that integrates all bodies of a load by diffrax's method Dopri8.
 
-    The step size is chosen separately for each body. `setting` is the relative and the absolute
-    tolerance. JAX chooses its threads itself, so that `threads` has no effect. The function returns
-    omega of the bodies at `HORIZON` (rad/s), shape (n, 3).
+    A load is a set of bodies with their initial omegas and torques. The step size is chosen
+    separately for each body. `setting` is the relative and the absolute tolerance. JAX chooses its
+    threads itself, so that `threads` has no effect. The function returns omega of the bodies at the
+    end time `HORIZON` (rad/s), shape (n, 3).
     """
     compiled, jnp = _diffrax_solve()
     given = jnp.array(load.omega0), jnp.array(load.acceleration), setting

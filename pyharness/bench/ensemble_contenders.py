@@ -20,13 +20,17 @@ _HARDEST = 1.0  # largest torque about an axis over the moment about this axis, 
 
 
 def coefficients() -> list[float]:
-    """Return the Euler coefficients A, B and C of a body with the moments `MOMENTS`."""
+    """Return A, B and C of Euler's equations for a body with the moments of inertia `MOMENTS`."""
     return [float(each) for each in exact_coefficients(Scene("", (0.0, 0.0, 0.0), MOMENTS))]
 
 
 @dataclass(frozen=True, eq=False)
 class EnsembleLoad:
-    """Many bodies with the moments `MOMENTS`, each with its own initial omega and torque."""
+    """A benchmark problem (load) of many bodies, each with its own initial omega and torque.
+
+    All bodies have the moments of inertia `MOMENTS`. The torques are constant, or None if the
+    bodies have no torque.
+    """
 
     name: str
     omega0: Array  # (n, 3), rad/s
@@ -39,26 +43,31 @@ class EnsembleLoad:
 
     @property
     def scene(self) -> Scene:
-        """Return a scene with the moments that all bodies share, at rest and without torque."""
+        """Return a scene with the moments that all bodies share, at rest and without torque.
+
+        Solvers take the moments from this scene, and the bodies' initial omegas and torques
+        separately.
+        """
         return Scene(self.name, (0.0, 0.0, 0.0), MOMENTS)
 
     @property
     def acceleration(self) -> Array:
-        """Return the torque divided by the moments, shape (n, 3), in rad/s2."""
+        """Return each body's torque divided by its moments of inertia, shape (n, 3), in rad/s2."""
         if self.torque is None:
             return np.zeros_like(self.omega0)
         found: Array = self.torque / np.array(MOMENTS)
         return found
 
     def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
-        """Return a load that consists of the bodies whose indices are in `rows`."""
+        """Return a load (a set of bodies) with only those bodies whose indices are in `rows`."""
         torque = None if self.torque is None else np.ascontiguousarray(self.torque[rows])
         return replace(self, omega0=np.ascontiguousarray(self.omega0[rows]), torque=torque)
 
     def ends(self) -> Array:
-        """Return the reference values of omega at `HORIZON` for all bodies, rad/s, shape (n, 3).
+        """Return reference values of omega for all bodies at the end time, in rad/s, shape (n, 3).
 
-        Our function `solve` computes them for one body after another, with the tolerance 1e-15.
+        The end time is `HORIZON`. Our function `solve` computes the values for one body after
+        another, with the tolerance 1e-15.
         """
         found = np.empty_like(self.omega0)
         for i, start in enumerate(self.omega0.tolist()):
@@ -76,7 +85,10 @@ EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 
 @dataclass(frozen=True)
 class EnsembleContender(Contender):
-    """A contender (solver) of `bench --ensemble`: it computes omega of many bodies at `HORIZON`."""
+    """A contender (solver) in the benchmark of the command `bench --ensemble`.
+
+    It computes omega of many bodies at the end time `HORIZON`.
+    """
 
     prepare: EnsembleMaker  # the first call of the function that it returns may compile code
     # Numbers of threads to measure with; 0 means as many as the package uses.
@@ -87,8 +99,8 @@ class EnsembleContender(Contender):
 def draw(seed: str, n: int) -> list[EnsembleLoad]:
     """Return two loads of n random bodies, the first without torque and the second with torques.
 
-    The bodies have the same initial omegas in both loads. The text `seed` determines the random
-    numbers.
+    A load is a set of bodies to be solved in a benchmark. The bodies have the same initial omegas
+    in both loads. The text `seed` determines the random numbers.
     """
     source = np.random.default_rng([ord(letter) for letter in f"ensemble/{seed}"])
     omega0 = source.uniform(-_FASTEST, _FASTEST, (n, 3))
@@ -100,7 +112,10 @@ def draw(seed: str, n: int) -> list[EnsembleLoad]:
 
 
 def own_ensembles() -> list[EnsembleContender]:
-    """Return our own contenders of `bench --ensemble`: closed form, Taylor method and RK4."""
+    """Return our own contenders (solvers) in the benchmark `bench --ensemble`.
+
+    They are the closed form, the Taylor method and RK4.
+    """
     return [
         EnsembleContender("closed-form", "none", _own("closed-form"), torque_free=True),
         EnsembleContender("taylor", "tolerance", _own("taylor")),

@@ -26,7 +26,7 @@ _BATCH, _ROUNDS = 0.02, 5
 
 @dataclass(frozen=True)
 class Size:
-    """The time per body of each of our methods, on one core, in a call with `bodies` bodies."""
+    """The run time per body of each of our methods, on one core, in a call for `bodies` bodies."""
 
     bodies: int
     seconds: dict[str, float]  # s per body, by method
@@ -46,16 +46,16 @@ class Memory:
 
     @property
     def ratio(self) -> float | None:
-        """Return the ratio of the peak memory to the memory of the arrays, or None if unknown."""
+        """Return the peak memory divided by the memory of the call's arrays, or None if unknown."""
         return None if self.peak is None else self.peak / self.arrays
 
 
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
-    """Measure the time per body of our methods in calls with 1, 10, 100, ... bodies.
+    """Measure the run time per body of our methods in calls with 1, 10, 100, ... bodies.
 
     `most` is the largest number of bodies, and `seed` determines the random bodies. The closed form
-    is measured without torque, both by `solve_many` and as a prepared solver. The other methods are
-    measured with torque.
+    is measured without torque, once by the function `solve_many`, and once as a solver that is
+    prepared before the timing. The other methods are measured with torque.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []
@@ -74,7 +74,10 @@ def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
 
 
 def _prepared(load: EnsembleLoad) -> Callable[[], object]:
-    """Return a function that solves all bodies of a load with a prepared closed-form solver."""
+    """Return a function that solves all bodies of a load (a set of bodies) by the closed form.
+
+    The function calls a solver that is prepared once, before the function is returned.
+    """
     solver, out = prepare(load.scene, "closed-form"), np.empty_like(load.omega0)
     return lambda: solver.many(load.omega0, HORIZON, out=out)
 
@@ -82,8 +85,8 @@ def _prepared(load: EnsembleLoad) -> Callable[[], object]:
 def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> list[Memory]:
     """Measure the memory that a call with `bodies` bodies needs, for each of `methods`.
 
-    By default these are our own methods. Each method runs in a separate process, because the peak
-    memory of a process never decreases.
+    By default `methods` are all of our own methods. Each method runs in a separate process, because
+    the peak memory of a process never decreases.
     """
     found = []
     for method in own_ensembles() if methods is None else methods:

@@ -42,8 +42,8 @@ Say = Callable[[str], None]  # receives the current part of a task
 class Rate:
     """The measured speed of one contender (solver) with one number of threads on one task.
 
-    The task is to solve the bodies of a load with at most a target error, or in a prescribed number
-    of steps of RK4.
+    The task is to solve the bodies of a load, a set of bodies. The error may be at most a target
+    error, or the number of RK4 steps is prescribed.
     """
 
     load: str
@@ -57,7 +57,7 @@ class Rate:
 
     @property
     def bodies_a_second(self) -> float:
-        """Return the number of bodies integrated to the horizon per second."""
+        """Return the number of bodies integrated to the end time per second of run time."""
         return self.bodies / self.seconds
 
     @property
@@ -71,7 +71,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class Rates:
-    """All speeds that a run of the benchmark measured, and the reasons for missing speeds."""
+    """All speeds that a run of `bench --ensemble` measured, and the reasons for missing speeds."""
 
     seed: str
     bodies: int
@@ -82,7 +82,7 @@ class Rates:
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """A task for contenders: to solve the bodies of a load with at most a target error.
+    """A benchmark task: to solve the bodies of a load (a set of bodies) within a target error.
 
     Without a target error, the task is to solve the bodies in `STEPS` steps of RK4. The error is
     measured on a sample, which consists of the first bodies of the load. Since all bodies are
@@ -96,20 +96,25 @@ class _Task:
 
     @property
     def place(self) -> str:
-        """Return a description of the task for messages: the load and the target error."""
+        """Return a description of the task for messages, such as ``no torque, 1e-06``.
+
+        It has the name of the set of bodies, and the target error or the prescribed number of RK4
+        steps.
+        """
         return f"{self.load.name}, {f'{self.target:g}' if self.target else f'{STEPS} steps of RK4'}"
 
     def takes(self, each: EnsembleContender) -> bool:
-        """Return whether the contender `each` can do the task.
+        """Return whether the contender (solver) `each` can do the task.
 
-        It must be able to solve bodies with the torques of the load. Without a target error, it
-        must also be an RK4 solver, whose setting is the number of steps.
+        It must be able to solve bodies with the torques of the load, which is the task's set of
+        bodies. Without a target error, it must also be an RK4 solver, whose setting is the number
+        of steps.
         """
         torque = self.load.torque is not None and each.torque_free
         return not torque and (self.target is not None or each.setting == "steps")
 
     def error(self, omega: Array) -> float:
-        """Return the largest relative error of `omega`, the computed result for the sample.
+        """Return the largest relative error of `omega`, the computed result for a sample of bodies.
 
         The error of a body is relative to its largest component of omega at the start and the end.
         If a component of `omega` is not finite, the result is infinite.
@@ -121,10 +126,11 @@ class _Task:
         return float(np.where(np.isfinite(errors), errors, np.inf).max())
 
     def setting(self, each: EnsembleContender) -> float | None:
-        """Return the coarsest setting with which the contender `each` reaches the target error.
+        """Return the coarsest setting with which the contender (solver) reaches the target error.
 
-        Return None if no setting reaches it. Without a target error, return the prescribed number
-        of steps, `STEPS`.
+        A setting of the contender `each` is a tolerance or a number of steps. Return None if no
+        setting reaches the error. Without a target error, return the prescribed number of RK4
+        steps, `STEPS`.
         """
         if self.target is None:
             return float(STEPS)
@@ -146,8 +152,9 @@ def measure_ensembles(
 ) -> Rates:
     """Measure the speed of all contenders (solvers) on all loads, at all target errors.
 
-    On the last load, the contenders that run RK4 are also measured with `STEPS` steps. `seed`, from
-    which the loads were drawn, is only recorded in the result.
+    A load is a set of bodies. On the last load, the contenders that run RK4 are also measured with
+    the fixed number of steps `STEPS`. `seed`, from which the loads were drawn, is only recorded in
+    the result.
     """
     found = Rates(seed, loads[0].n)
     n_tasks, done = len(loads) * len(TARGETS) + 1, 0
@@ -211,9 +218,10 @@ def _enough(
 ) -> tuple[EnsembleLoad, Callable[[], Array]]:
     """Return a load with the first bodies of `load`, and a function that solves these bodies.
 
-    The number of bodies is chosen so that a call of the function takes long enough to be timed. If
-    `load` has too few bodies, all of them are used. `prepare` makes the function, for the setting
-    `setting` and the number of threads `threads`.
+    A load is a set of bodies. The number of bodies is chosen so that a call of the function takes
+    long enough to be timed. If `load` has too few bodies, all of them are used. `prepare` makes the
+    function. `setting` is the tolerance or the number of steps, and `threads` the number of
+    threads.
     """
     n, before = min(load.n, 64), 0.0
     while True:
@@ -227,5 +235,8 @@ def _enough(
 
 
 def clock_of(threads: int) -> Clock:
-    """Return the clock for a call: processor time on one core, wall-clock time on several."""
+    """Return the clock function that times a call with this number of threads.
+
+    It is the processor time for one thread, and the wall-clock time otherwise.
+    """
     return process_time if threads == 1 else perf_counter

@@ -20,7 +20,7 @@ _BLOCK = 4096  # bodies whose arrays fit into the cache
 
 
 def ensemble_peers() -> list[EnsembleContender]:
-    """Return all third-party contenders (solvers) of `bench --ensemble`, installed or not."""
+    """Return all third-party solvers in the benchmark `bench --ensemble`, installed or not."""
     one = EnsembleContender
     blocks, alone = partial(compiled.numba_rk4, True), partial(compiled.numba_rk4, False)
     return [
@@ -38,9 +38,10 @@ def ensemble_peers() -> list[EnsembleContender]:
 def _heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
     """Return a function that integrates all bodies of a load with one heyoka batch integrator.
 
-    For each batch of bodies in turn, the function sets the state and the torque of the integrator.
-    It returns omega of the bodies at `HORIZON` (rad/s), shape (n, 3). `setting` is the tolerance,
-    and `threads` has no effect.
+    A load is a set of bodies with their initial omegas and torques. For each batch of bodies in
+    turn, the function sets the state and the torque of the integrator. It returns omega of the
+    bodies at the end time `HORIZON` (rad/s), shape (n, 3). `setting` is the tolerance, and
+    `threads` has no effect.
     """
     import heyoka
 
@@ -103,10 +104,10 @@ def _integrator(with_torque: bool, tolerance: float, size: int) -> Any:
 
 
 def _batches(rows: Array, size: int) -> Array:
-    """Return rows of three numbers, one row for each body, as batches of `size` bodies.
+    """Return the array `rows`, with three numbers for each body, divided into batches of bodies.
 
-    The result has the shape (batches, 3, size). The last batch is padded with copies of the last
-    row.
+    A batch has `size` bodies, and the result has the shape (batches, 3, size). The last batch is
+    padded with copies of the last row.
     """
     lacking = -len(rows) % size
     filled = np.concatenate([rows, np.repeat(rows[-1:], lacking, axis=0)])
@@ -116,9 +117,10 @@ def _batches(rows: Array, size: int) -> Array:
 def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
     """Return a function that integrates all bodies of a load by RK4 with NumPy arrays.
 
-    An array has one component of omega for a block of bodies. `setting` is the number of steps, and
-    `threads` the number of threads. The function returns omega of the bodies at `HORIZON` (rad/s),
-    shape (n, 3).
+    A load is a set of bodies with their initial omegas and torques. An array has one row for each
+    component of omega, and a block of bodies as columns. `setting` is the number of steps, and
+    `threads` the number of threads. The function returns omega of the bodies at the end time
+    `HORIZON` (rad/s), shape (n, 3).
     """
     a, b, c = coefficients()
     starts, torques = load.omega0.T.copy(), load.acceleration.T.copy()
@@ -161,9 +163,9 @@ def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[],
 def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
     """Return a function that runs SciPy's `solve_ivp` for one body of a load after another.
 
-    The right-hand side computes with floats, not with arrays. `setting` is the relative tolerance,
-    and `threads` has no effect. The function returns omega of the bodies at `HORIZON` (rad/s),
-    shape (n, 3).
+    A load is a set of bodies with their initial omegas and torques. The right-hand side computes
+    with floats, not with arrays. `setting` is the relative tolerance, and `threads` has no effect.
+    The function returns omega of the bodies at the end time `HORIZON` (rad/s), shape (n, 3).
     """
     from scipy.integrate import solve_ivp
 

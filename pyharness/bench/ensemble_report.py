@@ -27,7 +27,11 @@ _STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
 
 @dataclass(frozen=True)
 class Ensembles:
-    """The results of one run of `bench --ensemble`: speeds, times by size, and memory."""
+    """The results of one run of `bench --ensemble`.
+
+    They are the measured speeds of all solvers, our run times for different numbers of bodies, and
+    the memory that our methods need.
+    """
 
     rates: Rates
     sizes: Sequence[Size]
@@ -37,8 +41,8 @@ class Ensembles:
 def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> Report:
     """Return the report of `bench --ensemble`, which consists of tables and notes.
 
-    The tables show the speeds for each load and target error, the time per body against the number
-    of bodies, and the memory. `packages` are the packages whose
+    `found` has the results. The tables show the speeds for each set of bodies and target error, the
+    time per body against the number of bodies, and the memory. `packages` are the packages whose
     versions are listed. `command` is the command that produces the report again.
     """
     return measured_report(
@@ -55,10 +59,10 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
-    """Return the speed of our fastest method divided by the speed in `row`.
+    """Return the speed of our fastest method divided by the speed of the contender in `row`.
 
     `rows` has the speeds of all contenders (solvers) on the same task. Both speeds are for the same
-    number of threads; a contender that chooses its threads itself is compared with our speed on the
+    number of threads. A contender that chooses its threads itself is compared with our speed on the
     most threads. Return None if none of our methods was measured with that number of threads.
     """
     ours = [each for each in rows if each.method in _STYLES]

@@ -22,9 +22,10 @@ _STARTS = 8
 
 @dataclass(frozen=True)
 class Growth:
-    """The error of the Taylor method at one time, and the effect of a rounding of this time.
+    """The error of the Taylor method at one time, and the change of omega if this time is rounded.
 
-    The effect does not depend on the method. It therefore serves as a measure for the error.
+    The change depends on the motion but not on the method. It is the scale with which the error is
+    compared.
     """
 
     time: float  # s
@@ -41,9 +42,9 @@ def growth(
 ) -> list[Growth]:
     """Measure the error of the Taylor method at several times of a torque-free motion.
 
-    `horizons` are the times (s), and the error is the difference from the closed form. `tolerance`
-    is the relative tolerance of the Taylor method. Raise InputError if the scene has no closed
-    form.
+    `horizons` are the times (s). The result has a `Growth` for each of them. The error is the
+    difference from the closed form. `tolerance` is the relative tolerance of the Taylor method.
+    Raise InputError if the scene has no closed form.
     """
     if closed_form(scene) is None:
         raise InputError(

@@ -63,14 +63,14 @@ class Workload:
 
     @property
     def place(self) -> str:
-        """Return the name of the workload in messages, as ``case 5`` or ``scene 12``."""
+        """Return the name of this benchmark problem in messages, as ``case 5`` or ``scene 12``."""
         return f"{'scene' if self.kinds else 'case'} {self.label}"
 
     @property
     def group(self) -> str:
-        """Return the name of the group of workloads over which ratios of run times are averaged.
+        """Return the name of the group of problems over which ratios of run times are averaged.
 
-        All workloads of a group have the same end time. Scenes with a torque and scenes without
+        All problems of a group have the same end time. Scenes with a torque and scenes without
         torque are in separate groups, except without attitude at an end time other than 3 s.
         """
         if self.horizon != HORIZON and self.scene.attitude is None:
@@ -80,7 +80,10 @@ class Workload:
 
 @dataclass(frozen=True)
 class Row:
-    """The run time and the error of one contender (solver) with one setting on one workload."""
+    """The run time and the error of one contender (solver) with one setting on one workload.
+
+    The setting is a tolerance or a number of steps. A workload is a scene with an end time.
+    """
 
     workload: Workload
     method: str  # name of the contender
@@ -98,6 +101,7 @@ class Row:
 class Refusal:
     """The reason why a contender (solver) has no result for a workload with some setting.
 
+    A workload is a scene with an end time, and `setting` a tolerance or a number of steps.
     `setting` is None if the contender was not run with any setting, or if it has no setting.
     """
 
@@ -129,11 +133,12 @@ class Finding:
 def workloads(
     case: int | None = None, horizon: float | None = None, attitude: bool = False
 ) -> list[Workload]:
-    """Return the workloads: by default Cases 2 to 7 to T = 3 s, and Cases 3 and 4 to T = 100 s.
+    """Return the workloads of a benchmark: cases of the thesis, each with an end time T.
 
-    With `attitude` the workloads are Cases 1 to 7 to T = 3 s, and all cases except 6 to T = 100 s.
-    The attitude then starts from the axes of space. `case` selects a single case, and `horizon` a
-    single end time T (s).
+    By default they are Cases 2 to 7 to T = 3 s, and Cases 3 and 4 to T = 100 s. With `attitude`
+    they are Cases 1 to 7 to T = 3 s, and all cases except 6 to T = 100 s. The body's axes then
+    initially coincide with the axes of space. `case` selects a single case, and `horizon` a single
+    end time T (s).
     """
     usual, long = (_TURNING_CASES, _LONG_TURNING_CASES) if attitude else (_CASES, _LONG_CASES)
     cases = usual if case is None else (case,)
@@ -155,7 +160,8 @@ def measure(
 ) -> Finding:
     """Run every contender (solver) on every workload in `loads`; return the times and errors.
 
-    `progress` is called before each part of the work.
+    A workload is a scene with an end time. `progress` is called with a message before each part of
+    the work.
     """
     found = Finding(list(loads), [], [], {}, {})
     makers: dict[tuple[int | str, str], Maker] = {}
@@ -200,7 +206,7 @@ def measure(
 
 
 def error_of(end: End, truth: Reference) -> float | None:
-    """Return the error of the result `end` of a call against the reference solution `truth`.
+    """Return the error of a solver's result `end` against the reference solution `truth`.
 
     It is the relative error of omega. If `truth` has an attitude, it is the relative error of omega
     or the angular error of the attitude (rad), whichever is larger. Return None if the result is
@@ -262,11 +268,13 @@ def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[
 def _first_calls(
     load: Workload, contender: SceneContender, make: Maker, truth: Reference, refused: list[Refusal]
 ) -> tuple[list[tuple[Ready, Row]], float]:
-    """Prepare the calls of one contender for one workload, and run each of them for the first time.
+    """Prepare the calls of one contender for one workload, one for each setting, and try them.
 
-    Return the calls, each with its result, and the total time (s) of preparing them, without the
-    time of the calls themselves. `make` prepares a call for an end time (s) and a setting. `truth`
-    is the reference solution. Settings that cannot be run are appended to `refused`.
+    A contender is a solver. A workload is a scene with an end time, and a setting is a tolerance or
+    a number of steps. Return the calls, each with its result, and the total time (s) of preparing
+    them, without the time of the calls themselves. `make` prepares a call for an end time (s) and a
+    setting. `truth` is the reference solution. Settings that cannot be run are appended to
+    `refused`.
     """
     entries: list[tuple[Ready, Row]] = []
     errors: list[float | None] = []
@@ -319,7 +327,7 @@ def _first_calls(
 
 
 def _at_rounding(errors: Sequence[float | None]) -> bool:
-    """Return whether rounding limits the errors of a contender with ever finer steps.
+    """Return whether rounding limits the errors of a contender (solver) with ever finer steps.
 
     `errors` are its errors from coarse to fine steps. Rounding limits them if none of the last
     three errors is below the smallest earlier error, and if the smallest error is below 1e-10.

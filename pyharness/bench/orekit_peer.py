@@ -17,10 +17,12 @@ WARMING = 2.0
 
 
 def orekit(scene: Scene) -> Maker:
-    """Return a `Maker`, which prepares timed calls, for Orekit's `TorqueFree` on a scene.
+    """Return a function that prepares timed runs of Orekit's `TorqueFree` on a scene.
 
-    Each call computes the elliptic integrals of the motion again. The setting of a call has no
-    effect. Raise InputError if the scene has a torque or no moments, or if Java or Orekit fails.
+    `TorqueFree` is a closed form. The function takes the end time (s) and a setting that has no
+    effect, and returns a computation that is ready to be timed. Each run computes the elliptic
+    integrals of the motion again. Raise InputError if the scene has a torque or no moments, or if
+    Java or Orekit fails.
     """
     if not scene.torque.is_zero or scene.moments is None:
         raise InputError("TorqueFree does not take this scene; allowed: moments, and no torque")
@@ -71,7 +73,8 @@ def _end(found: Any) -> End:
 def _machine() -> Any:
     """Return the module JPype, after starting the Java virtual machine in this process if needed.
 
-    A process can start a Java virtual machine only once. Raise InputError if Java or Orekit fails.
+    JPype lets Python call Java. A process can start a Java virtual machine only once. Raise
+    InputError if Java or Orekit fails.
     """
     try:
         # JPype's type hints declare only some of its names.

@@ -53,9 +53,10 @@ def peers() -> list[SceneContender]:
 
 
 def _heyoka(scene: Scene) -> Maker:
-    """Return a `Maker`, which prepares timed calls, for the package heyoka on a scene.
+    """Return a function that prepares timed runs of the package heyoka on a scene.
 
-    It compiles one integrator for each tolerance. Each call resets the integrator's time and state.
+    The function takes the end time (s) and the tolerance, and compiles one integrator for each
+    tolerance. Each timed run first resets the integrator's time and state.
     """
     import heyoka
 
@@ -98,9 +99,10 @@ def _heyoka_equations(scene: Scene) -> list[tuple[Any, Any]]:
 
 
 def _right_hand_side(scene: Scene) -> RightHandSide:
-    """Return the right-hand side of a scene's equations of motion, which computes with floats.
+    """Return the right-hand side of a scene's equations of motion, for SciPy's integrators.
 
-    It is for omega, or for omega and attitude if the scene has an attitude.
+    It computes with Python floats, not with arrays. The unknowns are omega, and also the attitude
+    quaternion if the scene has an attitude.
     """
     slopes = scene.right_hand_side()
     return slopes if scene.attitude is None else with_attitude(slopes)
@@ -117,10 +119,11 @@ def _absolute(scene: Scene) -> Any:
 
 
 def _solve_ivp(name: str, scene: Scene) -> Maker:
-    """Return a `Maker`, which prepares timed calls, for SciPy's `solve_ivp` on a scene.
+    """Return a function that prepares timed runs of SciPy's `solve_ivp` on a scene.
 
-    `name` is the method of `solve_ivp`. The calls have no dense output, and their right-hand side
-    computes with Python floats.
+    The function takes the end time (s) and the relative tolerance. `name` is the method of
+    `solve_ivp`. The runs have no dense output, and their right-hand side computes with Python
+    floats.
     """
     from scipy.integrate import solve_ivp
 

@@ -31,8 +31,9 @@ _SLOPES = (2, 4, 8)
 def bench_picture(finding: Finding, data: Table) -> Picture:
     """Draw the error of each solver against run time and against evaluations, for each workload.
 
-    Each workload has a row of two plots: error against run time, and error against the number of
-    evaluations of the right-hand side. `data` is the table that is saved with the picture.
+    `finding` has the results of a benchmark. A workload is a scene with an end time, and has a row
+    of two plots: error against run time, and error against the number of evaluations of the
+    right-hand side. `data` is the table that is saved with the picture.
     """
     from matplotlib.figure import Figure
 
@@ -111,9 +112,10 @@ def _frame(axes: "Axes", load: Workload, label: str) -> None:
 
 
 def draw_slopes(axes: "Axes") -> None:
-    """Draw lines with the slopes of methods of order 2, 4 and 8 in a plot against right-hand sides.
+    """Draw lines that show how fast the errors of methods of order 2, 4 and 8 decrease.
 
-    The lines form a fan in the upper right corner of the plot, where no solver has its results.
+    The plot `axes` shows error against the number of evaluations of the right-hand side. The lines
+    form a fan in the upper right corner of the plot, where no solver has its results.
     """
     low, high = axes.get_xlim()
     begin = high * (low / high) ** 0.3
@@ -133,8 +135,9 @@ def draw_slopes(axes: "Axes") -> None:
 def growth_picture(found: "Mapping[int, Sequence[Growth]]") -> Picture:
     """Draw the Taylor method's error, and the effect of one rounding of the time, against time.
 
-    `found` has the measured errors by the number of the case. Each case has a plot. The effect of a
-    rounding, by a relative 2**-53, does not depend on the method.
+    `found` has the measured errors by the number of the case of Table 1. Each case has a plot. The
+    effect is the change of omega if the time changes by a relative 2**-53. It does not depend on
+    the method.
     """
     from matplotlib.figure import Figure
 

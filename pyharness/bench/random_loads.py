@@ -25,15 +25,17 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 
 
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
-    """Return the random workload that a seed and a number (from 1) determine.
+    """Return the random benchmark problem that a seed and a number (from 1) determine.
 
-    Successive numbers take the kinds of torque in turn. The `kinds` of the workload are members of
-    `KINDS`, and its solution `truth` comes from the second reference, `integer_series`. Moments are
-    in kg m2, omega in rad/s, torque in N m, the horizon in s. A scene is drawn again if its error
-    amplification is `MOST_GROWTH` or more, or if the body turns less than once or more than 300
-    times. With `attitude`, the same scene also has an attitude, which starts from the axes of
-    space. The workload then has no `truth`, because the second reference does not propagate the
-    attitude.
+    The problem is a `Workload`, a scene with an end time. Successive numbers take the kinds of
+    torque in turn. `kinds` of the workload are members of `KINDS`, such as ``no torque``. Its
+    solution `truth` comes from `integer_series`, the second of our two reference solvers. A scene
+    is drawn again if its error amplification is `MOST_GROWTH` or more. It is also drawn again if
+    the body turns less than once or more than 300 times. Moments are in kg m2, omega in rad/s,
+    torque in N m, the end time in s.
+
+    With `attitude`, the same scene also has an attitude, which starts from the axes of space. The
+    workload then has no `truth`, because `integer_series` does not propagate the attitude.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1

@@ -33,10 +33,11 @@ _DRIFT = (
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
     """Return the report of a benchmark: a table for each workload, then mean ratios of run times.
 
-    A ratio is the run time of the baseline solver divided by the run time of another solver at the
-    same error. For random scenes, the report shows the distributions of the ratios instead of these
-    tables. The report also describes the machine. `packages` are the packages whose versions are
-    listed. `command` is the command that produces the report again.
+    `finding` has the results, and a workload is a scene with an end time. A ratio is the run time
+    of the baseline solver divided by the run time of another solver at the same error. For random
+    scenes, the report shows the distributions of the ratios instead of these tables. The report
+    also describes the machine. `packages` are the packages whose versions are listed. `command` is
+    the command that produces the report again.
     """
     drawn, data = _random(finding), _data(finding)
     return measured_report(
@@ -67,10 +68,11 @@ def _spread_data(finding: Finding) -> Table:
 
 
 def _spread_parts(finding: Finding) -> list[tuple[str, Table]]:
-    """Return a title and a table for every solver and target error, for random scenes.
+    """Return a title and a table for every solver and target error of a run with random scenes.
 
-    For each kind of scene, a table has the distribution over the scenes of the baseline solver's
-    run time divided by this solver's run time.
+    A table has a row for each kind of scene. The row shows the distribution of ratios over the
+    scenes of this kind. A ratio is the run time of the baseline solver divided by the run time of
+    the table's solver.
     """
     heads = ("mean", "smallest", "25 %", "median", "75 %")
     columns = [
@@ -195,10 +197,11 @@ def ratio(value: float | None) -> str:
 
 
 def _parts(finding: Finding) -> list[tuple[str, Table]]:
-    """Return a title and a table for every workload, and for every group of workloads.
+    """Return pairs of a title and a table, for every workload and every group of workloads.
 
-    The table of a workload has each solver's run time for each target error. The table of a group
-    has geometric means, over its workloads, of the baseline solver's time divided by each solver's.
+    A workload is a scene with an end time. Its table has each solver's run time for each target
+    error. The table of a group has geometric means, over its workloads, of the baseline solver's
+    time divided by each solver's.
     """
     targets = list(map(_power, TARGETS))
     columns = [Column("us per solve to", left=True)]

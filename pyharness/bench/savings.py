@@ -24,7 +24,10 @@ _SECONDS = 2e-3  # duration of a batch
 
 @dataclass(frozen=True)
 class Saving:
-    """The times of one computation with and without a part that a plan can leave out."""
+    """The run times of one computation with and without a part that a plan can leave out.
+
+    A plan decides which parts of a computation, such as dense output, a scene needs.
+    """
 
     part: str  # the part that is left out, as the plan names it
     where: str  # the scene or program with which it is measured
@@ -33,17 +36,17 @@ class Saving:
 
     @property
     def ratio(self) -> float:
-        """Return the ratio of the time with the part to the time without it."""
+        """Return the time with the part that can be left out, divided by the time without it."""
         return self.with_it / self.without
 
 
 def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
     """Measure the time saved by each part of a computation that a plan can leave out.
 
-    The parts are the integration (if there is a closed form), the torque as a function of time,
-    dense output, and the translational velocity. Further parts are the imports of SciPy and of the
-    reference solver. Solutions
-    are computed up to `t_end` (s) with the relative tolerance `tolerance`.
+    A plan decides which parts a scene needs. The parts are the integration (if there is a closed
+    form), the torque as a function of time, dense output, and the translational velocity. Further
+    parts are the imports of SciPy and of the reference solver. Solutions are computed up to `t_end`
+    (s) with the relative tolerance `tolerance`.
     """
     constant = case_scene(5)
     times = [t_end * k / 100.0 for k in range(1, 101)]
@@ -90,9 +93,9 @@ def _python(code: str) -> None:
 def measured_saving(
     part: str, where: str, with_it: Callable[[], object], without: Callable[[], object]
 ) -> Saving:
-    """Measure the times of the functions `with_it` and `without`, and return them as a `Saving`.
+    """Measure the run times of two functions that differ in one part of a computation.
 
-    The functions make a computation with the part `part` and without it. `where` names the scene or
-    program with which they are measured.
+    The function `with_it` does the part named `part`, and the function `without` does not. `where`
+    names the scene or program with which they are measured. The times are returned as a `Saving`.
     """
     return Saving(part, where, *seconds([with_it, without], _SECONDS, _BATCHES))

@@ -14,7 +14,10 @@ YARDSTICKS = ("heyoka", "solve_ivp-dop853")
 
 @dataclass(frozen=True)
 class Score:
-    """The times in which one contender (solver) reaches the target errors on one workload."""
+    """The times in which one contender (solver) reaches the target errors on one workload.
+
+    A workload is a scene with an end time.
+    """
 
     method: str  # name of the contender
     # For each error in `TARGETS`, the time (s) of the fastest setting that reaches this error; None
@@ -30,8 +33,8 @@ class Score:
 class Spread:
     """The distribution of a contender's time ratios over the random scenes of one kind.
 
-    A ratio is the baseline contender's time to reach the target error, divided by the time of this
-    contender.
+    A contender is a solver in the benchmark. A ratio is the baseline contender's time to reach the
+    target error, divided by the time of this contender.
     """
 
     method: str  # name of the contender
@@ -56,7 +59,9 @@ def yardstick(finding: Finding) -> str | None:
 def scores(finding: Finding, load: Workload) -> list[Score]:
     """Return the scores of all contenders (solvers) on the workload `load`.
 
-    The score of the baseline contender is the first; the others are in the order of measurement.
+    A workload is a scene with an end time. A score has the times in which a contender reaches the
+    target errors. The score of the baseline contender is the first; the others are in the order of
+    measurement.
     """
     rows: dict[str, list[Row]] = {}
     for row in finding.rows:
@@ -77,7 +82,7 @@ def scores(finding: Finding, load: Workload) -> list[Score]:
 def groups(finding: Finding) -> dict[str, list[Workload]]:
     """Return the groups of workloads over which time ratios are averaged, by the name of the group.
 
-    The groups are ordered by the end time of the integration, and then by name.
+    A workload is a scene with an end time. The groups are ordered by this time, and then by name.
     """
     found: dict[str, list[Workload]] = {}
     for load in finding.workloads:
@@ -88,9 +93,10 @@ def groups(finding: Finding) -> dict[str, list[Workload]]:
 def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float | None]]:
     """Return each contender's geometric means of its time ratios over the workloads `loads`.
 
-    A ratio is the baseline's time divided by the contender's. A contender has a mean for each
-    target error. The mean is None if the contender or the baseline does not reach the error on all
-    workloads.
+    The result is a dictionary by the name of the contender (solver), with a mean for each target
+    error. A ratio is the baseline's time divided by the contender's. The mean is None if the
+    contender or the baseline does not reach the error on all workloads, which are scenes with end
+    times.
     """
     tables = [{each.method: each.ratios for each in scores(finding, load)} for load in loads]
     names = dict.fromkeys(name for table in tables for name in table)
@@ -106,8 +112,9 @@ def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float |
 def spreads(finding: Finding, kinds: Sequence[str]) -> list[Spread]:
     """Return the distribution of each contender's time ratios, by target error and kind of scene.
 
-    `kinds` are the kinds of random scenes. The distributions are ordered by contender, error and
-    kind. The baseline contender has no distribution, because all of its ratios are 1.
+    A ratio is the time of the baseline contender (solver) divided by the contender's. `kinds` are
+    the kinds of random scenes. The distributions are ordered by contender, error and kind. The
+    baseline has no distribution, because all of its ratios are 1.
     """
     tables = {
         load.label: {each.method: each.ratios for each in scores(finding, load)}

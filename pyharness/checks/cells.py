@@ -27,10 +27,11 @@ _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
 def cells(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks that Fortran and the Python twin agree bit for bit in every cell.
+    """Yield deferred checks that the Fortran programs and their Python versions agree bit for bit.
 
-    A cell is a program with a case of Table 1, a subset of the program's defects, and a subset of
-    its readings. If `chosen.thin` is set, as in the self-test, only a few cells are checked.
+    There is a check for each cell: a program with a case of Table 1, a subset of the program's
+    defects, and a subset of its readings. A reading is an interpretation of a doubtful card. If
+    `chosen.thin` is set, as in the self-test, only a few cells are checked.
     """
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
@@ -43,19 +44,19 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
-    """Return the name of the check that the suite named `suite` makes of one cell.
+    """Return the name of the check that a suite makes of one cell.
 
-    A cell is a listing (a program with a choice of its defects and readings) and the number of a
-    case.
+    `suite` is the name of the suite, a group of checks. A cell is a listing (a program with a
+    choice of its defects and readings) and the number of a case of Table 1.
     """
     return Name(suite, listing.program, f"case-{case}", listing_name(listing))
 
 
 def random_programs(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks that Fortran and the Python twin agree in scenes drawn at random.
+    """Yield deferred checks that Fortran and Python versions of a program agree in random scenes.
 
-    `chosen` has the seed and the number of draws. For each scene, the listing and the options of
-    the stop test are also drawn.
+    `chosen` has the seed and the number of scenes. For each scene, a program with some of its
+    defects and readings is also drawn, and the options of its stop test.
     """
     for number in range(chosen.draws):
         yield Attempt(chosen.drawn(number, "program"), partial(_of_draw, chosen.seed, number))
@@ -71,11 +72,12 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 
 
 def _agreement(name: Name, listing: Listing, scene: Scene, is_listed: bool, *options: Any) -> Check:
-    """Return the check that Fortran and the twin agree in a scene to the last bit.
+    """Return the check that the Fortran and the Python version of a program agree to the last bit.
 
-    If `is_listed`, a difference in this cell is known and listed in `data/divergences.toml`. The
-    check then fails if the difference no longer occurs. `options` are the constant of the stop test
-    (1/s) and whether the test may stop the run.
+    `listing` is the program with a choice of its defects, and `scene` is the problem that it
+    solves. If `is_listed`, a difference is known and recorded in `data/divergences.toml`. The check
+    then fails if the difference no longer occurs. `options` are the constant of the stop test (1/s)
+    and whether the test may stop the run.
     """
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))

@@ -32,7 +32,8 @@ class Name:
     quantity : str
         The quantity that is compared with a limit.
     command, options : str
-        The verb that makes the check, and the options that repeat it in addition to ``--only``.
+        The command of pyharness that makes the check, such as ``verify``, and the options that
+        repeat it in addition to ``--only``.
     scene : Scene or None
         The scene of the problem, which can be saved in a file; None if there is none.
     """
@@ -50,8 +51,8 @@ class Name:
     def id(self) -> str:
         """Return the non-empty parts of the name joined by slashes; ids are unique within a run.
 
-        The order is suite, subject, circumstance, setting and quantity. In random and external
-        checks the circumstance is before the subject.
+        The order is suite, subject, circumstance, setting and quantity. In the suites ``random``
+        and ``external`` the circumstance is before the subject.
         """
         who = self.subject, self.circumstance
         who = who[::-1] if self.suite in _CIRCUMSTANCE_FIRST else who
@@ -115,7 +116,10 @@ class Check:
 
     @property
     def suite(self) -> str:
-        """Return the suite that made the check: a kind of `verify` or a trial of `stress`."""
+        """Return the name of the suite (group of checks) to which the check belongs.
+
+        A suite is a kind of checks of the command `verify`, or a trial of the command `stress`.
+        """
         return self.name.suite
 
     @property
@@ -135,9 +139,10 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a scene drawn at random, with its entry point, tolerance and error amplification.
+    """The result of a check in a random scene, with its entry point, tolerance and amplification.
 
-    The report groups these checks by the three quantities.
+    The entry point is the call that solved the scene, and the amplification is the error
+    amplification of the motion. The report groups these checks by the three quantities.
     """
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
@@ -163,8 +168,9 @@ Attempts = Iterable[Check | Attempt]
 def made(attempts: Attempts, only: Sequence[str]) -> Iterator[Check]:
     """Yield the requested checks of `attempts`, which has finished and deferred checks.
 
-    `only` has the leading parts of the requested ids. A deferred check (`Attempt`) is computed only
-    if it is requested. A finished check in `attempts` is always yielded.
+    `only` has the leading parts of the requested ids, as in ``cells/two-term``. A deferred check
+    (`Attempt`) is computed only if it is requested. A finished check in `attempts` is always
+    yielded.
     """
     for each in attempts:
         if isinstance(each, Check):
@@ -181,12 +187,13 @@ def run_suites(
     command: str,
     of_the_user: Sequence[str] = (),
 ) -> Iterator[Check]:
-    """Yield the requested checks of all suites, which are computed one after another.
+    """Yield the requested checks of all suites (groups of checks), computed one after another.
 
-    `suites` maps the name of each suite to a function that returns the attempts of this suite.
-    `only` has the leading parts of the requested ids, and `command` is the verb that makes the
-    checks. An InputError that ends a suite becomes a failed check. In the suites `of_the_user` the
-    InputError is raised again, because it is caused by a mistake in the user's input.
+    `suites` maps the name of each suite to a function that returns its finished or deferred checks.
+    `only` has the leading parts of the requested ids. `command` is the command of pyharness that
+    makes the checks, such as ``verify``. An InputError that ends a suite becomes a failed check. In
+    the suites `of_the_user` the InputError is raised again, because it is caused by a mistake in
+    the user's input.
     """
     for suite, attempts in suites.items():
         if not may_hold(suite, only):
@@ -202,9 +209,10 @@ def run_suites(
 
 
 def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
-    """Return the names in `suites` that may contain a requested check, in the same order.
+    """Return the names of the suites that may contain a requested check, in the same order.
 
-    `only` has the leading parts of the requested ids.
+    `suites` has names of groups of checks, such as ``cells``. `only` has the leading parts of the
+    ids of the requested checks, as in ``cells/two-term``.
     """
     return [suite for suite in suites if may_hold(suite, only)]
 
@@ -233,7 +241,7 @@ def selected(id: str, only: Sequence[str]) -> bool:
 def may_hold(id: str, only: Sequence[str]) -> bool:
     """Return whether `only` may request a check whose id is `id` or begins with `id`.
 
-    `only` has the leading parts of the requested ids. An attempt or a suite is computed only if the
-    result for its name is true.
+    `only` has the leading parts of the requested ids. If the result is false, no check whose id
+    begins with `id` needs to be computed.
     """
     return selected(id, only) or any(each.startswith(id + "/") for each in only)

@@ -31,7 +31,9 @@ _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/
 def listings(program: str) -> list[Listing]:
     """Return the versions of a program to check: original, corrected, and each with one change.
 
-    The change activates or corrects a single defect or conjecture, or activates a single reading.
+    The change activates or corrects a single defect or conjecture, or activates a single reading. A
+    conjecture is an assumption about a missing card, and a reading is an interpretation of a
+    doubtful card.
     """
     names = frozenset(switches(program))
     found = [Listing.original(program), Listing.corrected(program)]
@@ -43,10 +45,11 @@ def listings(program: str) -> list[Listing]:
 
 
 def decks(chosen: Selection) -> Iterator[Check]:
-    """Yield checks that every deck gives the same file TAPE5 and the same page as the Fortran port.
+    """Yield checks that every deck gives the same results as the Fortran port, bit for bit.
 
-    A deck is the source text of a program on the author's own cards. Yield nothing if there is no
-    Fortran compiler. `verify` then reports that the decks were not run.
+    A deck is the source text of a program on the author's own cards. Its results are the file TAPE5
+    and the printed page. `chosen` selects the checks. Yield nothing if there is no Fortran
+    compiler. The command `verify` then reports that the decks were not run.
     """
     asked = [
         (of_cell("decks", listing, case), listing, case)
@@ -88,10 +91,11 @@ def _compared(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
 
 
 def _after(deck: Run, steps: int, overflowed: bool) -> list[str]:
-    """Return texts that describe faults in the deck's records after the last row of the port.
+    """Return texts that describe faults in the deck's records after the last row of our port.
 
-    The port has `steps` rows. If the port overflowed, the deck must have further records, none of
-    which has three finite components of omega. Otherwise the deck must have no further records.
+    The deck is a run of the program on the author's own cards. Our Fortran port has `steps` rows.
+    If the port overflowed, the deck must have further records, none of which has three finite
+    components of omega. Otherwise the deck must have no further records.
     """
     rest = deck.tape5[steps:]
     if not overflowed:

@@ -38,9 +38,10 @@ _WEIGHTS = {"two-term": 3.0, "four-term": 15.0}
 
 @dataclass(frozen=True)
 class Probe:
-    """A vector or matrix, measured on a program and derived by theory, with an error bound.
+    """A vector or matrix that is measured by running a program and also derived by theory.
 
-    The bound on the difference allows for rounding errors alone, because the theory is exact.
+    `limit` bounds the difference of the two. It allows for rounding errors alone, because the
+    theory is exact.
     """
 
     found: Array  # as measured
@@ -49,7 +50,7 @@ class Probe:
 
     @property
     def difference(self) -> float:
-        """Return the largest absolute difference of a measured and a derived element.
+        """Return the largest absolute difference between a measured and a derived element.
 
         The result is not finite if an element is not finite.
         """
@@ -57,10 +58,10 @@ class Probe:
 
 
 def steady_scene(coefficients: Triple, omega: Triple, step: float) -> Scene:
-    """Return a scene of one `step` (s) in which a constant torque keeps `omega` (rad/s) steady.
+    """Return a scene of one `step` (s) in which a constant torque keeps `omega` (rad/s) constant.
 
     `coefficients` are A, B and C of Euler's equations. If all numbers have few binary digits, the
-    balance is exact and no rounding disturbs it.
+    torque balances the other terms exactly, and no rounding disturbs the steady rotation.
     """
     a, b, c = coefficients
     x, y, z = omega
@@ -71,9 +72,9 @@ def steady_scene(coefficients: Triple, omega: Triple, step: float) -> Scene:
 
 
 def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
-    """Return the Jacobian of equations 13-15 at `omega`, times the scene's step size, in fractions.
+    """Return the exact Jacobian of Euler's equations at `omega`, times the scene's step size.
 
-    The equations are Euler's equations of the thesis, and the Jacobian is exact.
+    Its elements are fractions. Euler's equations are equations 13-15 of the thesis.
     """
     a, b, c = (Fraction(each) * Fraction(scene.step_size) for each in scene.euler_coefficients)
     x, y, z = map(Fraction, omega)
@@ -81,17 +82,22 @@ def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
 
 
 def eigenvalues(scene: Scene) -> Array:
-    """Return z, the eigenvalues of the Jacobian times the step size, at the scene's omega."""
+    """Return the eigenvalues of the Jacobian of Euler's equations, times the step size.
+
+    The Jacobian is taken at the initial omega of the scene. Each of these products is a value of z,
+    on which the linear stability of a method depends.
+    """
     return np.asarray(np.linalg.eigvals(np.array(jacobian(scene, scene.omega), dtype=float)))
 
 
 def first_step(scene: Scene, listing: Listing) -> Probe:
     """Return the derivative of a program's first step at a steady rotation, measured and derived.
 
-    It is the derivative of omega after the step with respect to omega before the step, a 3 x 3
-    matrix. The measured matrix consists of differences between steps from neighbouring omegas. The
-    step is a polynomial of known degree, so that differences with enough neighbours have no error
-    except rounding. The derived matrix follows from the amplification matrix.
+    `listing` is the program with a choice of its defects. The derivative is that of omega after the
+    step with respect to omega before the step, a 3 x 3 matrix. The measured matrix consists of
+    differences between steps from neighbouring omegas. The step is a polynomial of known degree, so
+    that differences with enough neighbours have no error except rounding. The derived matrix
+    follows from the amplification matrix, by which a step multiplies perturbations.
     """
 
     def stepped(omega: Array) -> Array:
@@ -108,10 +114,10 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 def later_steps(scene: Scene, listing: Listing) -> Probe:
     """Return a spinning top's perturbation after all steps of a scene, measured and derived.
 
-    The coefficient C and the torque are zero. omega3 is the spin, and omega1 and omega2 are the
-    perturbation. The equations are then linear, so that the perturbation may be of any size. The
-    derived perturbation is the initial perturbation, multiplied by the amplification matrix in
-    every step.
+    `listing` is the program that is run, with a choice of its defects. The coefficient C and the
+    torque are zero. omega3 is the spin, and omega1 and omega2 are the perturbation. The equations
+    are then linear, so that the perturbation may be of any size. The derived perturbation is the
+    initial perturbation, multiplied by the program's amplification matrix in every step.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
@@ -134,8 +140,9 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
     """Return the growth factor of a collocation step on x' = z x, measured and derived.
 
-    The measured factor is computed by the Python twin, in step number `step` of a run with steps of
-    1 s. The derived factor is an element of the amplification matrix.
+    `listing` is a collocation program with a choice of its defects. The measured factor is computed
+    by its Python version, in step number `step` of a run with steps of 1 s. The derived factor is
+    an element of the amplification matrix, by which the step multiplies perturbations.
     """
     program = listing.program
     moved = _moved(listing, step)
@@ -157,9 +164,9 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
 
     z is the step size times an eigenvalue of the equations of a spinning top. It has the direction
-    -1 or 1j from 0. The distance is measured by bisection over runs of the program. If the program
-    keeps a second vector from step to step, growth is measured by the change of omega from step to
-    step. Otherwise the constant part of omega would hide the growth.
+    -1 or 1j from 0. The distance is measured by bisection over runs of the program `listing`. If
+    the program propagates a second vector from step to step, growth is measured by the change of
+    omega from step to step. Otherwise the constant part of omega would hide the growth.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -192,8 +199,8 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
 def _moved(listing: Listing, step: int) -> float:
     """Return the factor by which a defect has moved the collocation points of a step.
 
-    The defect is `dt-accumulates`, and the factor is 1 for a listing without it. `step` is the
-    number of the step, from 1.
+    With the defect `dt-accumulates`, the factor is the number `step` of the step, counted from 1.
+    If the program version `listing` does not have this defect, the factor is 1.
     """
     return float(step) if listing.has("dt-accumulates") else 1.0
 
@@ -201,10 +208,11 @@ def _moved(listing: Listing, step: int) -> float:
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
     """Return the derivative of a collocation step at an unsteady omega, measured and derived.
 
-    The derivative is measured with the Python twin, in step number `step` of a run. It is taken at
-    the scene's omega, which is no steady rotation. With the step size h, omega after the step is
-    omega + h F + h**2/2 J F + w h**3 Q(F). F is the right-hand side, J is its Jacobian, and Q is
-    its quadratic part. Only the weight w depends on the positions of the collocation points.
+    The derivative is that of omega after the step with respect to omega before it. It is measured
+    with the Python version of the program, in step number `step` of a run. It is taken at the
+    scene's omega, which is no steady rotation. With the step size h, omega after the step is omega
+    + h F + h**2/2 J F + w h**3 Q(F). F is the right-hand side, J is its Jacobian, and Q is its
+    quadratic part. Only the weight w depends on the positions of the collocation points.
     """
     program, h = listing.program, scene.step_size
     moved = _moved(listing, step)
@@ -222,7 +230,7 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
     a, omega = np.array(coefficients), np.array(scene.omega)
 
     def along(direction: Array) -> Array:
-        """Return the Jacobian of equations 13-15 at omega = `direction`."""
+        """Return the Jacobian of Euler's equations (13-15 of the thesis) at omega = `direction`."""
         x, y, z = direction
         return np.asarray(a[:, None] * np.array([[0.0, z, y], [z, 0.0, x], [y, x, 0.0]]))
 
@@ -235,7 +243,7 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
 def _differentiated(
     stepped: Callable[[Array], Array], omega: Sequence[float], count: int
 ) -> tuple[Array, float, float]:
-    """Return the derivative of a step by differences, their reach, and a rounding factor.
+    """Return the derivative of a step by differences, the reach of the differences, and a factor.
 
     `stepped` maps omega before the step to omega after the step, and the derivative is taken at
     `omega`. There are `count` pairs of neighbouring omegas along each axis. The reach is the
@@ -260,8 +268,8 @@ def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Arra
     """Return a bound on the rounding error of each omega in a step, in units of 2**-53 rad/s.
 
     `sizes` are bounds of abs(omega) before the step. `moved` is the factor by which a defect has
-    moved the collocation points. Every rounding belongs to a term of the step that is no larger
-    than the same term with all signs positive.
+    moved the collocation points. The bound sums the terms of the step with all signs positive,
+    because rounding errors are proportional to these terms.
     """
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":

@@ -21,10 +21,10 @@ class Divergence:
     """The smallest step size (s) for which runs diverge, as found by running and as predicted.
 
     `found` is the smallest step with which a component of omega overflows, or exceeds twice its
-    largest magnitude in the solution. It is 0 if this already happens with the smallest step that
-    is tried. `predicted` is the smallest step with which, by linear stability, the wobble about
-    axis 3 doubles. `limit` is the largest allowed difference of `found` and `predicted`, relative
-    to `predicted`.
+    largest magnitude in the true solution. It is 0 if this already happens with the smallest step
+    that is tried. `predicted` is the smallest step with which, by linear stability, the wobble
+    about axis 3 doubles. `limit` is the largest allowed difference of `found` and `predicted`,
+    relative to `predicted`.
     """
 
     found: float
@@ -35,11 +35,11 @@ class Divergence:
 def divergence(
     scene: Scene, time: float, matrix: Amplification, runner: Runner, smallest: float
 ) -> Divergence:
-    """Compare the step size at which runs of a spinning body diverge with the prediction.
+    """Return the step sizes at which runs of a spinning body diverge, as found and as predicted.
 
     The body has no torque, and spins about a stable axis 3 for `time` (s). `runner` runs a scene by
-    a method, and `matrix` is the amplification matrix of the method's step. `smallest` is the
-    smallest step size that is tried (s).
+    a method. `matrix` is the amplification matrix of the method's step, from which the prediction
+    follows. `smallest` is the smallest step size that is tried (s).
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -89,11 +89,11 @@ def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: floa
 def _doubling(
     matrix: Amplification, rate: float, time: float, smallest: float, missed: float = 0.0
 ) -> float:
-    """Return the smallest step (s) with which a wobble grows by the factor 2 exp(`missed`).
+    """Return the smallest step (s) with which, by theory, a wobble grows by 2 exp(`missed`).
 
-    `matrix` is the amplification matrix of a step, `rate` is the angular frequency of the wobble
-    (1/s), and `time` (s) is the duration of the growth. The step is found by bisection between
-    `smallest` (s) and `time`.
+    `missed` allows for a peak of the wobble between two steps. `matrix` is the amplification matrix
+    of a step, `rate` is the angular frequency of the wobble (1/s), and `time` (s) is the duration
+    of the growth. The step is found by bisection between `smallest` (s) and `time`.
     """
     wanted = math.log(2.0) + missed
 

@@ -57,9 +57,9 @@ def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> It
     """Yield checks that compare every method with the published results of each problem.
 
     A method that can't take a problem is left out. The ids of the checks are
-    ``external/<problem>/<time>/<method>``. Value and limit are in the problem's unit, for the
-    component of omega with the largest ratio of value to limit. `only` has the leading parts of the
-    requested ids.
+    ``external/<problem>/<time>/<method>``. The value of a check is the difference from the
+    published result, in the problem's unit. Value and limit are for the component of omega with the
+    largest ratio of value to limit. `only` has the leading parts of the requested ids.
     """
     for problem in problems:
         # Times of one sign are solved together, so that a replay of one check gives the same bits.
@@ -77,7 +77,7 @@ def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> It
 def _names(
     problem: Problem, values: Sequence[Value], method: str, only: Sequence[str], quantity: str = ""
 ) -> list[tuple[int, Name]]:
-    """Return the index in `values`, and the name, of each requested check of a method.
+    """Return pairs of an index in `values` and a name, one for each requested check of a method.
 
     `values` are the published results by time, and `only` has the leading parts of the requested
     ids. `quantity` is the last part of the ids, if it is not empty. Return an empty list if the
@@ -95,11 +95,12 @@ def _names(
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
-    """Return the check of a method that has no result at the time of `value`.
+    """Return the check of a method that has no result at the time of the published `value`.
 
-    `refusal` is the message of the method, or empty if its run ended before that time. For a
-    problem from a user's file a refusal passes, because its times may take the method too long.
-    `auto` and `closed-form` may not refuse.
+    `refusal` is the message with which the method refused the problem. It is empty if the run ended
+    before that time; the check then fails. If the method refused a problem from a user's file, the
+    check passes, because it may take the method too long. The methods `auto` and `closed-form` may
+    not refuse.
     """
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
@@ -110,7 +111,8 @@ def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
 def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
     """Yield checks of every method that propagates attitudes against the published attitudes.
 
-    The value of a check is the angle between the two attitudes (rad). The limit is the sum of the
+    `values` are the published results, and `only` has the leading parts of the requested ids. The
+    value of a check is the angle between the two attitudes (rad). The limit is the sum of the
     published accuracy, the tolerance, and the effect of rounding the input numbers of the problem.
     """
     scene, times = problem.scene, [float(value.time) for value in values]
@@ -141,8 +143,9 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
     """Return the change of attitude that rounding the numbers of a scene causes at each time (rad).
 
-    The change is computed like the change of omega in `_moves`. If the scene can't be solved, only
-    the rounding of the quaternions is counted.
+    The changes caused by each number and by the time alone are computed to first order, and their
+    magnitudes are added. If the scene can't be solved, only the rounding of the quaternions is
+    counted.
     """
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows
@@ -182,11 +185,11 @@ def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Ite
 def _as_far_as_solved(
     solve: Callable[[Sequence[Value]], list[_Row]], values: Sequence[Value]
 ) -> tuple[list[_Row], str]:
-    """Return the results of `solve` for as many values as possible, and the message of a refusal.
+    """Return the results of `solve` for as many values as possible, and the message of any refusal.
 
-    All published values are first solved together. If this is refused, they are solved one by one
-    up to the first refusal, because an earlier time may be within the work limit. The message is
-    empty if nothing was refused.
+    `solve` refuses values by an InputError. All published values are first solved together. If this
+    is refused, they are solved one by one up to the first refusal, because an earlier time may be
+    within the work limit. The message is empty if nothing was refused.
     """
     try:
         return solve(values), ""
@@ -208,7 +211,8 @@ def _as_far_as_solved(
 def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
     """Return omega and its error bound (rad/s) by a method at the time of each published value.
 
-    An element is None if no step is long enough for the linear equations of a program.
+    `method` may also be a program of the thesis. An element is None if the program's linear solver
+    declares the equations of even the longest steps singular.
     """
     if method in PROGRAMS:
         return [_program(problem, value, method) for value in values]
@@ -218,7 +222,8 @@ def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Re
 def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
     """Return whether a method can solve a scene at these times (s), whatever the tolerance.
 
-    Programs integrate only forward in time, and `closed-form` and `quick` solve only some scenes.
+    Programs of the thesis integrate only forward in time. The methods `closed-form` and `quick`
+    solve only some scenes.
     """
     if method == "closed-form":
         return closed_form(scene) is not None
@@ -246,10 +251,10 @@ def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Resu
 def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     """Return omega by a corrected program at the time of `value`, and a bound on its error.
 
-    The step is halved until the error is below a tenth of the published accuracy, or is rounding
-    error. The error is estimated from the last halving, and doubled for safety. Rounding may add
-    half a unit in the last place per step. Return None if no step is long enough for the program's
-    linear equations.
+    `value` is a published result. The step is halved until the error is below a tenth of the
+    published accuracy, or is rounding error. The error is estimated from the last halving, and
+    doubled for safety. Rounding may add half a unit in the last place per step. Return None if the
+    program's linear solver declares the equations of even the longest steps singular.
     """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
@@ -311,8 +316,8 @@ def _scale(scene: Scene, omega: Array) -> float:
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
     """Return the change of omega caused by rounding the numbers of a scene (rad/s), by time.
 
-    The keys are the times of the published values, as printed. The change is set to zero at a time
-    that no solution reaches. The check of the method then reports the reason.
+    The keys are the times of the published `values`, as printed. The change is set to zero at a
+    time that no solution reaches. The check of a method at this time reports the reason.
     """
 
     def solve(values: Sequence[Value]) -> list[Array]:
@@ -332,8 +337,8 @@ def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
     """Return the change of omega caused by rounding the numbers of a scene and its times (rad/s).
 
     The changes caused by each number alone are computed to first order, from solutions by `method`,
-    and their magnitudes are added. The result has a row for each time, which is zero after the end
-    of the motion.
+    and their magnitudes are added. The result has a row for each time, which is zero if the
+    solution does not reach this time.
     """
     moved = np.zeros((len(times), 3))
     run = method_candidate(method, METHODS[method].finest).rows

@@ -40,7 +40,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Pointing:
-    """A published attitude with its accuracy."""
+    """A published attitude as a unit quaternion, with a bound on its error (rad)."""
 
     attitude: Quaternion  # unit quaternion
     accuracy: float  # bound on its error, rad
@@ -196,10 +196,10 @@ def _value(entry: object, sequence: object) -> Value:
 def _pointing(
     where: str, entry: dict[str, Any], sequence: object, good_to: float
 ) -> Pointing | None:
-    """Return the attitude published in one `[[value]]` entry of a file; None if there is none.
+    """Return the attitude published in one `[[value]]` entry of a TOML file; None if there is none.
 
-    The entry has a quaternion, or Euler angles in the file's `sequence`. `good_to` is the error
-    that the source states. Messages of errors begin with `where`.
+    The entry has a quaternion, or Euler angles. `sequence` names the axes of the three rotations.
+    `good_to` is the error that the source states. Messages of errors begin with `where`.
     """
     given = [key for key in ("attitude", "angles_deg") if key in entry]
     if not given:

@@ -43,7 +43,10 @@ _KEYS = ("command", "ended", "steps", "evaluations", "stop", "digest")
 
 @dataclass(frozen=True)
 class Recorded:
-    """A trajectory of the golden record, with the command and the scene that produce it."""
+    """A trajectory of the golden record, with the command and the scene that produce it.
+
+    The golden record is a folder of stored results, with which each new version is compared.
+    """
 
     source: str  # the program or method, which is the name of its file
     name: str  # the last parts of the id of its check, as in ``case-3/original``
@@ -62,7 +65,11 @@ class Recorded:
 
 
 def recorded() -> Iterator[Recorded]:
-    """Yield the trajectories that the golden record must contain: all cases, by several methods."""
+    """Yield the trajectories that the golden record must contain: all cases, by several methods.
+
+    The golden record is a folder of stored results. Each program of the thesis is included in its
+    original and its corrected version.
+    """
     for case in case_numbers():
         scene = case_scene(case)
         command = f"python -m pyharness run --case {case}"
@@ -81,11 +88,12 @@ def recorded() -> Iterator[Recorded]:
 def golden(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks that compare the trajectories computed now with the golden record.
 
-    Programs and methods with a fixed step must agree with the record to the last bit. Methods that
-    state an error must agree within twice this error, because processors and compilers may round
-    their operations differently. If sine and cosine come from another mathematical library than in
-    the record, results under a torque with waves may differ by rounding. Yield nothing if there is
-    no folder of the record.
+    The golden record is a folder of stored results, which `chosen` names. Programs and methods with
+    a fixed step must agree with the record to the last bit. Methods that state an error must agree
+    within twice this error, because processors and compilers may round their operations
+    differently. If sine and cosine come from another mathematical library than in the record,
+    results under a torque with waves may differ by rounding. Yield nothing if the folder does not
+    exist.
     """
     if not chosen.record.is_dir():
         return
@@ -136,9 +144,10 @@ def _compared(
 
 
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return the contents of each file of the golden record in `folder`, by program or method.
+    """Return the contents of each file of the golden record (stored results) in `folder`.
 
-    Raise InputError if a file is not a valid record.
+    The result is a dictionary by the name of the program or method. Raise InputError if a file is
+    not a valid record.
     """
     found = {}
     for path in sorted(folder.glob("*.toml")):
@@ -164,8 +173,9 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
     """Return the files of a new golden record, by name, and its differences from the old record.
 
-    The old record is in `folder`. Each difference is a line of text. A file of the old record is
-    omitted if none of its trajectories is computed any more.
+    The golden record has stored results of programs and methods. The old record is in `folder`.
+    Each difference is a line of text. A file of the old record is omitted if none of its
+    trajectories is computed any more.
     """
     try:
         known = read_record(folder) if folder.is_dir() else {}
@@ -190,7 +200,7 @@ def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
 def mathematics() -> str:
     """Return the name of this system's mathematical library, which computes sine and cosine.
 
-    The golden record contains the name of the library with which it was made.
+    The golden record (stored results) contains the name of the library with which it was made.
     """
     return " ".join([*platform.libc_ver(), platform.system(), platform.machine()]).strip()
 
@@ -213,9 +223,10 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
 
 
 def _digest(rows: Array, run: Trajectory) -> str:
-    """Return a SHA-256 digest of every bit of the rows, and of IER if the run has this error code.
+    """Return a SHA-256 digest of every bit of the rows of a run, and of its error codes, if any.
 
-    All NaNs count as one bit pattern. The digest is shortened to 32 hexadecimal digits.
+    The error code IER of each step comes from the linear solver of the collocation programs. All
+    NaNs count as one bit pattern. The digest is shortened to 32 hexadecimal digits.
     """
     digest = hashlib.sha256(np.where(np.isnan(rows), np.nan, rows).astype("<f8").tobytes())
     if run.ier is not None:
@@ -224,17 +235,19 @@ def _digest(rows: Array, run: Trajectory) -> str:
 
 
 def _rows(entry: dict[str, Any]) -> Array:
-    """Return the recorded rows of an entry of the golden record as an array.
+    """Return the rows in an entry of the golden record (stored results) as an array.
 
-    The columns are step number, time, TIME, omega and, for programs, translational velocity.
+    The columns are step number, time, TIME, omega and, for programs, translational velocity. TIME
+    is the time that a program writes, which a defect may make wrong.
     """
     return np.array([[float(row[0]), *map(float.fromhex, row[1:])] for row in entry["rows"]])
 
 
 def _moved(old: dict[str, Any], new: dict[str, Any]) -> str:
-    """Return a text that describes how the entries `old` and `new` of one trajectory differ.
+    """Return a text that describes how two entries of the golden record differ.
 
-    Differences of numbers are in units in the last place.
+    `old` and `new` are stored results for one trajectory. Differences of numbers are in units in
+    the last place.
     """
     parts = [
         f"{key} {old[key] or 'none'} -> {new[key] or 'none'}"

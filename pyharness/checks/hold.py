@@ -55,9 +55,10 @@ FORMS = ("closed-form", "auto")
 def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Truth:
     """Return the true omega of a scene at `time` (s), with its error bound and conditioning.
 
-    `flow` is the conditioning of the scene up to `time`; it is computed if it is not given. For a
-    body with known moments and no torque, the solution consists of elliptic functions. For any
-    other scene, `pyharness.truth.reference` computes the solution.
+    The conditioning, `flow`, has the error amplification and the rounding errors up to `time`; it
+    is computed if it is not given. For a body with known moments and no torque, the solution
+    consists of elliptic functions. For any other scene, `pyharness.truth.reference` computes the
+    solution.
     """
     flow = flow or conditioning(scene, time)
     if not _is_free(scene):
@@ -86,9 +87,10 @@ def check_all(
 ) -> Iterator[Attempt]:
     """Yield deferred checks of all methods in the extreme scenes of the trial named `suite`.
 
-    ``held(name, time)`` yields the checks in the scene of `name` at `time` (s); by default it is
-    `hold`. In the scenes for which `has_programs` is true, the errors of the programs of the thesis
-    are also reported, without a limit.
+    A trial is a group of checks under one kind of extreme conditions. ``held(name, time)`` yields
+    the checks in the scene of `name` at `time` (s); by default it is the function `hold`. In the
+    scenes for which `has_programs` is true, the errors of the programs of the thesis are also
+    reported, without a limit.
     """
     for each in EXTREMES[suite]():
         name = named(suite, "", each.name, scene=each.scene)
@@ -108,8 +110,8 @@ def hold(
     """Yield deferred checks of the error of each method at `time` (s) in the scene of `name`.
 
     `methods` has the names of the methods. `truth` computes the true solution. `tolerances` returns
-    the tolerances at which a method is tried, by default those of `affordable`. `judged` makes the
-    checks of one method at one tolerance.
+    the tolerances at which a method is tried, by default those of the function `affordable`.
+    `judged` makes the checks of one method at one tolerance.
 
     By default, the limit of the error is the sum of three terms. The first term is the error that
     the method promises to make, and the second is rounding. The error amplification multiplies
@@ -136,8 +138,9 @@ def run_method(name: str, scene: Scene, time: float, tolerance: float | None) ->
     """Return omega at `time` (s) by the method `name`, and how the run ended, as an `End`.
 
     If the tolerance is None, the method uses the scene's step size and runs as a prepared solver.
-    The methods `auto` and `quick` always run as prepared solvers. A prepared solver may report a
-    refusal in the result. Any other refusal raises InputError.
+    Such a solver is set up once and takes many initial conditions. The methods `auto` and `quick`
+    always run as prepared solvers. If a prepared solver refuses the scene, the result may state
+    this. Any other refusal raises InputError.
     """
     if name in ("auto", "quick") or tolerance is None:
         return prepared_candidate(name, tolerance or 1.0).end(scene, time)
@@ -152,10 +155,10 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse a scene; every other refusal is a fault.
 
     `tried` has the method and the scene, and `truth` is the true solution. `why` is the message of
-    the refusal and does not matter here. `closed-form` may refuse a scene that has no closed form.
-    `quick` may refuse every scene, because it requires that A, B and C are not 0 and that few steps
-    suffice. Methods that use the Taylor series may refuse a torque with a wave whose phase exceeds
-    1e8 radians, because they would take too long.
+    the refusal and does not matter here. The method `closed-form` may refuse a scene that has no
+    closed form. The method `quick` may refuse every scene, because it requires that A, B and C are
+    not 0 and that few steps suffice. Methods that use the Taylor series may refuse a torque with a
+    wave whose phase exceeds 1e8 radians, because they would take too long.
     """
     method, scene = tried.method, tried.scene
     if method == "closed-form":
@@ -166,11 +169,11 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
 
 
 def _derived(truth: Truth, tried: MethodRun) -> float | None:
-    """Return the limit of a method's error: promised errors and rounding, amplified by the flow.
+    """Return the limit of a method's error: its promised error and rounding, amplified by the flow.
 
-    `tried` is the run of the method. The limit is relative to the largest omega. It is None if the
-    method promises no error, and infinite if it would leave fewer than two digits of omega. The
-    limit of a closed form is not amplified.
+    `tried` is the run of the method, and `truth` is the true solution. The limit is relative to the
+    largest omega. It is None if the method promises no error, and infinite if it would leave fewer
+    than two digits of omega. The limit of a closed form is not amplified.
     """
     made = promised_sum(tried, truth)
     if truth.exact and tried.method in FORMS:
@@ -223,7 +226,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
 
 
 def scene_of(name: Name) -> Scene:
-    """Return the scene in the name of a check, which must have one."""
+    """Return the scene that belongs to the name of a check; the name must have a scene."""
     assert name.scene is not None
     return name.scene
 
@@ -231,9 +234,10 @@ def scene_of(name: Name) -> Scene:
 def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
     """Return the bound that a method promises on the sum of the errors of its steps.
 
-    The bound is relative to the largest omega. For a method with a fixed step in a scene without
-    torque, it follows from the order of the method. In all other cases it is the tolerance of the
-    run, or None if the run has no tolerance.
+    `tried` is the run of the method, and `truth` is the true solution. The bound is relative to the
+    largest omega. For a method with a fixed step in a scene without torque, it follows from the
+    order of the method. In all other cases it is the tolerance of the run, or None if the run has
+    no tolerance.
     """
     if tried.method in FIXED_STEP and truth.exact:
         radians = speed(tried.scene, truth.flow.largest) * abs(truth.end)
@@ -270,8 +274,9 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 def describe_programs(name: Name) -> Iterator[Attempt]:
     """Yield deferred checks that report, without a limit, the largest error of each program.
 
-    The programs of the thesis, original and corrected, run over the steps of the scene in `name`.
-    The error of omega is relative to the largest omega, and is taken at about ten of the steps.
+    The programs of the thesis, original and corrected, run over the steps of the scene that belongs
+    to `name`. The error of omega is relative to the largest omega, and is taken at about ten of the
+    steps.
     """
     scene = scene_of(name)
     every = max(1, scene.steps // _ROWS)

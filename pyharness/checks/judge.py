@@ -26,9 +26,10 @@ MOST = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A method's answer: results at all requested times or the last one, or why it refused.
+    """A method's answer to a check: its results, or the reason why it refused the scene.
 
-    The answer has no rows if the method refused, or if its rows are not those that were requested.
+    The results are those at all requested times, or only at the last one. The answer has no rows if
+    the method refused, or if its rows are not those that were requested.
     """
 
     omega: Array = field(default_factory=lambda: np.empty((0, 3)))  # shape (n, 3), rad/s
@@ -41,9 +42,10 @@ class Answer:
 
 
 def of_end(method: str, end: End) -> Answer:
-    """Return the answer of `method` for one time; `end` is the result of its call as an `End`.
+    """Return the answer of `method` for one time, made from the `End` of its call.
 
-    If the status of a prepared solver reports that it refused, the answer is a refusal.
+    An `End` has omega at this time and how the run ended. If a prepared solver has refused the
+    scene, the answer contains no omega but the reason.
     """
     if end.is_refused:
         return Answer(refusal=f"{method}: {end.ended}")
@@ -55,7 +57,8 @@ def of_end(method: str, end: End) -> Answer:
 def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answer:
     """Run a candidate, a method with its tolerance, at all `times` (s) and return its answer.
 
-    The answer has attitudes if the scene has one. If rows are missing, `is_whole` is false.
+    The answer has attitudes if the scene has one. If the run does not give all requested rows, the
+    answer has none, and its field `is_whole` is false.
     """
     run = candidate.rows(scene, list(times))
     has_rows = run.has_all_rows and run.time.tolist() == list(times)
@@ -66,9 +69,10 @@ def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answe
 
 @dataclass(frozen=True, eq=False)
 class MethodRun:
-    """A run of a method on a scene, which `ask` makes when the answer is first needed.
+    """A deferred run of a method on a scene.
 
-    `tolerance` is None if the method uses the scene's step size.
+    The function `ask` makes the run when its results are first needed. `tolerance` is None if the
+    method uses the scene's step size.
     """
 
     method: str
@@ -78,7 +82,11 @@ class MethodRun:
 
     @cached_property
     def answer(self) -> Answer:
-        """Return the answer, computed once; an InputError of the method becomes a refusal."""
+        """Return the answer of the run, which is computed only once.
+
+        An InputError becomes an answer without rows, which has the message of the error as its
+        reason.
+        """
         try:
             return self.ask()
         except InputError as refusal:
@@ -86,9 +94,9 @@ class MethodRun:
 
 
 def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
-    """Return a deferred run of the method `method` by `solve`, with results at all `times` (s).
+    """Return a deferred run of a method by the function `solve`, with results at all `times` (s).
 
-    The run is made when its answer is first needed.
+    The run is made when its results are first needed.
     """
     ask = method_candidate(method, tolerance)
     return MethodRun(method, tolerance, scene, lambda: of_rows(ask, scene, times))
@@ -99,8 +107,8 @@ def by_end(
 ) -> MethodRun:
     """Return a deferred run of a candidate, a method or a prepared solver, until one `time` (s).
 
-    The run is made when its answer is first needed. `method` is the name of the method in the
-    policy and in messages of refusal.
+    The run is made when its results are first needed. `method` is the name of the method, on which
+    the error limit and the messages of the check depend.
     """
     return MethodRun(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
@@ -116,7 +124,7 @@ class Truth:
     error : float
         Bound on the error of any component of `omega` (rad/s).
     flow : Conditioning
-        Error amplification and rounding errors up to the last time.
+        Error amplification of the motion and rounding errors, up to the last time.
     attitude, angle_error : ndarray of shape (n, 4) or None, float
         The true quaternions, if attitudes are compared instead of omega, and a bound on their error
         (rad).
@@ -150,10 +158,11 @@ class Truth:
         return self.error / (self.flow.largest or 1.0)
 
     def error_of(self, answer: Answer) -> float:
-        """Return the largest error of an answer: of its attitudes if compared, else of its omegas.
+        """Return the largest error of a method's answer, either of its attitudes or of its omegas.
 
-        The error of an attitude is an angle (rad). The error of omega is relative to the largest
-        omega. Return NaN if a row of the answer contains NaN.
+        If the true solution has attitudes, these are compared, and the error is an angle (rad). The
+        error of omega is relative to the largest omega. Return NaN if a row of the answer contains
+        NaN.
         """
         if self.attitude is None:
             difference = float(np.abs(answer.omega - self.omega[-len(answer.omega) :]).max())
@@ -168,10 +177,10 @@ class Truth:
 
 
 def unknown_flow(largest: float) -> Conditioning:
-    """Return a conditioning with infinite error amplification, for closed forms.
+    """Return a `Conditioning` with infinite error amplification, for scenes solved in closed form.
 
-    The limits of closed forms do not depend on the error amplification, so that it is not computed.
-    `largest` is the largest abs(omega) (rad/s).
+    The error limits of closed forms do not depend on the error amplification, so that it is not
+    computed. `largest` is the largest abs(omega) (rad/s).
     """
     return Conditioning(math.inf, MOST, MOST, MOST, largest)
 
@@ -184,9 +193,9 @@ def reference_truth(
 ) -> Truth:
     """Return the true solution of a scene at all `times` (s) by the high-precision reference.
 
-    `effort` is a factor on the work limit of the reference. `flow` is the conditioning up to the
-    last time, which is computed if it is not given. Raise InputError if the solution does not reach
-    all times.
+    `effort` is a factor on the work limit of the reference. `flow` has the error amplification up
+    to the last time, which is computed if it is not given. Raise InputError if the solution does
+    not reach all times.
     """
     flow = flow or conditioning(scene, times[-1])
     # The reference's steps are accurate to 1e-22. The precise series is requested where the flow
@@ -199,10 +208,10 @@ def reference_truth(
 
 @dataclass(frozen=True)
 class Policy:
-    """A rule for judging answers: the limit of the error, and the refusals that pass.
+    """A rule for judging methods: the limit of the error, and the scenes that a method may refuse.
 
-    `limit` takes the true solution and the run. `may_refuse` takes the run, the true solution and
-    the message of the refusal.
+    The function `limit` takes the true solution and the run of the method. The function
+    `may_refuse` takes the run, the true solution and the message with which the method refused.
     """
 
     limit: Callable[[Truth, MethodRun], float | None]
@@ -212,10 +221,10 @@ class Policy:
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
     """Return the limit of a method's error: errors of its steps, rounding, and the truth's error.
 
-    The limit is relative to the largest omega, or an angle (rad) if attitudes are compared. `made`
-    is the sum of the errors that the method makes in its steps, in the same unit. `growth` is the
-    error amplification by which `made` is multiplied. `steps` is the number of times that the
-    method rounds omega.
+    The limit is relative to the largest omega, or an angle (rad) if attitudes are compared. `truth`
+    is the true solution with its error bound. `made` is the sum of the errors that the method makes
+    in its steps, in the same unit. `growth` is the error amplification by which `made` is
+    multiplied. `steps` is the number of times that the method rounds omega.
     """
     if truth.attitude is not None:
         return truth.flow.angle_limit(made * growth, truth.end) + truth.angle_error
@@ -223,33 +232,35 @@ def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> flo
 
 
 def lively(growth: float) -> float:
-    """Return the factor on a tolerance in a limit: `growth` if it exceeds `LIVELY`, else 1.
+    """Return the factor by which a tolerance is multiplied in an error limit.
 
-    `growth` is the error amplification of the flow.
+    `growth` is the error amplification of the motion. The factor is `growth` if it exceeds the
+    threshold `LIVELY`, and otherwise 1.
     """
     return growth if growth > LIVELY else 1.0
 
 
 def linear(limit: float) -> float:
-    """Return an error limit unchanged, or infinity if it exceeds `LINEAR`.
+    """Return an error limit unchanged, or infinity if it exceeds the relative error `LINEAR`.
 
-    If errors exceed `LINEAR`, the linearised flow does not predict them, and omega has fewer than
-    two correct digits.
+    If errors exceed `LINEAR`, the linearised equations do not predict them, and omega has fewer
+    than two correct digits.
     """
     return limit if limit <= LINEAR else math.inf
 
 
 def tolerance_of(tried: MethodRun) -> float:
-    """Return the tolerance of a run, which must have one."""
+    """Return the tolerance of a run; the run must have a tolerance and not a fixed step size."""
     assert tried.tolerance is not None
     return tried.tolerance
 
 
 def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether a method may refuse the scene of `tried` with the message `why`.
+    """Return whether a method may refuse the scene of the run `tried` with the message `why`.
 
-    `closed-form` may refuse a scene that has no closed form. `quick` may refuse a scene if one of
-    the coefficients A, B and C is 0. The true solution `truth` does not matter.
+    The method `closed-form` may refuse a scene that has no closed form. The method `quick` may
+    refuse a scene if one of the coefficients A, B and C is 0. The true solution `truth` does not
+    matter.
     """
     if tried.method == "quick":
         # `quick` requires that A, B and C are not 0.
@@ -258,9 +269,9 @@ def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
 
 
 def _granting(factor: Callable[[float], float]) -> Callable[[Truth, MethodRun], float]:
-    """Return the limit function of a policy: the tolerance times ``factor(K)``, plus rounding.
+    """Return a function that computes an error limit: tolerance times ``factor(K)``, plus rounding.
 
-    K is the error amplification of the flow. The limit also contains the error of the true
+    K is the error amplification of the motion. The limit also contains the error of the true
     solution.
     """
     return lambda truth, tried: allowed(
@@ -282,9 +293,10 @@ AMPLIFIED = Policy(_granting(lambda growth: growth))
 def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
     """Return the check that the error of a method's answer is within the limit of the policy.
 
-    `tried` is the run that gives the answer, and `truth` is the true solution. If the method
-    refused, the check passes if the policy permits the refusal. If the policy sets no limit, a
-    finite error is only reported. `closed-form` fails if it solves a scene that has no closed form.
+    `tried` is the run of the method, and `truth` is the true solution. `policy` sets the limit, and
+    the scenes that the method may refuse. If the method refused a scene, the check passes if the
+    policy permits it. If the policy sets no limit, a finite error is only reported. The method
+    `closed-form` fails if it solves a scene that has no closed form.
     """
     answer = tried.answer
     if answer.refusal:

@@ -71,7 +71,7 @@ _OF_THE_USER = ("external", "golden")
 
 
 def verify(chosen: Selection) -> Iterator[Check]:
-    """Yield the checks that `chosen` requests, a `Selection`.
+    """Yield the results of the checks that the selection `chosen` requests.
 
     The checks are computed one after another, as they are requested from the iterator.
     """

@@ -46,9 +46,10 @@ _PREPARED_TURNED = ("auto", "taylor")
 
 
 def methods(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of omega, by every method with a tolerance, against the reference.
+    """Yield deferred checks of omega by every method with a tolerance.
 
-    In each case of Table 1, omega is compared at all times of the case and at one later time.
+    In each case of Table 1, omega is compared with the high-precision reference solution, at all
+    times of the case and at one later time. `chosen` selects the checks.
     """
     for case in cases(chosen):
         scene = case_scene(case)
@@ -58,8 +59,9 @@ def methods(chosen: Selection) -> Iterator[Attempt]:
 def prepared(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of prepared solvers against the reference, forward and back in time.
 
-    Methods with a fixed step and Gauss collocation use the scene's step size. Their prepared
-    solvers are compared bit for bit with a run of the method that is not prepared.
+    A prepared solver is set up once for a scene, and then called for any initial omega. Methods
+    with a fixed step and Gauss collocation use the scene's step size. Their prepared solvers are
+    compared bit for bit with a run of the method that is not prepared.
     """
     for case in cases(chosen):
         scene = case_scene(case)
@@ -73,7 +75,8 @@ def prepared(chosen: Selection) -> Iterator[Attempt]:
 def attitudes(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of attitudes against the reference in every case of Table 1.
 
-    Every method that propagates the attitude is tried, by `solve` and as a prepared solver.
+    Every method that propagates the attitude is tried, by the function `solve` and as a prepared
+    solver, which is set up once for many calls.
     """
     for case in cases(chosen):
         scene = replace(case_scene(case), attitude=START)
@@ -86,7 +89,7 @@ def attitudes(chosen: Selection) -> Iterator[Attempt]:
 def cases(chosen: Selection, thin: Sequence[int] = (4, 5)) -> Sequence[int]:
     """Return the numbers of the cases of Table 1 in which checks are made.
 
-    They are all cases, or `thin` if `chosen` is the selection of the self-test.
+    They are all cases, or only the cases `thin` if `chosen` is the selection of the self-test.
     """
     return thin if chosen.thin else list(case_numbers())
 
@@ -118,10 +121,10 @@ def _prepared(
 
 
 def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
-    """Return a deferred run of a method by `solve`, with results at all `times` (s).
+    """Return a deferred run of a method by the function `solve`, with results at all `times` (s).
 
-    If the scene has an attitude and `tolerance` is too fine for a method of SciPy, the finest
-    tolerance that the method can meet is used instead.
+    `tolerance` may be too fine for a method of SciPy in a scene with attitude. The finest tolerance
+    that the method can meet is then used instead.
     """
     if method in SCIPY_METHODS and scene.attitude:
         # SciPy's methods can't be requested to have so small an error over a long time.
@@ -132,8 +135,8 @@ def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[fl
 def run_of_call(method: str, tolerance: float, scene: Scene, time: float) -> MethodRun:
     """Return a deferred call of a prepared solver with a result at one `time` (s).
 
-    Before this call, the solver is called with another initial omega, which must not affect the
-    result.
+    A prepared solver is set up once for a method and a scene. Before this call, the solver is
+    called with another initial omega, which must not affect the result.
     """
     prepare = attitude_candidate if scene.attitude else prepared_candidate
     return by_end(method, prepare(method, tolerance, primed=True), tolerance, scene, time)
@@ -144,10 +147,10 @@ def _judged(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Na
 
 
 def _same_steps(scene: Scene, name: Name) -> Check:
-    """Check the bits of a prepared solver that makes 100 steps of the scene's step size.
+    """Return the check that a prepared solver gives the right bits after 100 steps of a scene.
 
-    They must be those of `solve` for a method with a fixed step, and those of a direct call of the
-    kernel for Gauss collocation.
+    For a method with a fixed step, they must be the bits of the function `solve`. For Gauss
+    collocation, they must be those of a direct call of the compiled kernel.
     """
     method, time = name.subject, 100.0 * scene.step_size
     found = prepared_candidate(method, 1.0).end(scene, time).omega

@@ -35,7 +35,7 @@ _ORDER_SLACK = 0.2
 def orders(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of the order of each corrected program and each fixed-step method.
 
-    The value of a check is the expected order less the measured one.
+    The value of a check is the expected order minus the measured one. `chosen` selects the checks.
     """
     for case in cases(chosen, (5,)):
         scene = case_scene(case)
@@ -76,10 +76,10 @@ def _of_method(scene: Scene, truth: Callable[[], Reference], name: Name) -> Chec
 
 
 def judged_order(name: Name, found: Order) -> Check:
-    """Return the check that a measured order is at most `_ORDER_SLACK` below the expected one.
+    """Return the check that a measured order is at most a small slack below the expected one.
 
-    The check also passes if the error is as small as rounding before an order can be observed. It
-    fails if the order can't be determined for another reason.
+    The slack is `_ORDER_SLACK`. The check also passes if the error is as small as rounding before
+    an order can be observed. It fails if the order can't be determined for another reason.
     """
     missing = None if found.value is None else found.due - found.value
     passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK

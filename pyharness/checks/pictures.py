@@ -30,11 +30,12 @@ _COARSE = 1e-6
 
 
 class _Mark(NamedTuple):
-    """A check as a mark in a picture: its method, its circumstance and its series of marks.
+    """A check as a mark (plotted point) in a picture, with the properties that place and style it.
 
-    `kind` is the part of the circumstance's name before its first number. The series is given by
-    `rank` and `what`. `rank` is ``coarse`` or ``fine`` if the setting is a tolerance, and otherwise
-    the setting itself. `what` is ``error`` or ``drift`` if the check compares one of these, and
+    `method` and `circumstance` are the method and the problem of the check. `kind` is the part of
+    the circumstance's name before its first number. Marks with the same `rank` and `what` form a
+    series. `rank` is ``coarse`` or ``fine`` if the setting is a tolerance, and otherwise the
+    setting itself. `what` is ``error`` or ``drift`` if the check compares one of these, and
     otherwise empty.
     """
 
@@ -47,7 +48,7 @@ class _Mark(NamedTuple):
 
     @property
     def style(self) -> dict[str, Any]:
-        """Return the marker and the colour of the mark, as options of Matplotlib."""
+        """Return the marker and the colour of this plotted point, as options of Matplotlib."""
         marker = _MARKERS.get(self.what, "s" if self.rank else "D")
         return {"marker": marker, "color": _COLORS.get(self.rank, "black"), "linestyle": "none"}
 
@@ -66,8 +67,9 @@ def _mark(check: Check) -> _Mark:
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
     """Return a picture of the checks of a trial: values and limits, in a panel for each method.
 
-    On the horizontal axis, circumstances whose names begin alike are adjacent, in the order in
-    which they were tried. Raise InputError if no check has a value.
+    A trial is a group of checks under one kind of extreme conditions. The problems of the trial are
+    on the horizontal axis, in the order in which they were tried, but those whose names begin alike
+    are adjacent. Raise InputError if no check has a value.
     """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -121,9 +123,10 @@ def _label(rank: str, what: str) -> str:
 
 
 def _places(marks: Sequence[_Mark]) -> dict[tuple[str, str], float]:
-    """Return the position of each circumstance on the horizontal axis, by its kind and its name.
+    """Return the position of each problem on the horizontal axis, by its kind and its name.
 
-    Circumstances of one kind are side by side, with space for the name of the kind above them.
+    A problem is the circumstance of a check. Problems of one kind are side by side, with space for
+    the name of the kind above them.
     """
     names = dict.fromkeys((mark.kind, mark.circumstance) for mark in marks)
     places = {}

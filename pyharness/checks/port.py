@@ -30,8 +30,9 @@ Cell = tuple[str, Listing, int]
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
     """Return name, listing and case number of the requested cells.
 
-    A cell is a program with a case, defects and readings. `cells` has the leading parts of names of
-    cells. If it is empty, all cells of the programs and cases are requested.
+    A cell is a listing with a case of Table 1, and a listing is a program with a choice of its
+    defects and readings. `cells` has the leading parts of names of cells, as in
+    ``two-term/case-3``. If it is empty, all cells of the programs and cases are requested.
     """
     return [
         (cell_name(listing, case), listing, case)
@@ -43,11 +44,12 @@ def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[st
 
 
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[Check]:
-    """Yield checks that a port gives the same bits as the Python twins in the given cells.
+    """Yield checks that a port gives the same bits as our Python programs in the given cells.
 
-    `command` is the command that starts the port. An invalid answer is a failed check and ends the
-    comparison. `patience` is the longest time to wait for an answer (s). Raise InputError if
-    `command` is empty.
+    A port is an implementation of the programs of the thesis in any language, started by `command`.
+    A cell is a program, a choice of its defects, and a case. An invalid answer is a failed check
+    and ends the comparison. `patience` is the longest time to wait for an answer (s). Raise
+    InputError if `command` is empty.
     """
     verb = f"python -m pyharness verify --port {shlex.quote(command)}"
     name, again = Name("port", "start"), verb
@@ -71,11 +73,12 @@ def _compared(name: Name, process: PortProcess, listing: Listing, scene: Scene) 
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
-    """Return texts that describe how a port's answer differs from the run of the Python twin.
+    """Return texts that describe how a port's answer differs from the run of our Python program.
 
-    The texts report the first row that differs, the number of rows, how the run ended, where the
-    stop test ended it, and the first error code IER that differs. The list is empty if nothing
-    differs.
+    A port is an implementation of a program in any language, and `twin` is the run of our Python
+    version. The texts report the first row that differs, the number of rows, and how the run ended.
+    They also report where the stop test ended it, and the first error code IER that differs. The
+    list is empty if nothing differs.
     """
     wanted, given = _rows(twin), answer.rows
     found = []

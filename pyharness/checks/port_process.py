@@ -28,7 +28,10 @@ _MARK = "PYHARNESS_PORT"  # environment variable that marks each process of a po
 
 
 class PortError(Exception):
-    """An error raised if a port gives no valid answer; its message is one line."""
+    """An error raised if a port gives no valid answer; its message is one line.
+
+    A port is an implementation of the programs of the thesis, which runs as another process.
+    """
 
 
 def split_command(command: str) -> list[str]:
@@ -61,15 +64,22 @@ def _processes_with(mark: str) -> list[int]:
 
 
 class PortProcess:
-    """A running port as a context manager; entering it raises PortError if the port can't start."""
+    """The running process of a port, as a context manager that starts and ends it.
+
+    A port is an implementation of the programs of the thesis in any language. Entering the context
+    raises PortError if the port can't start.
+    """
 
     def __init__(self, command: str, patience: float = PATIENCE) -> None:
-        """Store the command to start, and the longest time to wait for an answer (s)."""
+        """Store the command to start the port, and the longest time to wait for an answer (s)."""
         self._words = split_command(command)
         self._patience = patience
 
     def __enter__(self) -> Self:
-        """Start the port in its own process group, so that the children of a shell end with it."""
+        """Start the port, a program in another process, in its own process group.
+
+        If the port is started by a shell, its process and the shell can then be ended together.
+        """
         self._mark = f"{_MARK}={os.urandom(16).hex()}"
         self._told = b""  # the last part of what the port wrote to stderr
         try:
@@ -100,7 +110,7 @@ class PortProcess:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End the port and all processes that it started, whatever they are doing."""
+        """End the port's process and all processes that it started, whatever they are doing."""
         # If all processes of the group have ended, the group is not found. macOS reports this as
         # PermissionError.
         with contextlib.suppress(ProcessLookupError, PermissionError):
@@ -121,8 +131,9 @@ class PortProcess:
     def ask(self, line: bytes) -> bytes:
         """Send the request `line` to the port and return its answer, each without a line feed.
 
-        An answer is one line. Raise PortError if the port does not answer in time, if it ends, or
-        if it writes too much or a second line.
+        The port is an implementation of the programs in another process. An answer is one line.
+        Raise PortError if the port does not answer in time, if it ends, or if it writes too much or
+        a second line.
         """
         end = time.monotonic() + self._patience
         rest = line + b"\n"
@@ -156,7 +167,10 @@ class PortProcess:
         return answer
 
     def _hear(self) -> bool:
-        """Read the port's stderr and keep the last part; return whether there was any output."""
+        """Read what the port's process wrote to stderr, and return whether there was any output.
+
+        The last part of the output is kept for error messages.
+        """
         try:
             piece = os.read(self._errors.fileno(), _PIECE)
         except BlockingIOError:

@@ -23,7 +23,7 @@ ENDINGS = ("complete", "stopped", "overflow")
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The result of one run of a program by a port.
+    """The result of one run of a program by a port, its implementation in any language.
 
     Attributes
     ----------
@@ -46,10 +46,12 @@ class Answer:
 def request(
     scene: Scene, listing: Listing, lipschitz: float | None = None, may_stop: bool = True
 ) -> bytes:
-    """Return the line that requests a run from a port; its decimals reproduce floats exactly.
+    """Return the line of JSON that requests a run of a program from a port.
 
-    `lipschitz` is the constant of the stop test (1/s), by default the constant in the author's
-    decks. If `may_stop` is false, the test does not end the run.
+    A port is an implementation of the programs in any language. `listing` is the program with a
+    choice of its defects. The decimal numbers in the line reproduce floats exactly. `lipschitz` is
+    the constant of the stop test (1/s), by default the constant in the author's decks. If
+    `may_stop` is false, the test does not end the run.
     """
     asked = {
         "schema": SCHEMAS["port request"],
@@ -63,7 +65,11 @@ def request(
 
 
 def requested_scene(scene: Scene) -> dict[str, Any]:
-    """Return a scene as the dictionary for the field `scene` of a request to a port."""
+    """Return a scene as the dictionary for the field `scene` of a request to a port.
+
+    A port is an implementation of the programs of the thesis in any language. A scene is a body
+    with its initial state, torque and steps.
+    """
     return {
         **scene_record(scene),
         "masses": scene.masses,
@@ -75,7 +81,8 @@ def requested_scene(scene: Scene) -> dict[str, Any]:
 def read_answer(line: bytes, steps: int) -> Answer:
     """Return a port's answer to a scene with `steps` steps; raise PortError if it is invalid.
 
-    `line` is the answer as JSON, without a line feed.
+    A port is an implementation of the programs in any language. `line` is the answer as JSON,
+    without a line feed.
     """
     try:
         given = json.loads(line)

@@ -57,10 +57,11 @@ Entrances = Mapping[str, Callable[[], MethodRun]]
 
 
 def truth_of(drawn: Draw) -> Truth:
-    """Return the true omega of a draw, at a fraction .4 of its last time and at the last time.
+    """Return the true omega of a random draw at a fraction .4 of its end time, and at its end time.
 
-    Raise InputError if the solution grows without bound or is too fast, or if amplified rounding
-    errors leave no digit of omega.
+    A draw is a random scene, with random parameters for its solution. Raise InputError if the
+    solution grows without bound or is too fast, or if amplified rounding errors leave no digit of
+    omega.
     """
     times = [_EARLIER * drawn.time, drawn.time]
     path = integer_series(drawn.scene, times)
@@ -72,12 +73,13 @@ def truth_of(drawn: Draw) -> Truth:
 
 
 def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether a method may refuse the scene of `tried` with the message `why`.
+    """Return whether a method may refuse the scene of its run `tried` with the message `why`.
 
     The automatic choice of a method may not refuse. A closed form may refuse only scenes near the
     limits of the range of binary64. Any other method may refuse a scene of the kinds `_MAY_REFUSE`,
-    whose motion may diverge, or a scene whose error amplification exceeds `_CALM`. `quick` may
-    refuse every scene. A method of SciPy may refuse a tolerance that is too fine for it.
+    whose motion may diverge or be too fast. It may also refuse a scene whose error amplification,
+    which `truth` has, exceeds `_CALM`. The method `quick` may refuse every scene. A method of SciPy
+    may refuse a tolerance that is too fine for it.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -109,10 +111,12 @@ The tolerance is multiplied by the error amplification only if this exceeds `LIV
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield deferred checks of omega, by every entry point, against the true omega of each draw.
+    """Yield deferred checks that compare omega from every entry point with the true omega.
 
-    The draws come from the seed of `chosen`. If a draw has no true solution, a single check reports
-    this, and passes if the scene is of the kinds `_MAY_REFUSE`.
+    An entry point is `solve` or a prepared solver, with one method. The random scenes are drawn
+    from the seed of `chosen`, the selection of checks. If a scene has no true solution, a single
+    check reports this. This check passes if the scene is of the kinds `_MAY_REFUSE`, whose motion
+    may diverge or be too fast.
     """
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
@@ -137,8 +141,9 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks that compare attitudes with the true attitude in random scenes.
 
     The attitudes are computed by the automatic choice of a method, by the Taylor series and by a
-    prepared solver. A draw is left out if the true attitude can't be computed, or if rounding
-    leaves it no digit.
+    prepared solver. The scenes are drawn from the seed of `chosen`, the selection of checks. A
+    scene is left out if its true attitude can't be computed, or if rounding errors leave no correct
+    digit of the attitude.
     """
     tolerance_at = METHODS["taylor"].finest
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
@@ -168,10 +173,11 @@ def _requested(chosen: Selection, number: int, entrances: Entrances) -> Entrance
 
 
 def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
-    """Return a deferred run for each entry point, in draw number `number`, by its name in the ids.
+    """Return a deferred run for each entry point, by its name, in the random scene `drawn`.
 
-    SciPy's methods and the reference are slow. They are tried in few draws, and in no draw if
-    `thin` is set, as in the self-test.
+    An entry point is `solve` or a prepared solver, with one method, as in ``solve-taylor``.
+    `number` is the number of the random draw. Methods of SciPy and the reference solver are slow.
+    They are tried in few draws, and in no draw if `thin` is set, as in the self-test of the checks.
     """
     forms = ["closed-form"] if closed_form(drawn.scene) else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
@@ -206,10 +212,11 @@ def _sampled(
 
 
 def _sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: Name) -> Sample:
-    """Run an entry point and return the check of its error, within the limit of the policy.
+    """Run a solver and return the check of its error, within the limit of the policy.
 
-    `tried` makes the run. The check also has the tolerance and the error amplification of the run,
-    for the report.
+    `tried` makes the run, and `truth` is the true solution. `policy` sets the limit of the error,
+    and says which scenes the solver may refuse. `name` is the name of the check. The check also has
+    the tolerance and the error amplification of the run, for the report.
     """
     one = tried()
     found, tolerance = judge(name, one, truth, policy), tolerance_of(one)

@@ -18,9 +18,10 @@ _GROUPS = (
 def checks_report(
     verb: str, checks: Sequence[Check], text: Sequence[Section], **extra: Any
 ) -> Report:
-    """Return the report of a verb's checks: sections for the screen, JSON record and JUnit cases.
+    """Return the report of the checks that a command made, for the screen and for files.
 
-    `text` has the sections that are printed, and `extra` has further fields of the JSON record.
+    `verb` is the name of the command, and `text` has the sections for the screen. For files there
+    are a JSON record, which also has the fields `extra`, and JUnit test cases.
     """
     return Report(
         verb,
@@ -48,7 +49,8 @@ def summary(
     """Return the printed sections: title, failures, a table of groups of checks, and verdict.
 
     A group consists of the checks whose ids have the first `depth` parts in common. The section
-    `more` is printed between the table and the verdict.
+    `more` is printed between the table and the verdict. The verdict is a line with the numbers of
+    all checks and of the failed ones.
     """
     groups: dict[str, list[Check]] = {}
     for check in checks:
@@ -95,11 +97,11 @@ _SAMPLES = (
 def samples(checks: Sequence[Check], rounding: float) -> Section:
     """Return a table of the worst ratio of error to tolerance, by entry point and tolerance.
 
-    Only checks in random scenes (`Sample`) are counted. `rounding` is the relative rounding error
-    for an error amplification of 1. Before division by the tolerance, `rounding` times the error
-    amplification is subtracted from the error. The table has columns for three ranges of the error
-    amplification. For each range it shows the number of checks with a result, and the worst ratio
-    among these checks.
+    Only checks in random scenes (class `Sample`) are counted. An entry point is a call with a
+    method, as in ``solve-taylor``. Before an error is divided by the tolerance, the rounding error
+    is subtracted from it. This rounding error is `rounding`, a relative error, times the error
+    amplification. For each of three ranges of the error amplification, the table shows the number
+    of checks with a result and the worst ratio.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:

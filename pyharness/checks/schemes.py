@@ -28,9 +28,11 @@ _ROUNDINGS = 32.0
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """One stage, or one collocation point, of every step of a run: its states and its rates.
+    """A stage, or a collocation point, of every step of a run, with its states and rates.
 
-    The columns of each array are U1, U2, U3 (omega) and V1, V2, V3 (translational velocity).
+    Each array has a row for every step. The columns are U1, U2, U3 (omega) and V1, V2, V3
+    (translational velocity). The array `rounding` bounds the difference of two computations of the
+    rates.
     """
 
     # shape (n, 6); the arguments of the right-hand sides (rad/s, m/s), and the right-hand sides
@@ -41,10 +43,11 @@ class Stage:
 
 
 def schemes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks that compare every step of the corrected programs with its scheme.
+    """Yield deferred checks that recompute every step of the corrected programs by its scheme.
 
-    The value of a check is the largest ratio of a difference to its rounding bound, for omega and
-    translational velocity. The limit is 1.
+    Each step is recomputed from the program's own state before the step. The value of a check is
+    the largest ratio of a difference to its rounding bound, for omega and translational velocity.
+    The limit is 1. `chosen` is the selection of checks.
     """
     for case in cases(chosen, (7,)):
         for program in PROGRAMS:
@@ -78,7 +81,7 @@ def rows(run: Trajectory) -> Array:
 
 
 def stages(scene: Scene, run: Trajectory) -> tuple[Stage, Stage, Stage, Stage]:
-    """Return the four stages of the scheme of W. Kutta (1901) in every step of a run.
+    """Return the four stages of the Runge-Kutta scheme of W. Kutta (1901) in every step of a run.
 
     The run is complete, and each step starts from the state of `run` before the step.
     """
@@ -91,10 +94,11 @@ def stages(scene: Scene, run: Trajectory) -> tuple[Stage, Stage, Stage, Stage]:
 
 
 def _scheme(name: str, scene: Scene, run: Trajectory) -> tuple[Array, Array]:
-    """Return the state after every step by a program's scheme, and the bound of its rounding.
+    """Return the state after every step by a program's scheme, and a bound on its rounding error.
 
-    `name` is the program. Each step starts from the state of `run` before the step. Both arrays
-    have the shape (n, 6), with omega (rad/s) and translational velocity (m/s).
+    `name` is the name of the program. Each step starts from the state before the step in `run`, a
+    run of the program. Both arrays have the shape (n, 6), with omega (rad/s) and translational
+    velocity (m/s).
     """
     if name not in PARTS:
         kutta = stages(scene, run)
@@ -135,9 +139,9 @@ def _beginning(scene: Scene, run: Trajectory) -> Stage:
 def _stage(scene: Scene, part: float, state: Array) -> Stage:
     """Return the rates for given states in every step, with a bound on their rounding errors.
 
-    `state` has the shape (n, 6), one row for each step. The rates are those of equations 16-18 and
-    of dV/dt = F/m - omega x V. `part` is the fraction of the step size after which the torque is
-    taken.
+    `state` has the shape (n, 6), with omega and the translational velocity V in one row for each
+    step. The rates are the right-hand sides of equations 16-18 of the thesis and of dV/dt = F/m -
+    omega x V. The torque is that at the fraction `part` of the step.
     """
     omega, velocity = state[:, :3], state[:, 3:]
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)

@@ -18,7 +18,11 @@ RECORD = Path(__file__).parent.parent.parent / "tests" / "golden"
 
 @dataclass(frozen=True)
 class Selection:
-    """The checks that one run of `verify` makes, with the seed and the files that they use."""
+    """The checks that one run of `pyharness verify` makes, with the seed and files that they use.
+
+    `only` has the leading parts of the ids of the requested checks. If it is empty, all are
+    requested.
+    """
 
     only: Sequence[str] = ()  # leading parts of names, as in ``cells/two-term``; empty: all
     seed: str = field(default_factory=weekly_seed)  # of random draws; by default the week
@@ -29,20 +33,21 @@ class Selection:
     thin: bool = False  # only a few checks of every kind, for `verify --self-test`
 
     def asks(self, id: str) -> bool:
-        """Return whether the check with this id is requested."""
+        """Return whether the check `id`, as in ``cells/two-term/case-3/original``, is requested."""
         return selected(id, self.only)
 
     def may_ask(self, id: str) -> bool:
         """Return whether a check whose id begins with `id`, or is `id`, may be requested.
 
-        If it is not, these checks need not be computed.
+        If none may be requested, the caller need not compute these checks.
         """
         return may_hold(id, self.only)
 
     def drawn(self, number: int, subject: str = "") -> Name:
         """Return the name of the check of `subject`, a program or method, in random draw `number`.
 
-        The options in the name contain the seed, so that the command of the check repeats the draw.
+        A draw is a random scene. The name includes the command-line option with the seed, so that
+        the command which repeats the check draws the same scene.
         """
         draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
         options = f"{draws} --seed {shlex.quote(self.seed)}"

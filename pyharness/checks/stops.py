@@ -31,10 +31,10 @@ Stages = tuple[Stage, Stage, Stage, Stage]
 
 @dataclass(frozen=True, eq=False)
 class Quotients:
-    """The quotients that the program compares with the stop constant, in the order of its tests.
+    """The quotients that the Runge-Kutta program compares with its stop constant, in its order.
 
-    A quotient is the change of K over the change of U within a step, where K is the right-hand side
-    and U is the state.
+    The program stops if a quotient exceeds the stop constant. A quotient is the change of K over
+    the change of U within a step, where K is the right-hand side and U is the state.
     """
 
     values: Array  # shape (n, m) for n steps, 1/s
@@ -43,11 +43,12 @@ class Quotients:
 
 
 def stops(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks that the Runge-Kutta program stops where eq. 19 requires it.
+    """Yield deferred checks that the Runge-Kutta program stops where its stop test requires it.
 
-    The number of the step, the variable and the quotient are compared, for every form of the test
-    that a listing can have. The value of a check is the largest ratio of a quotient's difference to
-    its rounding bound. The limit is 1.
+    The test (equation 19 of the thesis) compares quotients with a stop constant. It is checked in
+    every form that a listing, a choice of the program's defects, can give it. A check compares the
+    number of the step, the variable and the quotient of the stop. Its value is the largest ratio of
+    a quotient's difference to its rounding bound. The limit is 1.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):
@@ -59,9 +60,10 @@ def stops(chosen: Selection) -> Iterator[Attempt]:
 
 
 def _run(scene: Scene) -> tuple[Trajectory, Stages | None]:
-    """Return a run of the corrected program without the stop test, and the stages of its steps.
+    """Return a run of the corrected Runge-Kutta program without stop test, and its steps' stages.
 
-    The stages are None if the run has no row for every step.
+    The four stages of the scheme are recomputed for every step. They are None if the run has no row
+    for every step.
     """
     run = PROGRAM_REGISTRY[_PROGRAM].run(scene, Listing.corrected(_PROGRAM), may_stop=False)
     return run, stages(scene, run) if is_whole(scene, run) else None
@@ -118,7 +120,8 @@ def _quotients(scene: Scene, run: Trajectory, kutta: Stages, listing: Listing) -
 def _constants(quotients: Quotients) -> list[float]:
     """Return stop constants (1/s) on both sides of each quotient that exceeds all earlier ones.
 
-    Each constant differs by more than rounding from all quotients of its step.
+    The Runge-Kutta program stops at the first of the `quotients` above its stop constant. Each
+    returned constant differs by more than rounding from all quotients of its step.
     """
     constants = []
     below = 0.0
@@ -131,9 +134,10 @@ def _constants(quotients: Quotients) -> list[float]:
 
 
 def _due(quotients: Quotients, constant: float) -> Stop | None:
-    """Return the stop that must occur with a stop constant (1/s); None if none must occur.
+    """Return the step, variable and quotient at which a run with a stop constant (1/s) must stop.
 
-    The stop must occur at the first quotient above the constant.
+    The run must stop at the first of the `quotients` above `constant`. Return None if there is
+    none.
     """
     above = np.argwhere(quotients.values > constant)
     if not len(above):

@@ -24,11 +24,11 @@ The arguments are those of `Name`.
 
 @dataclass(frozen=True)
 class Trial:
-    """A group of checks of `stress` under one kind of extreme conditions.
+    """A group of checks of `pyharness stress` under one kind of extreme conditions.
 
     `title` describes the conditions, and `bound` explains how the limits are derived. `attempts`
-    takes the leading parts of the requested ids, and returns the attempts that may make these
-    checks.
+    takes the leading parts of the requested ids. It returns the deferred computations of the checks
+    that may have these ids.
     """
 
     name: str
@@ -40,17 +40,18 @@ class Trial:
 def trial(name: str) -> Trial:
     """Return the trial with the given name, one of `TRIALS`.
 
-    The module of the trial is imported when the trial is first requested.
+    A trial is a group of checks under extreme conditions. Its module is imported when the trial is
+    first requested.
     """
     found: Trial = import_module(f"pyharness.checks.trials.{name.replace('-', '_')}").TRIAL
     return found
 
 
 def stress(only: Sequence[str] = ()) -> Iterator[Check]:
-    """Yield the checks of all trials whose ids begin with an element of `only`.
+    """Yield the checks of `pyharness stress` whose ids begin with an element of `only`.
 
-    An element is the leading part of an id, as in ``separatrix/taylor``. If `only` is empty, yield
-    all checks of all trials.
+    An element is the leading part of an id, as in ``separatrix/taylor``. The first part of an id is
+    a trial, which is a group of checks. If `only` is empty, yield all checks of all trials.
     """
     suites = {name: lambda name=name: trial(name).attempts(only) for name in TRIALS}
     return run_suites(suites, only, "stress")
@@ -59,8 +60,9 @@ def stress(only: Sequence[str] = ()) -> Iterator[Check]:
 def worst(checks: Iterable[Check]) -> dict[str, Check]:
     """Return the check with the largest ratio of value to limit, for each trial and method.
 
-    The keys have the form ``trial/method``, as in ``shapes/auto``. A failed check counts as worse
-    than one that passed. Checks without a limit or without a scene are ignored.
+    A trial is a group of checks under extreme conditions. The keys have the form ``trial/method``,
+    as in ``shapes/auto``. A failed check counts as worse than one that passed. Checks without a
+    limit or without a scene are ignored.
     """
     found: dict[str, Check] = {}
     for check in checks:

@@ -20,7 +20,10 @@ _NOTE = (
 
 
 def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
-    """Return the report of `stress`: the failures, then a table and a picture for each trial."""
+    """Return the report of `pyharness stress`: failures, then a table and picture for each trial.
+
+    A trial is a group of checks under one kind of extreme conditions.
+    """
     text: list[Section] = [listed_singly(checks), [_NOTE]]
     for each in trials:
         own = [check for check in checks if check.suite == each.name]

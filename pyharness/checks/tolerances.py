@@ -33,9 +33,9 @@ _STAGES = {"dop853": 12, "lsoda": 2, "radau": 20, "rk45": 6}
 
 
 def of_case(name: str, thin: bool) -> list[float]:
-    """Return the tolerances at which the method `name` is tried in a case of Table 1.
+    """Return the tolerances at which the method `name` is checked in a case of Table 1.
 
-    With `thin`, which the self-test sets, there is only one tolerance.
+    With `thin`, which `pyharness verify --self-test` sets, there is only one tolerance.
     """
     finest = METHODS[name].finest
     if name in SCIPY_METHODS:
@@ -46,11 +46,11 @@ def of_case(name: str, thin: bool) -> list[float]:
 
 
 def finest(name: str, scene: Scene, time: float) -> float:
-    """Return the finest tolerance at which the method `name` is tried until `time` (s) in a scene.
+    """Return the finest tolerance at which a method is checked until `time` (s) in a scene.
 
-    This is the finest tolerance that the method claims to meet. If a method of `solve_ivp` can't
-    meet this tolerance in the scene, return the finest value of `_LADDER` that it can meet, or 1 if
-    there is none.
+    The result is the finest tolerance that the method `name` claims to meet. A method of
+    `solve_ivp` may not meet this tolerance in the scene. The result is then the finest tolerance of
+    the list `_LADDER` that the method can meet, or 1 if there is none.
     """
     met = finest_of(name, scene, time)
     claimed = REGISTRY[name].finest
@@ -58,10 +58,10 @@ def finest(name: str, scene: Scene, time: float) -> float:
 
 
 def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
-    """Return the tolerances at which the method `name` is tried until `time` (s) in a scene.
+    """Return the tolerances at which the method `name` is checked until `time` (s) in a scene.
 
     The tolerances are the finest one of the method and, if 1e-6 is coarser, also 1e-6. A method
-    that is slow at its finest tolerance is tried only at 1e-6.
+    that is slow at its finest tolerance is checked only at 1e-6.
     """
     if name in _ONLY_MIDDLING:
         return [MIDDLING]
@@ -70,12 +70,12 @@ def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
-    """Return the tolerances at which the method `name` is tried until `time` (s) in a scene.
+    """Return the tolerances at which the method `name` is checked until `time` (s) in a scene.
 
-    They are the finest tolerance at which the method stays within its work limit, and 1e-6 if it is
-    affordable. None in place of a tolerance means that the method uses the scene's step size.
-    Methods with a fixed step always do so, and Gauss collocation is tried both ways. `flow` has the
-    error amplification of the scene, on which the work depends.
+    They are the finest tolerance at which the method stays within its work limit, and 1e-6 if the
+    method stays within the limit there too. None in place of a tolerance means that the method uses
+    the scene's step size. Methods with a fixed step always use it, and Gauss collocation is checked
+    both ways. `flow` has the error amplification of the scene, on which the work depends.
     """
     if name in FIXED_STEP:
         return [None]
@@ -106,10 +106,11 @@ def _within_budget(name: str, least: float, radians: float, amplification: float
 
 
 def _cost(name: str, tolerance: float, radians: float, amplification: float) -> float:
-    """Return an estimate of the number of right-hand sides that a method takes at a tolerance.
+    """Return an estimate of the number of right-hand sides that the method `name` evaluates.
 
-    `radians` is the time multiplied by the largest rate of change of the motion, and
-    `amplification` is the error amplification. The estimate is 0 for a method without a work limit.
+    The work depends on the relative tolerance `tolerance` and on `radians`, the time multiplied by
+    the largest rate of change of the motion. It also depends on `amplification`, the error
+    amplification. The estimate is 0 for a method without a work limit.
     """
     if name in GAUSS:
         stages = int(name[-1])

@@ -24,16 +24,18 @@ _THIN_CASE = 3
 
 
 def words(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of our arithmetic of machine words, bit for bit.
+    """Yield deferred checks that our arithmetic of machine words is correct bit for bit.
 
-    The test vectors of the CDC's arithmetic are checked first. Two comparisons of runs follow in
-    each cell, which is a program with a case and a listing. In the first comparison, the Python
-    twin in our arithmetic of 53 bits must agree with the twin in floats. In the second, the
-    program compiled for each machine word must agree with the twin in the same word.
+    The arithmetic has the mantissa length and rounding of a machine, such as the CDC. It is checked
+    first by test vectors of the CDC. Runs of the programs are then compared in cells. A cell is a
+    program with a case and a listing, a choice of its defects. In the first comparison, the Python
+    version in our arithmetic of 53 bits must agree with the Python version in floats. In the
+    second, the program compiled for each machine word must agree with the Python version in that
+    word.
 
     If `chosen.only` requests some checks, both comparisons cover every cell. Otherwise the first
-    comparison covers the original listing, and listings with at most one defect or reading. The
-    second covers the original and the corrected listings.
+    covers the original listing and listings with at most one defect or reading, an interpretation
+    of a doubtful card. The second covers the original and the corrected listings.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -70,11 +72,19 @@ def _same(name: Name, one: Trajectory, other: Trajectory) -> Check:
 
 
 def _has_all_or_none(listing: Listing) -> bool:
-    """Return whether a listing is the original program without readings, or the corrected one."""
+    """Return whether a listing is the original or the corrected program, without readings.
+
+    A listing is a version of a program. A reading is an interpretation of a doubtful card that we
+    do not adopt.
+    """
     return listing.label != "custom" and not listing.readings
 
 
 def _is_few(listing: Listing) -> bool:
-    """Return whether a listing is the original program, or has at most one defect or reading."""
+    """Return whether a listing is the original program, or has at most one defect or reading.
+
+    A listing is a version of a program. A reading is an interpretation of a doubtful card that we
+    do not adopt.
+    """
     few = len(listing.defects) + len(listing.readings) <= 1
     return few or _has_all_or_none(listing)

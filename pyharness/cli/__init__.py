@@ -12,11 +12,11 @@ _LAYOUT = "\n\t\f"
 
 
 def shown(text: str) -> str:
-    """Return a text with its control characters, except line breaks and tabs, as escape sequences.
+    """Return a text with its control characters as escape sequences.
 
-    Names in a text may come from third-party files, and their control characters could change the
-    state of a terminal. All reports and messages are therefore passed through this function. It
-    does not replace form feeds either.
+    Line breaks, tabs and form feeds are kept. Names in a text may come from third-party files, and
+    their control characters could change the state of a terminal. All reports and messages are
+    therefore passed through this function.
     """
     return printable(text, _LAYOUT)
 

@@ -12,9 +12,10 @@ _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
 
 class Cost(NamedTuple):
-    """The time and memory that one random draw takes, and the largest allowed number of draws.
+    """The time and memory for one random draw, and the largest allowed number of draws.
 
-    Time and memory were measured on one core of a processor of 2026.
+    A draw is, for example, a random scene. Time and memory were measured on one core of a processor
+    of 2026.
     """
 
     what: str  # plural noun for the draws, as in "random scenes"
@@ -33,9 +34,9 @@ SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 def check_count(option: str, count: int, least: int, cost: Cost) -> None:
     """Raise InputError if a number of random draws is not allowed.
 
-    `option` is the option with the number `count`, `least` the smallest allowed number, and `cost`
-    has the largest. If the draws will take more than a minute, print a forecast of their time and
-    memory.
+    `option` is the name of the option that gave the number `count`. `least` is the smallest allowed
+    number, and `cost` has the largest. If the draws will take more than a minute, print a forecast
+    of their time and memory.
     """
     from pyharness.ensembles.forecast import duration
 

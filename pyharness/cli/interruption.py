@@ -27,7 +27,7 @@ LINE = "pyharness: interrupted\n"
 
 
 class _Interruption:
-    """The state of interruption of this process, and the handlers of its signals.
+    """The state of interruption of this process by Ctrl-C, and the handlers of its signals.
 
     `count` is the number of interrupts by the user. `is_reported` is true after the line that
     reports the interrupt was printed.
@@ -51,9 +51,9 @@ class _Interruption:
     def interrupt(self, number: int, frame: FrameType | None) -> None:
         """Raise KeyboardInterrupt; this function is the handler of SIGINT.
 
-        A timer is started, which raises KeyboardInterrupt again if it is dropped. The third
-        interrupt ends the process at once. `number` and `frame` are the arguments of every signal
-        handler, and are not used.
+        A timer is started, which raises KeyboardInterrupt again if other code drops the exception.
+        The third interrupt ends the process at once. `number` and `frame` are the arguments of
+        every signal handler, and are not used.
         """
         self.count += 1
         if self.count >= _MOST:
@@ -117,7 +117,7 @@ def run_interruptible(main: Callable[[], int]) -> int:
 
 
 def report() -> int:
-    """Print the line that reports the interrupt, unless it was printed; return exit status 130."""
+    """Print the line "pyharness: interrupted", unless it was printed; return exit status 130."""
     if not _STATE.is_reported:
         _STATE.is_reported = came()
         end_progress()
@@ -128,10 +128,10 @@ def report() -> int:
 def leave(code: int) -> None:
     """Remove temporary files and end the process with the exit status `code`.
 
-    It replaces Python's normal exit, which would wait for threads and free all memory object by
-    object. On Ctrl-C the normal exit would also drop the interrupt, or end the process by the
-    signal. After an interrupt this function ends child processes, and waits at most two seconds for
-    the cleanup.
+    This function replaces Python's normal exit, which would wait for threads and free all memory
+    object by object. On Ctrl-C the normal exit would also drop the interrupt, or end the process by
+    the signal. After an interrupt this function ends child processes, and waits at most two seconds
+    for the cleanup.
     """
     if code == CODE:
         # The interrupt was reported; messages of ending threads and finalizers are suppressed.

@@ -33,17 +33,18 @@ SCENE = {
 LISTING = {
     "--listing L": "Version of the program: original (all its defects active) or corrected (none "
     "active); by default `compare` uses both, and other verbs use the original.",
-    "--fix NAME,...": "Correct only these defects, readings or conjectures of the original listing "
-    "(`pyharness defects` lists the names).",
-    "--keep NAME,...": "Keep only these defects, readings or conjectures active, and correct all "
-    "others (`pyharness defects` lists the names).",
-    "--reading NAME,...": "For these readings (ambiguous passages of the cards), use the "
-    "interpretation that this edition does not adopt (`pyharness defects` lists the names).",
-    "--conjecture NAME,...": "Activate these conjectures about missing cards; none activates no "
-    "conjecture (default: the conjectures of the original listing).",
-    "--lipschitz L": "Constant of the Runge-Kutta program's stop test, 1/s (default 500): a run "
-    "stops if the slopes change by more than L times the change of the variables.",
-    "--no-stop": "Run the Runge-Kutta program without its stop test (see --lipschitz).",
+    "--fix NAME,...": "Correct only these faults of the original program: defects, doubtful "
+    "readings or conjectures (`pyharness defects` lists and explains the names).",
+    "--keep NAME,...": "Keep only these faults of the original program, and correct all others "
+    "(`pyharness defects` lists and explains the names).",
+    "--reading NAME,...": "Read these ambiguous statements of the printed program in the way that "
+    "this edition does not adopt (`pyharness defects --kind reading` explains the names).",
+    "--conjecture NAME,...": "Assume these statements, for which the printed program has no cards; "
+    "none: assume nothing (`pyharness defects --kind conjecture` explains the names).",
+    "--lipschitz L": "Stop the Runge-Kutta program when the slopes change by more than L times the "
+    "change of the variables, L in 1/s (default 500, as printed).",
+    "--no-stop": "Run the Runge-Kutta program to its last step, without the test that stops a "
+    "diverging run.",
 }
 EFFORT = {
     "--effort F": "Multiply the limit of computational work by this factor, above 0 (default 1, "
@@ -56,7 +57,7 @@ STRICT = {
 
 
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict[str, str]:
-    """Return the options --format, --plot and --out, each with its help text.
+    """Return the options --format, --plot and --out as a dictionary with their help texts.
 
     `formats` are the allowed formats, the default first. `plot` says what the picture of --plot
     shows, for the help text of --plot; if it is empty, the result has no option --plot.
@@ -100,7 +101,7 @@ def chosen_seed(options: argparse.Namespace) -> str | None:
 
 
 def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
-    """Raise InputError if the value of an option is given, but is not one of `allowed`.
+    """Raise InputError if an option is given and its value is not one of `allowed`.
 
     `what` is the name of the option without its dashes, and `name` its value, None if not given.
     """
@@ -112,8 +113,8 @@ def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[st
     """Return the names in the value `text` of --only, which select checks; an empty list for None.
 
     Each name is a kind of check, or the beginning of the id of a check, as in ``cells/two-term``.
-    `what` is the noun for a kind in a message. Raise InputError if the kind, the part of a name
-    before the first slash, is not one of `allowed`.
+    The part of a name before the first slash is a kind. Raise InputError, which calls the kind by
+    the noun `what`, if the kind is not one of `allowed`.
     """
     only = names(text)
     for each in only:
@@ -129,8 +130,8 @@ def chosen_scene(
 
     The further options are --omega0, --step-size and --steps. Print a warning if no rigid body can
     have the scene's moments of inertia, or if its attitude was normalised. Raise InputError for a
-    full inertia matrix unless `any_axes`, and for a torque about the axes of space unless
-    `any_torque`.
+    full inertia matrix unless `any_axes` is true, and for a torque about the axes of space unless
+    `any_torque` is true.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -172,8 +173,9 @@ def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
 def chosen_listing(options: argparse.Namespace) -> Listing:
     """Return the listing (version) of the requested program that the options describe.
 
-    The options are --listing, --fix, --keep, --reading and --conjecture. Print a warning for each
-    reading or conjecture that is requested, but has no effect.
+    The options are --listing, --fix, --keep, --reading and --conjecture. A reading is an
+    interpretation of a doubtful card, and a conjecture an assumption about a missing card. Print a
+    warning for each of them that is requested, but has no effect.
     """
     chosen_programs(options)
     listing = subset(
@@ -191,7 +193,8 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
     """Print a warning for each reading or conjecture that is requested, but active in no listing.
 
-    `listings` are the listings that the command runs.
+    A reading is an interpretation of a doubtful card, and a conjecture an assumption about a
+    missing card. `listings` are the versions of the programs that the command runs.
     """
     asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
     active = {name for listing in listings for name in listing.active}
@@ -200,9 +203,10 @@ def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> N
 
 
 def listing_text(listing: Listing) -> str:
-    """Return a line that describes a listing: its label, and its active defects.
+    """Return a line that describes a listing (version of a program): its label and active defects.
 
-    The line also has the names of the active readings and conjectures, if there are any.
+    The label is original, corrected or custom. The line also has the names of the active readings
+    (of doubtful cards) and conjectures (about missing cards), if there are any.
     """
     active = ", ".join(sorted(listing.defects)) or "no defects"
     more = {"readings": listing.readings, "conjectures": listing.conjectures}
@@ -211,10 +215,10 @@ def listing_text(listing: Listing) -> str:
 
 
 def chosen_lipschitz(options: argparse.Namespace) -> float:
-    """Return the constant of the stop test (1/s) that --lipschitz gives.
+    """Return the constant of the Runge-Kutta program's stop test (1/s) that --lipschitz gives.
 
     The default is the constant on the published cards. Raise InputError if --lipschitz or --no-stop
-    is given although the program has no stop test, or if both options are given.
+    is given although the requested program has no stop test, or if both options are given.
     """
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
@@ -226,8 +230,9 @@ def chosen_lipschitz(options: argparse.Namespace) -> float:
 def refuse(options: argparse.Namespace, chosen: str, names: Sequence[str]) -> None:
     """Raise InputError if one of the options `names` is given, which have no meaning with `chosen`.
 
-    The names are without leading dashes, as in "no_stop". `chosen` is the option that was given, or
-    a noun for the computation that was requested, as the message shows it.
+    The names are without leading dashes, as in "no_stop". `chosen` is another option that was
+    given, as in "--program two-term", or a noun for the requested computation. The error message
+    shows it.
     """
     for name in names:
         if getattr(options, name):
@@ -287,7 +292,7 @@ def warn(message: str) -> None:
 def check_outputs(options: argparse.Namespace) -> None:
     """Raise InputError if a file that --out or --plot names can't be written.
 
-    Verbs call this before any computation, so that no computation is lost.
+    Commands call this function before any computation, so that no computation is lost.
     """
     picture = getattr(options, "plot", None)
     if picture is None and options.out is None:

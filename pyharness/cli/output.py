@@ -113,7 +113,7 @@ class _DeferredInterrupt:
     """A context manager that defers Ctrl-C, which could otherwise leave temporary files behind."""
 
     def __enter__(self) -> Self:
-        """Install a signal handler that only records an interrupt."""
+        """Install a signal handler that only records an interrupt by Ctrl-C."""
         self._came = False
         self._before = signal.getsignal(signal.SIGINT)
         # Python raises KeyboardInterrupt in the main thread alone.
@@ -123,14 +123,14 @@ class _DeferredInterrupt:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Restore the previous signal handler, and call it if an interrupt was deferred."""
+        """Restore the previous signal handler, and call it if Ctrl-C was deferred."""
         if self._holds:
             signal.signal(signal.SIGINT, self._before)
         if self._came and callable(self._before):
             self._before(signal.SIGINT, None)
 
     def check(self) -> None:
-        """Raise KeyboardInterrupt if an interrupt was deferred."""
+        """Raise KeyboardInterrupt if an interrupt by Ctrl-C was deferred."""
         if self._came:
             raise KeyboardInterrupt
 
@@ -255,9 +255,9 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 def check_tree(path: str, mark: str, option: str) -> None:
     """Raise InputError if `write_tree` may not replace the folder `path`.
 
-    The folder may be new or empty. Otherwise it may contain only the JSON file `mark`, and the
-    files that this JSON file lists under the key `files`. The error message names `option`, the
-    option that gave the path. Callers make this check before any computation.
+    The folder may be new or empty. Otherwise it may contain only a JSON file with the name `mark`,
+    and the files that this JSON file lists under the key `files`. The error message names `option`,
+    the option that gave the path. Callers make this check before any computation.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))

@@ -16,7 +16,10 @@ _NARROWEST, _WIDEST = 80, 100  # columns
 
 
 class _Formatter(argparse.HelpFormatter):
-    """A help formatter whose usage line lists no options, and which does not reflow the example."""
+    """A help formatter whose usage line lists no options, and which keeps the lines of the example.
+
+    The example is the text at the end of a help text.
+    """
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         if text.startswith("example:"):
@@ -30,12 +33,16 @@ class _Formatter(argparse.HelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """The parser of one verb, whose error messages have one line and suggest the nearest name."""
+    """The parser of one verb (subcommand), which reports an error in a single line.
+
+    If a name is unknown, the error message suggests the nearest known name.
+    """
 
     def __init__(self, verb: str, description: str = "") -> None:
-        """Declare the options of the verb `verb`, which are the dictionary OPTIONS of its module.
+        """Declare the options of a subcommand, which are the dictionary OPTIONS of its module.
 
-        `description` is the line about the verb in the overview of `pyharness help`.
+        `verb` is the name of the subcommand, and `description` the line about it in the overview of
+        `pyharness help`.
         """
         self._width = _WIDEST
         self.module = import_module(f"pyharness.cli.verbs.{verb}")
@@ -74,13 +81,13 @@ class Parser(argparse.ArgumentParser):
         raise InputError(message)
 
     def option_names(self) -> list[str]:
-        """Return the names of all options of the verb, as in ``--case``."""
+        """Return the names of all options of the subcommand, as in ``--case``."""
         return [name for name in self._option_string_actions if name.startswith("--")]
 
     def read(self, verb: str, arguments: Sequence[str]) -> argparse.Namespace:
         """Return the parsed options of a command line.
 
-        `arguments` are the arguments after the verb, and `verb` is its name for error messages.
+        `arguments` are the arguments after the subcommand `verb`, whose name is in error messages.
         Raise InputError if an option or the output format is unknown.
         """
         options, rest = self.parse_known_args(self._joined(arguments))

@@ -19,7 +19,8 @@ from pyharness.truth.reference import Reference
 class Accuracy:
     """The errors of a trajectory against the reference solution.
 
-    They are the errors of omega, velocity and attitude, and the drifts of conserved quantities.
+    They are the errors of omega, translational velocity and attitude, and the drifts of energy and
+    angular momentum.
     """
 
     omega: tuple[float, float, float]  # largest error of each component (rad/s)
@@ -36,16 +37,16 @@ class Accuracy:
 
     @property
     def angle(self) -> float | None:
-        """Return the largest error of the attitude (rad); None if there is no attitude."""
+        """Return the largest error of the trajectory's attitude (rad); None without an attitude."""
         return None if self.turned is None else float(self.turned.max(initial=0.0))
 
 
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
     """Return the errors of a trajectory against the reference solution `truth`.
 
-    Both must have rows at the same times. If one of them ends earlier, the comparison ends with it.
-    Energy and angular momentum, which are constant without torque, are compared with their initial
-    values in `scene`.
+    The trajectory and `truth` must have rows at the same times. If one of them ends earlier, the
+    comparison ends with it. Energy and angular momentum, which are constant without torque, are
+    compared with their initial values in `scene`.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
@@ -107,9 +108,9 @@ def differences(first: Trajectory, second: Trajectory) -> list[str]:
     """Return the names of the results in which two trajectories of a program differ.
 
     First the numbers of steps and of evaluations, the status and the result of the stop test are
-    compared. If any of these differ, the list has only their names. Otherwise the rows and the
-    error code IER of the linear solver are compared bit for bit. The list is empty if all results
-    agree.
+    compared. If any of these differ, the list has only their names. Otherwise the rows at all times
+    and the error code IER of the linear solver are compared bit for bit. The list is empty if all
+    results agree.
     """
     counts = (
         ("steps", first.steps, second.steps),

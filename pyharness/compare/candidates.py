@@ -44,7 +44,7 @@ class End:
 
     @property
     def has_result(self) -> bool:
-        """Return whether the candidate reached the requested time.
+        """Return whether the method, prepared solver or program reached the requested time.
 
         The result may nevertheless be "sensitive": its amplified rounding error exceeds the
         tolerance.
@@ -66,9 +66,9 @@ class Ready:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A method with its tolerance, a prepared solver, or a program with its listing.
+    """A method with its tolerance, a prepared solver, or a program with its active defects.
 
-    Checks and timings use the same functions for all three.
+    Checks and timings run all three by the same functions.
     """
 
     name: str
@@ -86,10 +86,11 @@ class Candidate:
 
 
 def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
-    """Return a candidate that runs the method `name` by the function `solve`.
+    """Return a `Candidate` (common interface of solvers) that runs a method by `solve`.
 
-    `tolerance` is relative to the largest component of omega, and `effort` is the factor on the
-    work limit. The candidate's rows include the attitude if the scene has one.
+    `name` is the name of the method. `tolerance` is relative to the largest component of omega, and
+    `effort` is the factor on the work limit. The candidate's rows include the attitude if the scene
+    has one.
     """
 
     def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
@@ -104,12 +105,12 @@ def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candid
 
 
 def prepared_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a candidate that runs a solver prepared for a scene and the method `name`.
+    """Return a `Candidate` (common interface of solvers) that runs a prepared solver.
 
-    If `primed` is true, the solver is first called with another initial omega. This call must have
-    no effect on the result. `tolerance` is relative to the largest component of omega; None selects
-    the default of the method. A method with a fixed step, and Gauss collocation, use the scene's
-    step size.
+    The solver is prepared for a scene and the method `name`. If `primed` is true, the solver is
+    first called with another initial omega. This call must have no effect on the result.
+    `tolerance` is relative to the largest component of omega; None selects the default of the
+    method. A method with a fixed step, and Gauss collocation, use the scene's step size.
     """
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -122,7 +123,7 @@ def prepared_candidate(name: str, tolerance: float | None, primed: bool = False)
 
 
 def attitude_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a candidate that runs a prepared solver for omega and the attitude.
+    """Return a `Candidate` (common interface) that runs a prepared solver for omega and attitude.
 
     The arguments have the same meanings as those of `prepared_candidate`.
     """
@@ -154,7 +155,7 @@ def program_candidate(
     effort: float = 1.0,
     word: str = BINARY64,
 ) -> Candidate:
-    """Return a candidate that runs a program of the thesis.
+    """Return a `Candidate` (common interface of solvers) that runs a program of the thesis.
 
     `listing` is the program with its active defects. The other arguments are those of
     `Program.run`.
@@ -182,23 +183,27 @@ def program_candidate(
 
 
 def unstopped(listing: Listing) -> Candidate:
-    """Return a candidate that runs a listing's compiled program without its Lipschitz stop test.
+    """Return a `Candidate` that runs a compiled program of the thesis without its stop test.
 
-    The program does not compute the translational velocity.
+    A `Candidate` is a common interface of solvers. `listing` is the program with its active
+    defects. The program does not compute the translational velocity.
     """
     return program_candidate(listing, may_stop=False, velocity=False)
 
 
 def plain(values: Iterable[float]) -> Array:
-    """Return a copy of `values` as an array of floats.
+    """Return a copy of `values`, a result of a compiled function, as an array of floats.
 
-    The copy is needed because the next call of a kernel reuses the memory of its result.
+    The copy is needed because the next call of the function reuses the memory of its result.
     """
     return np.array([float(x) for x in values])
 
 
 def not_finite(why: str = "overflow") -> End:
-    """Return an End with omega NaN, for a run without result; `why` says how the run ended."""
+    """Return an `End` (result at one time) with omega NaN, for a run without result.
+
+    `why` says how the run ended.
+    """
     return End(np.full(3, math.nan), why)
 
 
@@ -218,7 +223,7 @@ def _answered(solver: Solver, omega: Array) -> End:
 
 
 def _printed(result: Any) -> End:
-    """Return the last row of a compiled program's run as an End.
+    """Return the last row of a compiled program's run as an `End` (result at one time).
 
     `result` is the tuple that the extension's function `run_program` returned.
     """

@@ -42,9 +42,10 @@ _TIMING_SECONDS = 3e-4
 
 @dataclass(frozen=True, eq=False)
 class ProgramFinding:
-    """The results of one listing of a program, and their differences from the reference.
+    """The results of one version of a program, and their differences from the reference.
 
-    It also has the differences between Fortran and the twin, which is the Python port.
+    The version is given by `listing`, a choice of the program's defects. The differences between
+    Fortran and the twin, which is the Python port, are also included.
     """
 
     listing: Listing
@@ -59,7 +60,7 @@ class ProgramFinding:
 
     @property
     def who(self) -> str:
-        """Return the name of the program and the label of its listing: ``two-term original``."""
+        """Return the program's name and its version's label, as in ``two-term original``."""
         return f"{self.listing.program} {self.listing.label}"
 
 
@@ -117,7 +118,8 @@ class Comparison:
     def digits(self) -> float | None:
         """Return the number of correct decimal digits that amplified rounding errors permit.
 
-        It is a limit for all methods in binary64. It is None if the error amplification is unknown.
+        The number is a limit for all methods in binary64. It is None if the error amplification is
+        unknown.
         """
         return None if self.growth is None else digits_left(ROUNDING * self.growth)
 
@@ -128,7 +130,7 @@ class Comparison:
 
     @property
     def is_sensitive(self) -> bool:
-        """Return whether the amplified rounding error exceeds a fraction, 0.3, of `tolerance`."""
+        """Return whether the amplified rounding error exceeds 0.3 times `tolerance`."""
         return is_sensitive(self.growth, self.tolerance)
 
     @property
@@ -270,12 +272,13 @@ def listings_for(
 ) -> list[Listing]:
     """Return the listings to compare: for each program the original and the corrected listing.
 
-    `fix` has names of defects, readings or conjectures to correct, and `keep` has names to leave
-    active. If a program has any of these names, the listing with this selection comes between the
-    other two. The selection starts from the listing `base`, ``original`` or ``corrected``. If only
-    `base` is given, without `fix` and `keep`, it is the only listing of each program. `readings`
-    and `conjectures` have the same meaning as in `subset`. Raise InputError for a name that none of
-    `programs` has.
+    A listing is a version of a program, with some of its defects, readings (of doubtful cards) and
+    conjectures (about missing cards) active. `fix` has names of those to correct, and `keep` of
+    those to leave active. If a program has any of these names, the listing with this selection
+    comes between the other two. The selection starts from the listing `base`, ``original`` or
+    ``corrected``. If only `base` is given, without `fix` and `keep`, it is the only listing of each
+    program. `readings` and `conjectures` have the same meaning as in `subset`. Raise InputError for
+    a name that none of `programs` has.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]

@@ -81,19 +81,21 @@ class Order:
 class _SingularError(Exception):
     """The signal that a run failed at a step size for which its matrix may be singular.
 
-    If LEQT1F finds the collocation matrix singular, the program uses the right-hand sides in place
-    of the solution. It is then another method, whose order is not measured.
+    If the linear solver LEQT1F finds the collocation matrix singular, the program uses the
+    right-hand sides in place of the solution. The program then is another method, whose order is
+    not measured.
     """
 
 
 def measured_order(
     scene: Scene, program: Program, listing: Listing, truth: Reference, pairs: int = 2
 ) -> Order:
-    """Measure the order with which omega of a listing's compiled program converges to `truth`.
+    """Measure the order with which omega of a compiled program converges to `truth`.
 
-    `order_of` measures the order, and explains the arguments `truth` and `pairs` and the result.
-    The state is `sensitive` instead of `misses` if the error may be amplified rounding error. It is
-    `misses` if the program does not converge, but a textbook method of the same order converges.
+    `listing` is the program with its active defects. The function `order_of` makes the measurement,
+    and explains `truth`, `pairs` and the result. The state of the result is `sensitive` instead of
+    `misses` if the error may be amplified rounding error. It is `misses` if the program does not
+    converge, but a textbook method of the same order converges.
     """
 
     def omega(finer: Scene) -> Array:
@@ -192,8 +194,8 @@ def _shows(order: float, due: int) -> bool:
 def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
     """Yield the scene with its own step size, with half of it, with a quarter, and so on.
 
-    All these scenes have the same last time. They have at most `most_steps` steps, or, if it is
-    None, as many as `order_of` uses by default.
+    All these scenes have the same last time. They have at most `most_steps` steps, or, if
+    `most_steps` is None, as many as `order_of` uses by default.
     """
     most = max(_MOST_STEPS, scene.steps << _HALVINGS) if most_steps is None else most_steps
     for halvings in itertools.count():

@@ -31,9 +31,10 @@ _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 
 
 def comparison_report(comparison: Comparison) -> Report:
-    """Return the report of a comparison, with the results of programs and methods, and a verdict.
+    """Return the report of a comparison of programs and methods with the reference solution.
 
-    The methods are those of SciPy's `solve_ivp`.
+    The methods are those of SciPy's `solve_ivp`. The report says whether all results are as
+    expected.
     """
     in_floats = comparison.word == BINARY64
     scene, truth = heading(comparison.scene), comparison.reference
@@ -87,7 +88,7 @@ def comparison_report(comparison: Comparison) -> Report:
 
 
 def verdict(comparison: Comparison) -> list[str]:
-    """Return our verdict on a comparison, as a list of sentences.
+    """Return sentences that say whether the results of a comparison are as expected.
 
     If all results are as expected, the first sentence says so; otherwise there is a sentence for
     each unexpected result. A further sentence says if the scene is sensitive to rounding errors. A
@@ -177,7 +178,10 @@ def _attitudes(comparison: Comparison) -> list[list[Table]]:
 
 
 def _data(comparison: Comparison) -> Table:
-    """Return the results as one table for CSV, with a row for each program and method."""
+    """Return the results of a comparison as one table for CSV.
+
+    The table has a row for each program and method.
+    """
     names = (
         "method listing active steps ended stop_variable stop_quotient error_w1 error_w2 error_w3 "
         "error_v energy_drift momentum_drift ulps order order_state evaluations seconds"

@@ -22,9 +22,9 @@ class Item(NamedTuple):
 class Entry(NamedTuple):
     """A public name on the API page: its signature, its docstring in parts, its methods if a class.
 
-    `anchor` is the anchor of the entry in the page, and `kind` is "function", "class" or
-    "property". `summary` is the first line of the docstring, `text` has the further paragraphs, and
-    `groups` has the sections with their titles, such as Parameters.
+    `anchor` is the anchor of the name in the page, and `kind` is "function", "class" or "property".
+    `summary` is the first line of the docstring, `text` has the further paragraphs, and `groups`
+    has the sections with their titles, such as Parameters.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Entry(NamedTuple):
 
 
 def entries() -> list[Entry]:
-    """Return an entry of the API page for each public name of the package."""
+    """Return, for each public name of the package, an entry of the web site's API page."""
     return [_entry(name, getattr(pyharness, name)) for name in pyharness.__all__]
 
 

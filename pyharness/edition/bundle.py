@@ -19,11 +19,11 @@ _UNKNOWN = re.compile(r"^\s*(?:import|export)\b.*|\bimport\s*[(.]", re.M)
 
 
 def bundle(entry: Path) -> str:
-    """Return the text of one script with the module in the file `entry` and all that it imports.
+    """Return one classic script with the JavaScript module in the file `entry` and all its imports.
 
     The script runs inside a function, so that it defines no global names. Raise ValueError, with
-    file and line, for an unsupported form of import or export, for an import of a missing file or
-    name, and for modules that import each other.
+    file and line, for an unsupported form of import or export, and for an import of a missing file
+    or name. Modules that import each other are refused too.
     """
     exports: dict[Path, list[str]] = {}
     parts: list[str] = []
@@ -34,7 +34,7 @@ def bundle(entry: Path) -> str:
 def _add(
     path: Path, importing: tuple[Path, ...], exports: dict[Path, list[str]], parts: list[str]
 ) -> None:
-    """Append the modules that a module imports, and then the module itself, to the script `parts`.
+    """Append a JavaScript module, after the modules that it imports, to the script `parts`.
 
     `path` is the file of the module. `importing` is the chain of modules that import it. The names
     that each appended module exports are stored in `exports`.
@@ -72,9 +72,9 @@ def _add(
 
 
 def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
-    """Yield the exported and the local name of each name in the braces of an import statement.
+    """Yield the exported and the local name of each name in a JavaScript import statement.
 
-    `found` is the match of the statement.
+    `found` is the match of the statement, with the names in braces.
     """
     for each in (found["names"] or "").split(","):
         name, _, alias = each.strip().partition(" as ")
@@ -83,10 +83,11 @@ def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
 
 
 def _as_constant(found: re.Match[str], path: Path, modules: list[Path]) -> str:
-    """Return the declaration of constants that replaces an import statement in the script.
+    """Return the declaration of constants that replaces a JavaScript import in the script.
 
-    It has as many lines as the statement. `found` is the match of the statement in the module
-    `path`. `modules` has the paths of the modules that are already in the script, in their order.
+    The declaration has as many lines as the import statement. `found` is the match of the statement
+    in the module `path`. `modules` has the paths of the modules that are already in the script, in
+    their order.
     """
     number = modules.index((path.parent / found["path"]).resolve())
     renamed = ", ".join(f"{name}: {here}" for name, here in _names(found))

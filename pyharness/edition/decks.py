@@ -22,8 +22,8 @@ _ORDER = (
 class Run(NamedTuple):
     """A run of consecutive characters of a card, or of the line of the scan that shows the card.
 
-    `entry` is the identifier of the apparatus entry that explains why card and scan differ in these
-    characters. It is None if card and scan agree.
+    `entry` is the identifier of the record in our apparatus that explains why card and scan differ
+    in these characters. It is None if card and scan agree.
     """
 
     text: str
@@ -33,9 +33,10 @@ class Run(NamedTuple):
 class CardView(NamedTuple):
     """A card as a page shows it, with its line of the scan and its apparatus entries.
 
-    `card` is the text of the card. `scan` is its line in the scan, or None if the scan lacks the
-    card. `port` and `twin` are the lines of the Fortran port and of the Python twin that correspond
-    to the card. `absent` is the reason why the port has no statement for the card, or None.
+    An apparatus entry records, for example, a defect, or a difference between card and scan. `card`
+    is the text of the card. `scan` is its line in the scan, or None if the scan lacks the card.
+    `port` and `twin` are the lines of the Fortran port and of the Python port that correspond to
+    the card. `absent` is the reason why the Fortran port has no statement for the card, or None.
     `otherwise` is the reason why the port's statement is different, or None. `parallels` are the
     cards of the other programs with the same text.
     """
@@ -53,7 +54,11 @@ class CardView(NamedTuple):
 
 
 def card_views(program: str) -> list[CardView]:
-    """Return a view of each card of a program, in the order of the cards."""
+    """Return a view of each card of a program, in the order of the cards.
+
+    A view has the card, its line of the scan, and the corresponding lines of the ports, as a page
+    shows them. `program` is the name of the program.
+    """
     by_name = {each["id"]: each for each in entries()}
     found = deck(program)
     return [
@@ -74,9 +79,11 @@ def card_views(program: str) -> list[CardView]:
 
 
 def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
-    """Return, by kind of apparatus entry, how many cards have an entry of this kind.
+    """Return the number of cards that have an apparatus entry of a kind, for each kind.
 
-    The kinds are in order of precedence; kinds without cards are omitted.
+    An apparatus entry records, for example, a defect or a doubtful reading of the card. `views` are
+    the cards as a page shows them. The kinds are in order of precedence; kinds without cards are
+    omitted.
     """
     counts = dict.fromkeys(_ORDER, 0)
     for view in views:

@@ -18,7 +18,7 @@ _OF_THE_MENU = ("index.md", "explanation/findings.md", "explanation/methods.md")
 def documents_folder(given: str | None = None) -> Path:
     """Return the folder of the documents: `given`, or by default the folder `docs` of the checkout.
 
-    Raise InputError if the folder lacks the documents, which an installed package does not include.
+    Raise InputError if the folder lacks the documents. An installed package does not include them.
     """
     folder = shipped("docs") if given is None else Path(given)
     missing = [name for name in _OF_THE_MENU if not (folder / name).is_file()]
@@ -36,7 +36,10 @@ def documents_folder(given: str | None = None) -> Path:
 
 
 def documents(folder: Path) -> Iterator[tuple[str, Document]]:
-    """Yield, for each Markdown document in a folder, its path in the site and its rendered text."""
+    """Yield the path in the web site and the rendered text of each document in a folder.
+
+    The documents are the Markdown files of the folder.
+    """
     for file in sorted(folder.rglob("*.md")):
         name = file.relative_to(folder).as_posix()
         text = file.read_text(encoding="utf-8")
@@ -44,12 +47,15 @@ def documents(folder: Path) -> Iterator[tuple[str, Document]]:
 
 
 def page_of(name: str) -> str:
-    """Return the path in the site of a document, from `name`, its path in the documents' folder."""
+    """Return the path of a document in the web site, from `name`, its path in the folder `docs`."""
     return f"docs/{name.removesuffix('.md')}.html"
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Return the content of the pictures in the documents' folder, by their path in the site."""
+    """Return the content of the pictures of the documents, by their path in the web site.
+
+    `folder` is the folder of the documents.
+    """
     return {
         f"docs/{file.relative_to(folder).as_posix()}": file.read_bytes()
         for file in sorted(folder.rglob("*"))
@@ -58,10 +64,10 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def _link(folder: Path, name: str, target: str) -> str | None:
-    """Return the link in the site that replaces the link `target` of a document.
+    """Return the link in the web site that replaces the link `target` of a document.
 
-    `name` is the path of the document in `folder`, the documents' folder. Return None if the site
-    does not have the target.
+    `name` is the path of the document in `folder`, the documents' folder. Return None if the web
+    site does not have the target.
     """
     path, hash_, anchor = target.partition("#")
     if "://" in target or not path:

@@ -28,7 +28,7 @@ class Drawn(NamedTuple):
 
 
 def drawn() -> dict[str, Drawn]:
-    """Compute and draw all figures of the site.
+    """Compute and draw all figures of the thesis for the web site.
 
     The result maps the name of a figure's files, without the suffix, to the drawn figure.
     """
@@ -39,10 +39,11 @@ def drawn() -> dict[str, Drawn]:
 
 
 def together(figures: Mapping[str, Drawn]) -> dict[str, bytes]:
-    """Draw the original and the corrected Figure 7 and its limit in one picture.
+    """Draw the original and the corrected Figure 7 of the thesis and its limit in one picture.
 
-    `figures` is the result of `drawn`. Return the content of two files by name: the picture (SVG)
-    and the plotted numbers (CSV).
+    The limit is the function to which the result of the original program converges as the step size
+    goes to 0. `figures` is the result of `drawn`. Return the content of two files by name: the
+    picture (SVG) and the plotted numbers (CSV).
     """
     original, corrected = (figures[name].finding for name in ("figure-07", "figure-07-corrected"))
     return saved(together_picture(original, corrected), "figure-07-together.svg")

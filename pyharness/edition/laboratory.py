@@ -37,12 +37,12 @@ _SHOWN = 3
 
 @cache
 def context() -> dict[str, Any]:
-    """Return the values for the template of the laboratory page.
+    """Return the values for the template of the page that runs the programs in the browser.
 
     `data` is the object that the page's script reads as `window.laboratoryData`. `switches` has the
-    defects, readings and conjectures that a reader can switch on or off, each kind with a heading.
-    `first` has the results of the run that `DEFAULTS` specifies. `titles` has the names of the
-    cases, and `programs` the names of the programs.
+    defects, readings (of doubtful cards) and conjectures (about missing cards) that a visitor can
+    switch on or off, each kind with a heading. `first` has the results of the run that `DEFAULTS`
+    specifies. `titles` has the names of the cases, and `programs` the names of the programs.
     """
     given = data()
     kinds = [
@@ -59,7 +59,10 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the data, as JSON values, with which the page's script runs any case and program."""
+    """Return the JSON values with which the script of a web page runs any case and program.
+
+    The page, the laboratory, runs the programs of the thesis in the browser.
+    """
     return {
         "scenes": [requested_scene(case_scene(number)) for number in case_numbers()],
         "headings": {number: _described(case_scene(number)) for number in case_numbers()},
@@ -92,11 +95,11 @@ def _described(scene: Scene) -> list[str]:
 
 
 def _first() -> dict[str, Any]:
-    """Return the values with which the page shows the run that `DEFAULTS` specifies.
+    """Return the values with which the web page shows the run that `DEFAULTS` specifies.
 
-    They include how the run ended, its first and last rows, and the largest error of omega (rad/s)
-    against the reference solution. They also include the page that the program prints, and the
-    command that repeats the run.
+    The values include how the run ended, its first and last rows, and the largest error of omega
+    (rad/s) against the reference solution. They also include the page that the program prints, and
+    the command that repeats the run.
     """
     scene = case_scene(DEFAULTS["case"])
     program = DEFAULTS["program"]
@@ -119,11 +122,12 @@ def _first() -> dict[str, Any]:
 
 
 def _row(run: Trajectory, number: int, error: float) -> list[str]:
-    """Return the cells of the row for one step, as texts, in the table of results.
+    """Return the cells of the row for one step, as texts, in the table of a program's results.
 
     `number` is the index of the step, from 0. The cells are the number of the step, the time (s),
-    omega (rad/s), the translational velocity (m/s), the variable TIME of the program (s), IER, and
-    `error`, the error of omega (rad/s).
+    omega (rad/s), the translational velocity (m/s), and the variable TIME of the program (s). The
+    cell for IER, an error code of the collocation programs, is empty. The last cell is `error`, the
+    error of omega (rad/s).
     """
     assert run.velocity is not None
     values = [run.time[number], *run.omega[number], *run.velocity[number]]

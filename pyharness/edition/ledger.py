@@ -22,10 +22,10 @@ from pyharness.views import html
 
 
 class SentenceVerdicts(NamedTuple):
-    """A sentence of the thesis with the verdicts on the claims that it makes.
+    """A sentence of the thesis with our verdicts on the claims that the sentence makes.
 
-    `judged` has a judgement, with its verdicts, for each of these claims. `anchor` is the anchor of
-    the sentence in the page.
+    `judged` has, for each of these claims, a judgement: our verdicts for the original and for the
+    corrected programs. `anchor` is the anchor of the sentence in the page.
     """
 
     sentence: Sentence
@@ -39,16 +39,18 @@ class SentenceVerdicts(NamedTuple):
 
 
 def judgements() -> list[Judgement]:
-    """Return the judgement, with our verdicts, of every claim of the thesis."""
+    """Return our verdicts on every claim of the thesis, for the original and corrected programs.
+
+    A `Judgement` has the verdicts on one claim.
+    """
     return [judgement(entry["id"]) for entry in claims()]
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
     """Return, for each verdict, the numbers of claims about results that received the verdict.
 
-    `judged` has the judgements of all claims; only claims of the kind `result` are counted. The
-    first number is for the original programs, the
-    second for the corrected programs.
+    `judged` has our verdicts on all claims of the thesis; only claims of the kind `result` are
+    counted. The first number is for the original programs, the second for the corrected programs.
     """
     judged = [each for each in judged if each.claim["kind"] == "result"]
     found: dict[str, tuple[int, int]] = {}
@@ -64,7 +66,10 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def kinds(judged: Sequence[Judgement]) -> Markup:
-    """Return an HTML table: how often each verdict occurs in `judged`, by kind of claim."""
+    """Return an HTML table with the number of times that each verdict occurs, by kind of claim.
+
+    `judged` has our verdicts on the claims of the thesis.
+    """
     return Markup(html.table(kinds_table(judged), "verdicts by kind of claim"))
 
 
@@ -82,7 +87,8 @@ def account() -> dict[str, Markup]:
 def context(judged: Sequence[Judgement]) -> dict[str, Any]:
     """Return the data of the claims page: the tables, each claim in detail, and the evidence.
 
-    `judged` has the judgements of all claims. The values are HTML or judgements with HTML.
+    `judged` has our verdicts on all claims of the thesis. The values are HTML, except for a list of
+    pairs of a judgement (verdicts on a claim) and its HTML.
     """
     table = claims_report(judged).data
     assert table is not None
@@ -103,8 +109,9 @@ def context(judged: Sequence[Judgement]) -> dict[str, Any]:
 def apparatus() -> list[tuple[dict[str, Any], Markup]]:
     """Return each entry of the critical apparatus with its report as HTML.
 
-    If the entry is a defect, reading or conjecture, the report shows its effect on the results in
-    every case.
+    The apparatus lists defects of the programs, readings of doubtful cards, conjectures about
+    missing cards, and other findings. If an entry can be switched on and off in the programs, the
+    report shows its effect on the results in every case.
     """
     found = []
     for entry in entries():
@@ -116,9 +123,9 @@ def apparatus() -> list[tuple[dict[str, Any], Markup]]:
 
 
 def thesis(judged: Iterable[Judgement]) -> dict[str, list[SentenceVerdicts]]:
-    """Return, by section of the thesis, its sentences with the verdicts on their claims.
+    """Return, by section of the thesis, its sentences with our verdicts on their claims.
 
-    `judged` has the judgements of all claims. Sections and sentences are in the thesis's order.
+    `judged` has the verdicts on all claims. Sections and sentences are in the thesis's order.
     """
     by_name = {each.claim["id"]: each for each in judged}
     found: dict[str, list[SentenceVerdicts]] = {}

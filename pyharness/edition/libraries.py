@@ -12,7 +12,10 @@ LIBRARIES = (
 
 
 def check_libraries() -> None:
-    """Raise InputError, with the command that installs the libraries, if one of them is missing."""
+    """Raise InputError if a third-party library that writes the web pages is missing.
+
+    The error message has the command that installs the libraries.
+    """
     for name in LIBRARIES:
         try:
             import_module(name)

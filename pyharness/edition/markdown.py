@@ -26,7 +26,10 @@ class Part(NamedTuple):
 
 
 class Document(NamedTuple):
-    """A rendered document: its title, its HTML without the title, and its text by heading."""
+    """A rendered Markdown document: its title, its HTML without the title, and its parts.
+
+    `parts` has the plain text under each heading.
+    """
 
     title: str
     html: Markup
@@ -36,9 +39,10 @@ class Document(NamedTuple):
 def document(text: str, link: Callable[[str], str | None]) -> Document:
     """Render the Markdown text of a document, whose first line is its title, as HTML.
 
-    `link` maps the target of a link or picture in the text to a link of the site. It returns None
-    if the site does not have the target: a link then becomes plain text. Raise ValueError if the
-    site does not have a picture.
+    The result has the title, the HTML, and the plain text by heading. `link` maps the target of a
+    link or picture in the text to a link of the web site. It returns None if the site does not have
+    the target: a link then becomes plain text. Raise ValueError if the site does not have a
+    picture.
     """
     tokens = _parser().parse(text)
     for token in _all(tokens):
@@ -65,7 +69,11 @@ def inline(text: str) -> Markup:
 
 
 def formula(tex: str, display: bool = False) -> Markup:
-    """Return a LaTeX formula, `tex`, as MathML; if `display` is true, for a separate line."""
+    """Return the LaTeX formula `tex` as MathML.
+
+    If `display` is true, the formula is displayed on a line of its own; otherwise it is part of a
+    line of text.
+    """
     from latex2mathml.converter import convert
 
     return Markup(convert(tex, display="block" if display else "inline"))
@@ -136,7 +144,7 @@ def slug(title: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return a line of Markdown as plain text."""
+    """Return a line of Markdown as plain text, without formatting characters and link targets."""
     return re.sub(r"[`*$\\]", "", re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text))
 
 

@@ -13,18 +13,21 @@ _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 
 
 def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return the JSON record of a site: the build that wrote it, and its files' sizes in bytes.
+    """Return the JSON record of the web site that the command `pyharness edition` writes.
 
-    `content` maps the path of each file to its content.
+    The key `build` has the versions, compiler and flags of the installation that wrote the site.
+    The key `files` has the size of each file in bytes, by its path. `content` maps the path of each
+    file to its content.
     """
     return {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
 
 
 def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Return the report of the verb `edition`: the number and size (kB) of files, by type.
+    """Return the report of the command `pyharness edition`, which writes the project's web site.
 
-    `folder` is the folder to which the site was written. `content` maps the path of each file to
-    its content. The type of a file is the suffix of its name.
+    The report has the number and the total size (kB) of the files of each type, which is the suffix
+    of the file name. `folder` is the folder to which the site was written. `content` maps the path
+    of each file to its content.
     """
     sizes: dict[str, list[int]] = {}
     for name, each in content.items():

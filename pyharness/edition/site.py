@@ -48,7 +48,10 @@ _DECKS = {"two-term": "Two-term collocation", "four-term": "Four-term collocatio
 
 
 class Found(NamedTuple):
-    """An entry of the search index: a link to a place in a page, its title, its kind, its text."""
+    """An entry of the web site's search index, which describes a place in a page.
+
+    `href` is the link to the place. `kind` is, for example, ``claim`` or ``figure``.
+    """
 
     href: str
     title: str
@@ -57,10 +60,12 @@ class Found(NamedTuple):
 
 
 class Page(NamedTuple):
-    """A page of the site, before it is rendered.
+    """A page of the web site, before it is rendered as HTML.
 
-    `template` is the name of the page's template, and `context` has the values for the template.
-    `found` has the entries of the search index that link to the page.
+    `path` is the path of the page in the site. `template` is the name of the page's template, and
+    `context` has the values for the template. `found` has the entries of the search index that link
+    to the page. `menu` is the path of the menu entry to highlight; if it is empty, the page's own
+    path is used.
     """
 
     path: str
@@ -72,11 +77,12 @@ class Page(NamedTuple):
 
 
 def build_site(progress: Progress = no_progress, docs: Path | None = None) -> dict[str, bytes]:
-    """Compute all results, and return the content of each file of the site by its path.
+    """Compute the results that the web site shows, and return all files of the site.
 
-    `progress` is called before each of five parts of the work, with the number of completed parts,
-    the number of all parts, and the name of the part. `docs` is the folder of the documents, by
-    default the folder of the checkout.
+    The result maps the path of each file to its content. `progress` is called before each of five
+    parts of the work. Its arguments are the number of completed parts, the number of all parts, and
+    the name of the part. `docs` is the folder of the documents, by default the folder `docs` of the
+    checkout.
     """
     docs = docs or documents.documents_folder()
     progress(0, 5, "figures")
@@ -210,8 +216,8 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
 def script(name: str, value: Any) -> bytes:
     """Return a JavaScript file that assigns `value`, as JSON, to the global variable `name`.
 
-    The data of the site are in scripts, because a page that is opened from a file can't load JSON
-    files.
+    The data of the web site are in scripts, because a page that is opened without a web server
+    can't load JSON files.
     """
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     return f"window.{name}={text};\n".encode()

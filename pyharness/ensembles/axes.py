@@ -39,8 +39,9 @@ _SAMPLE = "sample"
 class Axis:
     """One axis of a sweep's grid: a field of the scene or of the solver, and the field's values.
 
-    Axes with the same dimension vary together. This means that the scenes with index i along the
-    dimension have value i of each of these axes.
+    A sweep solves a grid of scenes, which are rigid-body problems. Axes with the same dimension
+    vary together. This means that the scenes with index i along the dimension have value i of each
+    of these axes.
 
     Attributes
     ----------
@@ -69,11 +70,11 @@ class Axis:
 
     @property
     def is_choice(self) -> bool:
-        """Return whether the values are names, for example of programs, and not numbers."""
+        """Return whether the values of the axis are names, for example of programs, not numbers."""
         return self.field in CHOICES
 
     def coordinates(self) -> NDArray[Any]:
-        """Return all values of the axis, as floats in the unit of its field, or as names.
+        """Return all values of the axis: names, or floats in the unit of the varied quantity.
 
         The array has shape (count,). It is cached, so callers must not change it.
         """
@@ -121,7 +122,8 @@ def _drawn(axis: Axis) -> Floats:
 def _between(first: float, last: float, made: Callable[[float, float], Floats]) -> Floats:
     """Return ``made(first, last)``, but without an overflow if `last - first` is not finite.
 
-    `made` is a function that returns values between two ends, `first` and `last`.
+    `made` is a function that returns values between two ends, for example evenly spaced values. If
+    the difference overflows, `made` is called with halved ends, and its values are doubled.
     """
     if math.isfinite(last - first):
         return made(first, last)
@@ -132,10 +134,12 @@ def _between(first: float, last: float, made: Callable[[float, float], Floats]) 
 
 
 def axis_of(table: object, number: int) -> Axis:
-    """Return the axis that a table [[axis]] of a sweep file describes.
+    """Return the axis of a sweep's grid that a table [[axis]] of a sweep file describes.
 
-    `number` is the number of the table in the file, counted from 1; error messages name it. Raise
-    InputError if a key of the table is missing, or has a value that is not allowed.
+    A sweep solves a grid of scenes; an axis is a quantity that varies along the grid, with its
+    values. `table` is the table as read from the TOML file. `number` is its number in the file,
+    counted from 1; error messages name it. Raise InputError if a key of the table is missing, or
+    has a value that is not allowed.
     """
     where = f"[[axis]] {number}"
     if not isinstance(table, dict):
@@ -221,11 +225,12 @@ def _refuse(where: str, table: dict[str, Any], chosen: str, keys: Iterable[str])
 
 
 def _checked(where: str, axis: Axis) -> Axis:
-    """Return `axis` itself; raise InputError if its field does not allow its extreme values.
+    """Return `axis` unchanged; raise InputError if its extreme values are not allowed.
 
-    The extreme values are the smallest and the largest of the listed or normally distributed
-    values; for other axes they are the ends of the range. The distribution `sphere` is not checked.
-    `where` is the beginning of the error message.
+    The field, which is the quantity that varies along the axis, determines the allowed values. The
+    extreme values are the smallest and the largest of the listed or normally distributed values;
+    for other axes they are the ends of the range. The distribution `sphere` is not checked. `where`
+    is the beginning of the error message.
     """
     field = NUMBERS[axis.field]
     if axis.how == "sphere":

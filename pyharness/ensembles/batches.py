@@ -19,9 +19,11 @@ Columns = dict[str, Array]
 def listing_of(program: str, listing: str, reading: str) -> Listing:
     """Return the listing of a program that the fields `listing` and `reading` of a sweep describe.
 
-    `listing` is ``original`` or ``corrected``, or ``fix:`` or ``keep:`` followed by the names of
-    defects to correct or to keep, joined by ``+``. `reading` is ``adopted``, or the names of the
-    readings to activate, joined by ``+``. Raise InputError for an unknown name.
+    A listing is a program with a choice of its defects and readings (interpretations of doubtful
+    cards). `listing` is ``original`` (all defects), ``corrected`` (no defect), ``fix:`` with the
+    only defects to correct, or ``keep:`` with the only defects to keep. `reading` is ``adopted``,
+    or the names of readings to activate that this edition does not adopt. Several names are joined
+    by ``+``. Raise InputError for an unknown name.
     """
     how, _, names = listing.partition(":")
     readings = [] if reading == "adopted" else reading.split("+")
@@ -33,9 +35,10 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 
 
 def looped_fields(sweep: Sweep) -> list[str]:
-    """Return the fields on the sweep's axes that must have one value for all scenes of a batch.
+    """Return the names of the varied quantities that are equal in all scenes of a batch.
 
-    `batches` makes a batch for each combination of the values of these fields.
+    A sweep solves a grid of scenes. A batch is a set of scenes that are solved in one call. The
+    function `batches` makes a batch for each combination of the values of these quantities.
     """
     fields = [axis.field for axis in sweep.axes]
     found = [name for name in fields if name in CHOICES or NUMBERS[name].looped]
@@ -44,11 +47,11 @@ def looped_fields(sweep: Sweep) -> list[str]:
 
 
 def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch]]:
-    """Yield batches that contain all selected scenes, each with the positions of its scenes.
+    """Divide selected scenes of a sweep into batches, each solved in one call, and yield them.
 
-    `where` selects the scenes. It has an array for each dimension of the grid: the index of every
-    selected scene along this dimension. The positions, which precede the batch, are indices into
-    these arrays.
+    `where` selects the scenes. It has an array for each dimension of the sweep's grid: the index of
+    every selected scene along this dimension. Each item is a pair of arrays of positions and a
+    batch. The positions are the indices, into the arrays of `where`, of the scenes in the batch.
     """
     columns = value_columns(sweep, where)
     looped = looped_fields(sweep)
@@ -86,10 +89,11 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
 
 
 def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | None:
-    """Return the components of a quantity for n scenes, shape (n, 3); None if no axis varies them.
+    """Return the three components of a quantity in n scenes, shape (n, 3), or None.
 
-    `name` is the quantity, such as ``omega``, whose first component is the field ``omega.1``. `own`
-    has the values of the scenes by field. `base` has the values of components that no axis varies.
+    None means that no axis of the sweep varies a component. `name` is the quantity, such as
+    ``omega``, whose components are ``omega.1`` to ``omega.3``. `own` maps the name of each varied
+    component to its n values. `base` has the values of the components that do not vary.
     """
     fields = [f"{name}.{axis}" for axis in (1, 2, 3)]
     if not any(field in own for field in fields):
@@ -101,9 +105,10 @@ def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
     """Return the kind of numbers that describe the bodies of n scenes, and these numbers.
 
-    The kind is `moments` (kg m2) or `coefficients` (A, B, C of Euler's equations). The numbers have
-    the shape (n, 3). `scene` is the scene of the sweep, and `own` has the values of the n scenes by
-    field. If no axis varies the body, the kind is empty and the numbers are None.
+    The kind is `moments` (of inertia, kg m2) or `coefficients` (A, B, C of Euler's equations). The
+    numbers have the shape (n, 3). `scene` has the values that do not vary between the scenes. `own`
+    maps the name of each varied quantity to its n values. If the body does not vary, the kind is
+    empty and the numbers are None.
     """
     if scene.coefficients is not None:
         found = _three("body.coefficients", scene.coefficients, own, n)
@@ -148,9 +153,10 @@ def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
 def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) -> Array:
     """Return unit vectors, shape (n, 3), given by two angles relative to the body's principal axes.
 
-    `tilt` (rad) is the angle from the axis of the middle moment. `azimuth` (rad) is the angle about
-    this axis, from the axis of the least moment. `moments` are the moments of the n bodies, shape
-    (n, 3); if None, all scenes have the body of `scene`.
+    `tilt` (rad) is the angle from the axis of the middle moment of inertia. `azimuth` (rad) is the
+    angle about this axis, from the axis of the least moment towards the axis of the largest.
+    `moments` are the moments of the n bodies, shape (n, 3); if None, all scenes have the body of
+    `scene`.
     """
     bodies = np.array([scene.moments]) if moments is None else moments
     order = np.broadcast_to(np.argsort(bodies, axis=1, kind="stable"), (len(tilt), 3))

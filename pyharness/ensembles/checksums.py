@@ -18,11 +18,18 @@ _PIECE = 1 << 20  # bytes read at once
 
 
 class DamageError(Exception):
-    """The error that a file of a store is not as it was written; the message names the damage."""
+    """The error that a file in a store, the folder with a sweep's results, is not as written.
+
+    The message names the file and the damage.
+    """
 
 
 class Label(NamedTuple):
-    """The identity of a store: its format, and the pyharness version and sweep that made it."""
+    """The identity of a store, which is the folder with the results of a sweep.
+
+    The identity has the number of the store's format, the version of pyharness that made the store,
+    and the SHA-256 of the sweep.
+    """
 
     schema: object  # number of the store's format; an integer if pyharness wrote the store
     version: str  # of pyharness
@@ -31,6 +38,9 @@ class Label(NamedTuple):
 
 def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], limit: int) -> bytes:
     """Return the content of a file of checksums, computed from the present files of a store.
+
+    A store is the folder with the results of a sweep. The content is text for ``sha256sum
+    --check``; its first line states `label` and `part`.
 
     Parameters
     ----------
@@ -61,10 +71,12 @@ def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], l
 def check_files(
     label: Label, part: str, folder: Path, names: Sequence[str], limit: int, checksums: str
 ) -> None:
-    """Raise DamageError if files of a store differ from their checksums in the file `checksums`.
+    """Raise DamageError if files of a store differ from the checksums that were recorded for them.
 
-    `checksums` is the path of the file of checksums in the store. The other arguments are the same
-    as those of `checksum_text`, which made the content of this file.
+    A store is the folder with the results of a sweep. `checksums` is the path of the file of
+    checksums in the store. The other arguments are the same as those of `checksum_text`, which made
+    this file: the store's identity, the part of the store, the folder, the paths of the files, and
+    their largest size (bytes).
     """
     found = checksum_text(label, part, folder, names, limit)
     known = read_bounded(folder, checksums, 2 * len(found))
@@ -77,7 +89,7 @@ def check_files(
 
 
 def read_bounded(folder: Path, name: str, limit: int) -> bytes:
-    """Return the content of the file `name` of a store.
+    """Return the content of the file `name` in the folder `folder` of a store (a sweep's results).
 
     Raise DamageError if the file is missing, is no regular file, or has more than `limit` bytes.
     """
@@ -105,10 +117,10 @@ def _digest(folder: Path, name: str, limit: int) -> str:
 
 
 def _opened(folder: Path, name: str, limit: int) -> int:
-    """Open the file `name` of a store for reading, and return its file descriptor.
+    """Open the file `name` in a store (the folder of a sweep's results), and return its descriptor.
 
-    Raise DamageError if the file is missing, is a folder, a device or a pipe, or has more than
-    `limit` bytes.
+    The file descriptor is for reading. Raise DamageError if the file is missing, is a folder, a
+    device or a pipe, or has more than `limit` bytes.
     """
     try:
         # Without O_NONBLOCK, opening a pipe waits for a writer.
@@ -134,9 +146,10 @@ def _opened(folder: Path, name: str, limit: int) -> int:
 
 
 def exists(folder: Path, name: str) -> bool:
-    """Return whether the path `name` exists in a store, whose folder is `folder`.
+    """Return whether the path `name` exists in `folder`, the folder of a sweep's results.
 
-    Raise DamageError if this can't be determined.
+    A link without a target counts as existing. Raise DamageError if an error of the file system
+    prevents the test.
     """
     try:
         os.lstat(folder / name)
@@ -148,10 +161,10 @@ def exists(folder: Path, name: str) -> bool:
 
 
 def clear(folder: Path, name: str) -> None:
-    """Remove any file or folder at the path `name` in a store, so that a file can be written there.
+    """Remove any file or folder at the path `name` in `folder`, so that a file can be written.
 
-    A file in the place of one of the parent folders of `name` is removed too. If a link is at the
-    path, the link is removed, but not its target.
+    `folder` is the folder of a sweep's results. A file in the place of one of the parent folders of
+    `name` is removed too. If a link is at the path, the link is removed, but not its target.
     """
     path = folder
     for part in Path(name).parts[:-1]:
@@ -166,7 +179,11 @@ def clear(folder: Path, name: str) -> None:
 
 
 def place(folder: Path, name: str, content: bytes) -> None:
-    """Write `content` to the file `name` of a store atomically, so that it is never incomplete."""
+    """Write `content` to the file `name` in `folder`, so that the file is never incomplete.
+
+    `folder` is the folder of a sweep's results. The content is written to a temporary file, which
+    is then renamed.
+    """
     path = folder / name
     path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_name(f"{path.name}.{os.urandom(8).hex()}.partial")

@@ -12,10 +12,11 @@ from multiprocessing import connection, resource_tracker
 
 @contextlib.contextmanager
 def deaf_children() -> Iterator[None]:
-    """Block Ctrl-C (SIGINT) in all processes and threads that this thread starts in this context.
+    """Block Ctrl-C (SIGINT) in all processes and threads that are started within this context.
 
     A terminal sends SIGINT to all of its processes, but only the parent process is to handle the
-    signal. If a signal arrives during the context, this thread receives it when the context ends.
+    signal. The signal is also blocked in the thread that enters the context. If a signal arrives
+    during the context, this thread receives it when the context ends.
     """
     # Children inherit the blocking of a signal. The resource tracker is started before, because
     # Python would otherwise start it with the first child, and would then unblock the signal.
@@ -31,8 +32,8 @@ def _start_tracker() -> None:
     """Start Python's resource tracker so that it does not warn about leftover semaphores.
 
     The tracker is a process that removes semaphores that other processes have not removed. After
-    Ctrl-C the tracker ends later than this process, and its warnings would follow this process's
-    last line.
+    Ctrl-C the tracker ends later than this process. Its warnings would then be printed after the
+    last line of this process.
     """
     warning = "ignore:resource_tracker"
     sys.warnoptions.append(warning)
@@ -43,7 +44,11 @@ def _start_tracker() -> None:
 
 
 def end_with_parent() -> None:
-    """End this process as soon as its parent process has ended, for any reason."""
+    """Start a thread that ends this process as soon as its parent process has ended.
+
+    The reason for the end of the parent process does not matter. A process without a parent process
+    starts no thread.
+    """
     parent = multiprocessing.parent_process()
     if parent is None:
         return

@@ -6,11 +6,12 @@ from pyharness.ensembles.sweep import Arrays, Indices, Sweep, points
 
 
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
-    """Solve all scenes of a chunk, and return the values of each reduction by its name.
+    """Solve all scenes of a chunk of a sweep, and return the values of each reduction by its name.
 
-    `chunk` is the number of the chunk, from 0. Each array has the shape of the chunk, and one more
-    dimension if the reduction has several components. Every executor calls this function for each
-    chunk.
+    A chunk is a block of the sweep's grid of scenes, and a reduction is a quantity that is stored
+    for each scene. `chunk` is the number of the chunk, from 0. Each array has the shape of the
+    chunk, and one more dimension if the reduction has several components. All executors (this
+    process, other processes, or a Dask cluster) call this function for each chunk.
     """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)
@@ -21,9 +22,9 @@ def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
 def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
     """Solve selected scenes of a sweep, and return the values of each reduction by its name.
 
-    `where` selects the scenes. It has an array for each dimension of the grid: the index of every
-    selected scene along this dimension. The first dimension of each returned array runs over the
-    selected scenes.
+    A reduction is a quantity that is stored for each scene. `where` selects the scenes. It has an
+    array for each dimension of the sweep's grid: the index of every selected scene along this
+    dimension. The first dimension of each returned array runs over the selected scenes.
     """
     n = len(where[0])
     found = {asked.name: empty(asked, n) for asked in sweep.reductions}

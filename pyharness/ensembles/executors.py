@@ -33,11 +33,12 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(
 
 
 class Engine(NamedTuple):
-    """A started executor: its number of workers, and a function that computes chunks.
+    """A started executor: its number of workers, and a function that computes chunks of a sweep.
 
-    The function `computed` takes a sweep and the numbers of the chunks to compute. For each
-    chunk it yields the number of the chunk, and the arrays of the chunk by the name of the
-    reduction. The chunks are in the order in which they are completed.
+    An executor is this process, other processes, or a Dask cluster; a chunk is a block of the
+    sweep's grid of scenes. The function `computed` takes a sweep and the numbers of the chunks to
+    compute. As soon as a chunk is completed, the function yields its number and its results. The
+    results are an array for each reduction (quantity to store), by name.
     """
 
     workers: int
@@ -49,13 +50,13 @@ class Engine(NamedTuple):
 def engine(
     executor: str, workers: int | None = None, address: str | None = None
 ) -> Iterator[Engine]:
-    """Start the executor `executor`, yield its engine, and end it when the context ends.
+    """Start an executor, which computes the parts of a sweep, and yield it as an `Engine`.
 
-    `executor` is one of `EXECUTORS`. `workers` is the number of processes, by default the number of
-    processors. `address` is the address of a Dask scheduler; without it, the executor `dask` starts
-    a cluster on this machine. Raise InputError if no scheduler with a worker answers at the
-    address. The iterator over the results raises InputError if no process or worker is left to
-    compute them.
+    The executor ends when the context ends. `executor` is ``here`` (this process), ``processes`` or
+    ``dask``. `workers` is the number of processes, by default the number of processors. `address`
+    is the address of a Dask scheduler; without it, the executor `dask` starts a cluster on this
+    machine. Raise InputError if no scheduler with a worker answers at the address. The iterator
+    over the results raises InputError if no process or worker is left to compute them.
     """
     if executor == "here":
         yield Engine(1, _here, is_here=True)
@@ -145,9 +146,10 @@ def _client(workers: int, address: str | None) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
-    """Yield a client of a new Dask cluster on this machine with `workers` processes.
+    """Start a Dask cluster with `workers` processes on this machine, and yield a client of it.
 
-    `dask` is the module `distributed`. Ctrl-C works while the cluster starts.
+    The cluster ends when the context ends. `dask` is the module `distributed`. Ctrl-C works while
+    the cluster starts.
     """
     started: list[Any] = []
     errors: list[Exception] = []
@@ -228,11 +230,12 @@ async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
 
 
 def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
-    """Yield the number and the arrays of each chunk as soon as a Dask cluster has computed it.
+    """Yield the number and the results of each chunk as soon as a Dask cluster has computed it.
 
-    `client` is a client of the cluster, and `chunks` has the numbers of the chunks. More chunks are
-    submitted than there are workers, so that no worker is idle. If a worker dies, Dask computes its
-    chunks again on another worker.
+    A chunk is a block of the sweep's grid of scenes. Its results are arrays by the name of the
+    stored quantity. `client` is a client of the cluster, and `chunks` has the numbers of the
+    chunks. More chunks are submitted than there are workers, so that no worker is idle. If a worker
+    dies, Dask computes its chunks again on another worker.
     """
     dask: Any = import_module("distributed")
     n_threads = sum(client.nthreads().values())

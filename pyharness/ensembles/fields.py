@@ -15,7 +15,7 @@ CHOICES = {
 
 @dataclass(frozen=True)
 class Field:
-    """A number of a scene, or of its solver, that an axis of a sweep may vary.
+    """A number of a scene, or of its solver, that an axis of a sweep's grid of scenes may vary.
 
     `units` is the unit of the number and `title` its description. The function `takes` returns
     whether a value is allowed, and `allowed` describes the allowed values. If `looped`, all scenes
@@ -94,10 +94,13 @@ RIVALS = (
 
 
 def field_names() -> list[str]:
-    """Return the names of all fields that an axis may vary."""
+    """Return the names of all quantities of a scene or solver that an axis of a sweep may vary."""
     return [*NUMBERS, *CHOICES]
 
 
 def units_of(field: str) -> str:
-    """Return the unit of a field, or an empty string if the values of the field are names."""
+    """Return the unit of a field, which is a quantity that a sweep may vary.
+
+    The result is an empty string if the values of the field are names, for example of programs.
+    """
     return NUMBERS[field].units if field in NUMBERS else ""

@@ -32,10 +32,10 @@ _FILES = 20  # largest number of chunks that are solved, or written and read, fo
 class Estimate:
     """The expected cost of computing the missing chunks of a sweep.
 
-    `n_scenes` and `n_chunks` count the scenes and chunks of the whole sweep, and `n_missing` the
-    chunks to compute. `n_bytes` is the size of the missing chunks on disk, before compression.
-    `memory` is the memory that all workers need together, in bytes. `seconds` is the expected
-    duration (s).
+    A chunk is a block of the sweep's grid of scenes. `n_scenes` and `n_chunks` count the scenes and
+    chunks of the whole sweep, and `n_missing` the chunks to compute. `n_bytes` is the size of the
+    missing chunks on disk, before compression. `memory` is the memory that all workers need
+    together, in bytes. `seconds` is the expected duration (s).
     """
 
     n_scenes: int
@@ -47,11 +47,12 @@ class Estimate:
 
 
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
-    """Return the seconds to solve and write the missing chunks of a store, and to read all chunks.
+    """Return the seconds to solve and write the missing chunks of a sweep, and to read all chunks.
 
-    `n_missing` is the number of missing chunks, `path` the path of the store, and `own` the engine
-    that computes the chunks. If other processes compute the chunks, this process writes them at the
-    same time. In this case only the longer of the times to solve and to write counts.
+    A chunk is a block of the sweep's grid of scenes. `path` is the folder of the results,
+    `n_missing` the number of chunks that it lacks, and `own` the engine that computes them. If
+    other processes compute the chunks, this process writes them at the same time. In this case only
+    the longer of the times to solve and to write counts.
     """
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
@@ -60,10 +61,10 @@ def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
 
 
 def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
-    """Return the mean seconds to write and to read the files of one chunk of a store.
+    """Return the mean seconds to write and to read the files of one chunk (block) of a sweep.
 
-    The measurement uses a temporary store in the folder that contains the store `path`. Both times
-    are 0 if the files can't be written; the sweep itself then reports the error.
+    The measurement uses a temporary folder beside `path`, the folder of the sweep's results. Both
+    times are 0 if the files can't be written; the sweep itself then reports the error.
     """
     times = []
     try:
@@ -88,8 +89,9 @@ def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
 def _pattern(sweep: Sweep, chunk: int) -> Arrays:
     """Return arrays like the results of the chunk with the number `chunk`, but with random values.
 
-    Equal values would be compressed to almost nothing, so that the measured time would be too
-    short. The number of the chunk is the seed of the random values.
+    A chunk is a block of the sweep's grid of scenes. The arrays serve to measure the time to write
+    a chunk. Equal values would be compressed to almost nothing, so that the measured time would be
+    too short. The number of the chunk is the seed of the random values.
     """
     draw = np.random.default_rng(chunk)
     shape = tuple(part.stop - part.start for part in sweep.box(chunk))
@@ -103,7 +105,7 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def seconds_per_chunk(sweep: Sweep) -> float:
-    """Return the seconds to solve a chunk in this process.
+    """Return the seconds to solve a chunk, which is a block of a sweep's grid, in this process.
 
     They are computed from the measured time of sample scenes. If the result is below 0.2 s, whole
     chunks are measured instead.
@@ -124,7 +126,10 @@ def seconds_per_chunk(sweep: Sweep) -> float:
 
 
 def seconds_per_scene(sweep: Sweep) -> float:
-    """Return the mean seconds to solve a scene in this process, measured on samples of the grid."""
+    """Return the mean seconds to solve a scene of a sweep in this process.
+
+    The time is measured on samples of scenes that are evenly spread over the sweep's grid.
+    """
     seconds = math.nan
     # This call is not timed, because it imports the solver's modules.
     solve_points(sweep, spread(sweep, 1))
@@ -143,10 +148,10 @@ def seconds_per_scene(sweep: Sweep) -> float:
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """Return the indices of sampled scenes, changed so that many of the scenes share a batch.
 
-    `where` has the indices of the scenes: an array for each dimension of the grid, as the result.
-    All scenes of a batch must have the same value along some dimensions. Along these dimensions the
-    indices are changed to at most five distinct values. The batches of the sample therefore have
-    many scenes, as the batches of a chunk do.
+    A batch is a set of scenes that are solved in one call; they must have the same value along some
+    dimensions of the grid. `where` has the indices of the scenes: an array for each dimension, as
+    the result. Along those dimensions the indices are changed to at most five distinct values. The
+    batches of the sample then have many scenes, as in a real computation.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found = []

@@ -30,11 +30,11 @@ _ORDERS = 3.0
 
 
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
-    """Return the reduction (stored quantity) of a sweep that the picture shows.
+    """Return the reduction (quantity stored for each scene) of a sweep that the picture shows.
 
     It is the reduction `name`. If `name` is None, it is the first reduction with numerical values.
-    If the values of all reductions represent outcomes, as for `status`, it is the first reduction.
-    Raise InputError if the sweep has no reduction `name`.
+    If the values of all reductions are codes of outcomes, as for `status`, it is the first
+    reduction. Raise InputError if the sweep has no reduction `name`.
     """
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
@@ -44,11 +44,11 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 
 
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
-    """Return the picture of the values in a store of the reduction `asked`.
+    """Return the picture of the reduction `asked`, a quantity stored for each scene of a sweep.
 
-    The picture is a map over two dimensions of the grid. They are the last two dimensions with
-    several numbers that are not random. If there are fewer than two such dimensions, the picture is
-    a line or dots.
+    `store` has the values. The picture is a map over two dimensions of the sweep's grid. They are
+    the last two dimensions with several numbers that are not random. If there are fewer than two
+    such dimensions, the picture is a line or dots.
     """
     from matplotlib.figure import Figure
 
@@ -101,10 +101,11 @@ def _panels(
 ) -> list[Panel]:
     """Return the title, the indices and the values of each panel of the picture of a reduction.
 
-    `asked` is the reduction. `shown` names the dimensions of the grid that each panel shows, and
-    `axis_of` has an axis for every dimension. The title states the panel's values along the
-    remaining dimensions, and the component of the reduction. The indices, an array for each
-    dimension in `shown`, tell which values along this dimension are drawn.
+    `asked` is the reduction, a quantity stored for each scene of a sweep. `shown` names the
+    dimensions of the sweep's grid that each panel shows, and `axis_of` has an axis for every
+    dimension. The title states the panel's values along the remaining dimensions, and the component
+    of the reduction. The indices, an array for each dimension in `shown`, tell which values along
+    this dimension are drawn.
     """
     reduction = REDUCTIONS[asked.reduction]
     most = _MOST_PLACES if len(shown) == 2 else _MOST_DOTS

@@ -24,7 +24,7 @@ _NOT_YET = -1
 
 @dataclass(frozen=True)
 class Reduction:
-    """A quantity that a sweep can store for each scene, with its computation and requirements.
+    """A quantity that a sweep can store for each scene of its grid, and the way to compute it.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Reduction:
 
     @property
     def fill(self) -> Any:
-        """Return the value that marks a result not computed yet: NaN, or -1 for integers."""
+        """Return the value that marks a result not computed yet: NaN, or -1 in an integer array."""
         return np.nan if self.dtype == "f8" else _NOT_YET
 
 
@@ -261,16 +261,21 @@ REDUCTIONS = {
 
 
 def empty(asked: ReductionSpec, n: int) -> Found:
-    """Return an array for the values of the reduction `asked` in n scenes, all marked missing."""
+    """Return an array for the values of the reduction `asked` in n scenes, all marked missing.
+
+    A reduction is a quantity that a sweep stores for each scene. Missing values are NaN, or -1 in
+    an integer array. The shape is (n,), or (n, components) if the quantity has several components.
+    """
     reduction = REDUCTIONS[asked.reduction]
     shape = (n, len(reduction.labels)) if reduction.labels else (n,)
     return np.full(shape, reduction.fill, dtype=reduction.dtype)
 
 
 def reduced(asked: ReductionSpec, batch: Batch) -> Found:
-    """Compute the reduction `asked` for a batch; return an array with a row for each scene.
+    """Compute the reduction `asked`, a quantity to store, for each scene of a batch.
 
-    A row is a single value if the reduction has no labels.
+    Return an array with a row for each scene. A row is a single value if the quantity has only one
+    component.
     """
     given = {**dict(asked.parameters), "function": asked.function}
     # NumPy's warnings are suppressed, because infinities and NaN are valid results.

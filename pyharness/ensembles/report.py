@@ -27,7 +27,7 @@ _FLAGS = (*words("reduction value"), Column("scenes"))
 
 
 class Found(NamedTuple):
-    """Statistics, over all scenes of a sweep, of one component of a reduction (a stored quantity).
+    """Statistics of one component of a reduction, a quantity stored for each scene of a sweep.
 
     `name` is the name of the reduction, and `label` the name of the component. The label is empty
     if the reduction has only one component. `scenes` counts the scenes with a finite value, and
@@ -46,11 +46,11 @@ class Found(NamedTuple):
 
 
 def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
-    """Return statistics of the reduction `asked` over all scenes of a store, for each component.
+    """Return statistics of a stored quantity over all scenes of a sweep, for each component.
 
-    If the values are integers that represent outcomes, as for `status`, there are no statistics,
-    and the second result counts the scenes with each integer. For other reductions the second
-    result is empty. The values are read chunk by chunk.
+    `asked` is the quantity, and `store` has its values. If the values are integers that represent
+    outcomes, as for `status`, there are no statistics, and the second result counts the scenes with
+    each integer. For other quantities the second result is empty. The values are read in blocks.
     """
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)
@@ -89,8 +89,8 @@ def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[in
 def sweep_report(store: Store, outcome: Outcome, path: str) -> Report:
     """Return the report of a sweep: its axes, statistics of its results, and the work of this run.
 
-    `outcome` has the numbers of chunks that this run computed or repaired, and its duration. `path`
-    is the path of the store.
+    `outcome` counts the chunks (blocks of the sweep's grid) that this run computed or repaired, and
+    has its duration. `store` has the results; `path` is its folder.
     """
     sweep = store.sweep
     found: list[Found] = []

@@ -27,9 +27,10 @@ _MOST_CHUNKS = 1_000_000
 class Outcome:
     """The numbers of chunks that one run of a sweep computed, and its duration.
 
-    `estimate` is the forecast of the cost, or None if no chunk was missing. `before` counts the
-    chunks that the store had before the run. `computed` counts the chunks that the run computed,
-    which took `seconds` (s). `repaired` counts those computed chunks that had been damaged before.
+    A chunk is a block of the sweep's grid of scenes. `estimate` is the forecast of the cost, or
+    None if no chunk was missing. `before` counts the chunks that had been computed before the run.
+    `computed` counts the chunks that the run computed, which took `seconds` (s). `repaired` counts
+    those computed chunks whose files had been damaged.
     """
 
     estimate: Estimate | None
@@ -40,17 +41,17 @@ class Outcome:
 
 
 def bytes_per_scene(sweep: Sweep) -> int:
-    """Return the size in bytes of the results of one scene in the store, before compression."""
+    """Return the size in bytes of the results that a sweep stores for one scene, uncompressed."""
     return sum(empty(asked, 1).nbytes for asked in sweep.reductions)
 
 
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
     """Return the bytes that the missing chunks need on disk, and the memory (bytes) of all workers.
 
-    `missing` is the number of missing chunks, `path` the path of the store, and `workers` the
-    number of processes. Raise InputError if the free disk space or half of the machine's memory is
-    too small, or if there are too many chunks. The check allocates no arrays, so that even the
-    largest grid is refused at once.
+    A chunk is a block of the sweep's grid of scenes. `missing` is the number of missing chunks,
+    `path` the folder of the results, and `workers` the number of processes. Raise InputError if the
+    free disk space or half of the machine's memory is too small, or if there are too many chunks.
+    The check allocates no arrays, so that even the largest grid is refused at once.
     """
     n_bytes = sweep.n_scenes * bytes_per_scene(sweep) * missing // sweep.n_chunks
     shown = f"{short_count(sweep.n_scenes)} scenes in {short_count(sweep.n_chunks)} chunks"
@@ -95,8 +96,9 @@ def swept(
 ) -> Iterator[tuple[Store, Outcome]]:
     """Compute the missing chunks of a sweep, and yield the open store and the outcome of the run.
 
-    The parameters and errors are the same as those of `run_sweep`. Until the context ends, the
-    store is locked against other processes.
+    A chunk is a block of the sweep's grid, and the store is the folder of the results. The
+    parameters and errors are the same as those of `run_sweep`. Until the context ends, the store is
+    locked against other processes.
     """
     is_there = check_store(sweep, path)
     check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)
@@ -126,6 +128,8 @@ def run_sweep(
     repair: bool = False,
 ) -> Outcome:
     """Compute the chunks of a sweep that its store does not have yet, and return the outcome.
+
+    A chunk is a block of the sweep's grid of scenes, and the store is the folder of the results.
 
     Parameters
     ----------

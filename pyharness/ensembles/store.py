@@ -45,7 +45,7 @@ _REPAIR = "'pyharness sweep' with --repair"
 
 
 def check_zarr() -> None:
-    """Raise InputError if Zarr is not installed."""
+    """Raise InputError if the package Zarr, which stores the results of sweeps, is missing."""
     try:
         import zarr  # noqa: F401
     except ImportError:
@@ -53,7 +53,9 @@ def check_zarr() -> None:
 
 
 class Store:
-    """The open store of one sweep, a folder with an array for each reduction; made by `opened`.
+    """The open store (result folder) of one sweep; the context manager `opened` makes it.
+
+    A store has a Zarr array for each reduction, which is a quantity that is stored for each scene.
 
     Attributes
     ----------
@@ -66,7 +68,7 @@ class Store:
     """
 
     def __init__(self, sweep: Sweep, folder: Path) -> None:
-        """Open the arrays of the store of `sweep` in an existing folder."""
+        """Open the arrays of results in `folder`, the existing folder of a sweep's results."""
         import zarr
 
         self.sweep, self.folder, self.repaired = sweep, folder, 0
@@ -80,10 +82,10 @@ class Store:
         self._done = [False] * sweep.n_chunks
 
     def check(self, repair: bool = False) -> None:
-        """Find the chunks that are complete, and compare each of them with its checksums.
+        """Find the complete chunks of the store, and compare their files with their checksums.
 
-        Raise InputError if a chunk is damaged. With `repair`, remove the files of damaged chunks
-        instead, so that they are computed again.
+        A chunk is a block of the sweep's grid of scenes. Raise InputError if a chunk is damaged.
+        With `repair`, remove the files of damaged chunks instead, so that they are computed again.
         """
         damages = {}
         for chunk in range(self.sweep.n_chunks):
@@ -107,14 +109,14 @@ class Store:
         self.repaired = len(damages)
 
     def done(self) -> list[bool]:
-        """Return, for each chunk of the sweep, whether it is complete in the store."""
+        """Return for each chunk (block of the sweep's grid) whether its results are complete."""
         return list(self._done)
 
     def write(self, chunk: int, found: Arrays) -> None:
-        """Write the results of a chunk, and the checksums of the written files.
+        """Write the results of a chunk (block of the sweep's grid), and checksums of the files.
 
-        `found` has the array of results of each reduction by its name. Raise OSError if one of the
-        files can't be written; the chunk then remains incomplete.
+        `chunk` is the number of the chunk. `found` has an array for each stored quantity by its
+        name. Raise OSError if one of the files can't be written; the chunk then remains incomplete.
         """
         for name, array in self._arrays.items():
             array[self.sweep.box(chunk)] = found[name]
@@ -126,15 +128,24 @@ class Store:
         self._done[chunk] = True
 
     def read(self, name: str, chunk: int) -> Any:
-        """Return the part of the array of the reduction `name` that belongs to a chunk."""
+        """Return the values of the stored quantity `name` in a chunk, a block of the sweep's grid.
+
+        `chunk` is the number of the chunk.
+        """
         return self._arrays[name][self.sweep.box(chunk)]
 
     def array(self, name: str) -> Any:
-        """Return the Zarr array of the reduction `name`; indexing reads only the indexed part."""
+        """Return the Zarr array of the stored quantity `name`, without reading its values yet.
+
+        An index into the array reads only the indexed part.
+        """
         return self._arrays[name]
 
     def _is_done(self, chunk: int) -> bool:
-        """Return whether a chunk is complete; raise DamageError if its files are damaged."""
+        """Return whether the results of a chunk (block of the sweep's grid) are complete.
+
+        Raise DamageError if the files of the chunk are damaged.
+        """
         checksums = self._checksums(chunk)
         if exists(self.folder, checksums):
             check_files(*self._described(chunk), checksums)
@@ -163,11 +174,12 @@ class Store:
 
 @contextlib.contextmanager
 def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
-    """Make or open the store of a sweep, lock it against other processes, check it, and yield it.
+    """Make or open the store (result folder) of a sweep, lock it, check it, and yield it.
 
-    Raise InputError if the folder `path` is the store of another sweep, no store, or a damaged
-    store; its files are then not changed. With `repair`, damage is not an error: damaged chunks are
-    removed and count as not computed yet, and damaged metadata are written again.
+    The lock excludes other processes. Raise InputError if the folder `path` is the store of another
+    sweep, no store, or a damaged store; its files are then not changed. With `repair`, damage is
+    not an error: damaged chunks (blocks of the results) are removed and count as not computed yet,
+    and damaged metadata are written again.
     """
     check_zarr()
     folder = Path(path)
@@ -199,9 +211,10 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
 
 
 def check_store(sweep: Sweep, path: str) -> bool:
-    """Return whether `path` is the store of this sweep; return False if it is missing or empty.
+    """Return whether the folder `path` has the results of this sweep.
 
-    Raise InputError if `path` is any other file or folder, or if no store can be made at this path.
+    Return False if the folder is missing or empty. Raise InputError if `path` is any other file or
+    folder, or if no folder can be made at this path.
     """
     folder = Path(path)
     if not path or "\0" in path:
@@ -244,7 +257,7 @@ def check_store(sweep: Sweep, path: str) -> bool:
 
 
 def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
-    """Compare the metadata of the store in `folder` with their checksums.
+    """Compare the metadata in `folder`, the folder of a sweep's results, with their checksums.
 
     If they differ, raise InputError or, with `repair`, write the metadata of `sweep` again.
     """
@@ -264,9 +277,10 @@ def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
 
 
 def _make(sweep: Sweep, folder: Path) -> None:
-    """Make the store of a sweep under a temporary name, and then rename it to `folder`.
+    """Make a folder for the results of a sweep under a temporary name, and rename it to `folder`.
 
-    At any time, `folder` is therefore either a store with all of its metadata or missing.
+    At any time, `folder` is therefore either missing, or has all metadata of the sweep. It has no
+    results yet.
     """
     with filled(sweep, folder) as new:
         try:
@@ -281,9 +295,10 @@ def _make(sweep: Sweep, folder: Path) -> None:
 
 @contextlib.contextmanager
 def scratch(sweep: Sweep, path: str) -> Iterator[Store]:
-    """Yield a temporary store of a sweep without results, and remove it when the context ends.
+    """Yield a temporary store (result folder) of a sweep, without results.
 
-    The store is in the folder that contains `path`. It is used to measure the speed of the disk.
+    The store is in the folder that contains `path`, and is removed when the context ends. It is
+    used to measure the speed of the disk.
     """
     with filled(sweep, Path(path)) as new:
         yield Store(sweep, new)

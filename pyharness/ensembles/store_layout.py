@@ -35,15 +35,20 @@ _HEAD = re.compile(
 
 
 def label(sweep: Sweep) -> Label:
-    """Return the identity of the store that this version of pyharness makes for a sweep."""
+    """Return the identity of the store (result folder) that this pyharness makes for a sweep.
+
+    The identity has the number of the store's format, the version of pyharness, and the SHA-256 of
+    the sweep.
+    """
     return Label(SCHEMAS["sweep store"], version(), sweep.fingerprint)
 
 
 def labels(folder: Path) -> list[Label]:
-    """Return the identities that two files of the store in `folder` state, at most two.
+    """Return the identities that two files in `folder`, a folder of a sweep's results, state.
 
-    One identity is in the metadata, and one in the first line of the file with the checksums of the
-    metadata. An identity that can't be read is left out. In an undamaged store both are equal.
+    An identity is the format, the pyharness version and the SHA-256 of the sweep. One is in the
+    metadata, and one in the first line of the file with the checksums of the metadata. An identity
+    that can't be read is left out. In an undamaged folder both are equal.
     """
     found = []
     with contextlib.suppress(
@@ -62,9 +67,10 @@ def labels(folder: Path) -> list[Label]:
 
 
 def metadata_files(sweep: Sweep) -> list[str]:
-    """Return the paths of those files in the store of a sweep that belong to no chunk of results.
+    """Return the paths of the files, in the folder of a sweep's results, that have no results.
 
-    These files contain the metadata, the values of the axes, and the labels of components.
+    These files contain the metadata, the values of the axes, and the names of the components of
+    stored quantities.
     """
     labels = {
         reduction.dimension
@@ -81,10 +87,10 @@ def metadata_files(sweep: Sweep) -> list[str]:
 
 @contextlib.contextmanager
 def filled(sweep: Sweep, folder: Path) -> Iterator[Path]:
-    """Make a store without results in a temporary folder next to `folder`, and yield its path.
+    """Make a store (result folder of a sweep) without results, and yield its temporary path.
 
-    When the context ends, all files of the temporary folder that the caller has not moved are
-    removed.
+    The temporary folder is next to `folder`. When the context ends, all files of the temporary
+    folder that the caller has not moved are removed.
     """
     new = folder.absolute().with_name(f".pyharness-{os.urandom(8).hex()}-new")
     try:
@@ -176,6 +182,9 @@ def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> Non
 
 
 def largest_chunk(sweep: Sweep) -> int:
-    """Return an upper bound (bytes) of the size of any file of a chunk, compressed or not."""
+    """Return an upper bound (bytes) of the size of any file of a chunk, compressed or not.
+
+    A chunk is a block of the sweep's grid of scenes; it has a file for each stored quantity.
+    """
     scenes = math.prod(sweep.chunk_shape)
     return 65536 + 2 * scenes * max(empty(asked, 1).nbytes for asked in sweep.reductions)

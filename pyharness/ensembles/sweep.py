@@ -20,8 +20,8 @@ Indices = NDArray[np.int64]
 class ReductionSpec:
     """A reduction (quantity to store) that a sweep requests, with its parameters and array name.
 
-    `name` is the name of the array in the store, and `reduction` a key of `REDUCTIONS`. If the
-    reduction is `claim`, `function` names the function that checks the claim, as in
+    `name` is the name of the array with the results, and `reduction` a key of `REDUCTIONS`. If the
+    reduction is `claim`, `function` names the function that checks a claim of the thesis, as in
     ``package.module:name``; for other reductions it is empty.
     """
 
@@ -65,26 +65,30 @@ class Sweep:
 
     @property
     def dimensions(self) -> dict[str, int]:
-        """Return the name and length of each dimension of the grid, in the order of the file."""
+        """Return the length of each dimension of the grid of scenes, by name.
+
+        The order of the dimensions is the order of the axes in the sweep file.
+        """
         return {axis.dimension: axis.count for axis in self.axes}
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Return the number of scenes along each dimension of the grid."""
+        """Return the number of scenes along each dimension of the sweep's grid."""
         return tuple(self.dimensions.values())
 
     @property
     def n_scenes(self) -> int:
-        """Return the number of scenes of the whole grid."""
+        """Return the number of scenes of the whole grid of the sweep."""
         return math.prod(self.shape)
 
     @property
     def chunk_shape(self) -> tuple[int, ...]:
         """Return the number of scenes of a chunk along each dimension of the grid.
 
-        A chunk covers some of the last dimensions completely, and the dimension before them in
-        part. Along earlier dimensions it has length 1. It also has length 1 along dimensions of
-        programs, methods, listings or readings, so that all of its scenes have the same solver.
+        A chunk is a block of the grid that is computed and stored at once. It covers some of the
+        last dimensions completely, and the dimension before them in part. Along earlier dimensions
+        it has length 1. It also has length 1 along dimensions of programs, methods, listings
+        (versions of a program) or readings, so that all of its scenes have the same solver.
         """
         single = {axis.dimension for axis in self.axes if axis.is_choice}
         room = self.chunk
@@ -97,23 +101,27 @@ class Sweep:
 
     @property
     def chunk_counts(self) -> tuple[int, ...]:
-        """Return the number of chunks along each dimension of the grid."""
+        """Return the number of chunks (blocks of scenes) along each dimension of the grid."""
         return tuple(-(-n // c) for n, c in zip(self.shape, self.chunk_shape, strict=True))
 
     @property
     def n_chunks(self) -> int:
-        """Return the number of chunks of the whole grid."""
+        """Return the number of chunks (blocks of scenes) into which the whole grid is divided."""
         return math.prod(self.chunk_counts)
 
     def place(self, chunk: int) -> tuple[int, ...]:
-        """Return the index of a chunk along each dimension, counted in chunks from 0.
+        """Return the position of a chunk (block of scenes) along each dimension of the grid.
 
-        `chunk` is the number of the chunk in the whole grid, from 0.
+        A position is counted in chunks from 0. `chunk` is the number of the chunk in the whole
+        grid, from 0.
         """
         return tuple(int(each) for each in np.unravel_index(chunk, self.chunk_counts))
 
     def box(self, chunk: int) -> tuple[slice, ...]:
-        """Return the part of the grid that a chunk covers, as a slice of each dimension."""
+        """Return the part of the grid that a chunk (block of scenes) covers, a slice per dimension.
+
+        `chunk` is the number of the chunk in the whole grid, from 0.
+        """
         return tuple(
             slice(at * length, min(n, (at + 1) * length))
             for at, length, n in zip(self.place(chunk), self.chunk_shape, self.shape, strict=True)
@@ -121,7 +129,7 @@ class Sweep:
 
 
 def points(box: tuple[slice, ...]) -> list[Indices]:
-    """Return the indices of all scenes in a part of the grid, an array for each dimension.
+    """Return the indices of all scenes in a part of a sweep's grid, an array for each dimension.
 
     `box` is the part of the grid, a slice for each dimension. In the result, the index along the
     last dimension varies fastest.
@@ -131,7 +139,7 @@ def points(box: tuple[slice, ...]) -> list[Indices]:
 
 
 def spread(sweep: Sweep, count: int) -> list[Indices]:
-    """Return the indices of `count` scenes that are evenly spread over the grid.
+    """Return the indices of `count` scenes that are evenly spread over the grid of a sweep.
 
     The result has an array for each dimension of the grid. If there are two or more scenes, they
     include the first and the last scene of the grid.
@@ -149,10 +157,11 @@ def spread(sweep: Sweep, count: int) -> list[Indices]:
 
 
 def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]:
-    """Return the values of the axes of a sweep for selected scenes, by the field of the axis.
+    """Return the values of the varied quantities of a sweep in selected scenes, by quantity.
 
-    `where` selects the scenes. It has an array for each dimension of the grid: the index of every
-    selected scene along this dimension. Each array of the result has one value for each scene.
+    `where` selects the scenes. It has an array for each dimension of the sweep's grid: the index of
+    every selected scene along this dimension. The keys of the result are the fields of the axes, as
+    in ``omega.1``. Each array has one value for each scene.
     """
     at = dict(zip(sweep.dimensions, where, strict=True))
     return {axis.field: axis.coordinates()[at[axis.dimension]] for axis in sweep.axes}
@@ -161,8 +170,8 @@ def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
     """Group the indices 0 to n - 1 so that all columns have equal values at the indices of a group.
 
-    Each column has n values. For each group, return its indices in ascending order, and its values,
-    one from each column. Without columns there is one group.
+    Each column has n values. The result is a list with a pair for each group: its indices in
+    ascending order, and its values, one from each column. Without columns there is one group.
     """
     if not columns:
         return [(np.arange(n), ())]

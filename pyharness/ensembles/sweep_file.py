@@ -44,7 +44,7 @@ _WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
 
 
 def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = None) -> Sweep:
-    """Return the sweep that a TOML file describes.
+    """Return the sweep (a grid of scenes to solve) that a TOML file describes.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
     """Return the scene from which all scenes of a sweep are made, and the bytes of its scene file.
 
     `table` is the table [scene] of the sweep file, and `path` the path of the sweep file. The bytes
-    begin with an additional zero byte. They are empty if the table names no scene file.
+    are empty if the table names no scene file. Otherwise they begin with an additional zero byte.
     """
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
@@ -267,8 +267,9 @@ def _choices(sweep: Sweep, field: str, default: str | None) -> Iterable[str]:
 def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
     """Yield each combination of program, method, listing and reading that occurs on the axes.
 
-    A combination has the name of the program, method, ... by field. Axes with the same dimension
-    vary together.
+    A listing is a version of a program, and a reading an interpretation of doubtful cards. A
+    combination maps those of these fields that are on axes to their names. Axes with the same
+    dimension vary together.
     """
     words = [axis for axis in axes if axis.is_choice]
     counts = {axis.dimension: axis.count for axis in words}
@@ -280,7 +281,8 @@ def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
 def _check_solvers(sweep: Sweep) -> None:
     """Raise InputError if the sweep has an unknown program, method, listing or reading.
 
-    Also raise InputError if a method does not allow the tolerance, or if an end time `t_end` is 0.
+    A listing is a version of a program, and a reading an interpretation of doubtful cards. Also
+    raise InputError if a method does not allow the tolerance, or if an end time `t_end` is 0.
     """
     solver = sweep.solver
     for program in _choices(sweep, "program", solver.program):

@@ -28,9 +28,9 @@ class Effect:
     """The outcome of one listing on one scene: its largest errors, and how the run ended.
 
     A listing is a program with a choice of its defects. `omega` (rad/s) and `velocity`
-    (translational, m/s) are the largest errors of any component over the completed `steps`. `ended`
-    is how the run ended, as in `Trajectory`. `stop` is the variable and step at which the stop test
-    ended the run, or None.
+    (translational, m/s) are the largest errors of any component over the completed `steps`, against
+    the reference solution. `ended` is how the run ended, for example ``complete`` or ``overflow``.
+    `stop` is the variable and step at which the stop test ended the run, or None.
     """
 
     listing: Listing
@@ -45,10 +45,11 @@ class Effect:
 class CaseEffects:
     """The effect of one apparatus entry in one program and case, shown by four listings.
 
-    An entry of the critical apparatus describes, for example, one defect. The listings are the
-    original program, the original with this entry alone corrected, the corrected program with this
-    entry alone kept, and the corrected program. For a reading or a conjecture, `effects_of`
-    describes the listings.
+    An apparatus entry describes, for example, one defect of the printed programs. A listing is a
+    program with a choice of its defects. The four listings are the original program, the original
+    with this entry alone corrected, the corrected program with this entry alone kept, and the
+    corrected program. For an interpretation of a doubtful card, or an assumption where no card
+    exists, `effects_of` describes the listings.
     """
 
     program: str
@@ -62,7 +63,9 @@ class CaseEffects:
 def entries(kind: str | None = None) -> list[dict[str, Any]]:
     """Return the apparatus entries of one kind, as in `data/apparatus.toml`; None means all kinds.
 
-    `kind` is, for example, ``defect`` or ``reading``. Raise InputError if no entry has that kind.
+    An apparatus entry describes a doubtful or faulty passage of the printed programs. `kind` is,
+    for example, ``defect``, or ``reading`` (an interpretation of a doubtful card). Raise InputError
+    if no entry has that kind.
     """
     everything: list[dict[str, Any]] = facts("apparatus")["entry"]
     kinds = sorted({entry["kind"] for entry in everything})
@@ -72,7 +75,10 @@ def entries(kind: str | None = None) -> list[dict[str, Any]]:
 
 
 def entry(name: str) -> dict[str, Any]:
-    """Return the apparatus entry with the identifier `name`; raise InputError if none has it."""
+    """Return the apparatus entry with the identifier `name`; raise InputError if none has it.
+
+    An apparatus entry describes a doubtful or faulty passage of the printed programs.
+    """
     by_name = {each["id"]: each for each in entries()}
     if name not in by_name:
         raise unknown("entry", name, list(by_name))
@@ -82,8 +88,9 @@ def entry(name: str) -> dict[str, Any]:
 def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0) -> Effect:
     """Run a listing on a scene, and return its largest errors and how the run ended.
 
-    `truth` is the reference solution at the end of each step of the scene, with the translational
-    velocity. `effort` is a factor on the work limit.
+    A listing is a program with a choice of its defects. `truth` is the reference solution at the
+    end of each step of the scene, with the translational velocity. `effort` is a factor on the work
+    limit.
     """
     run = run_program(scene, listing, effort=effort)
     found = accuracy(scene, run, truth)
@@ -95,7 +102,8 @@ def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0
 def case_truth(case: int) -> Reference:
     """Return the reference solution of a case at the end of each step, with translational velocity.
 
-    The solution is computed once and cached.
+    `case` is the number of a case in Table 1 of the thesis. The solution is computed once and
+    cached.
     """
     scene = case_scene(case)
     return reference(scene, scene.times(), velocity=True)
@@ -104,11 +112,11 @@ def case_truth(case: int) -> Reference:
 def effects_of(name: str) -> Iterator[CaseEffects]:
     """Yield the effect of the apparatus entry `name` in each of its programs, case by case.
 
-    The entry must have a switch in the programs. A reading is an interpretation of a doubtful card,
-    and a conjecture an assumption where no card exists. For both, the listings of a `CaseEffects`
-    have another meaning. `original` and `corrected_alone` are the original listing with and without
-    the entry, and `kept_alone` and `corrected` are the corrected listing with and without it. No
-    listing has a reading by default.
+    The entry must have a switch in the programs. For a defect, `CaseEffects` describes the four
+    listings (versions of the program). A reading (interpretation of a doubtful card) and a
+    conjecture (assumption where no card exists) have other listings. `original` and
+    `corrected_alone` are the original listing with and without the entry, and `kept_alone` and
+    `corrected` are the corrected listing with and without it. No listing has a reading by default.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -137,9 +145,10 @@ def lattice(
     """Return the outcomes of a program with every subset of its defects, largest error first.
 
     The errors are of omega against the reference solution, and an overflow counts as infinite. The
-    subsets also include or omit each reading named in `readings` and, if the torque varies, the
-    conjectures of the original program. A reading has no effect on a corrected statement. `effort`
-    is a factor on the work limit.
+    subsets also include or omit each of the `readings` (interpretations of doubtful cards). If the
+    torque varies, they also include or omit the original program's conjectures (assumptions where
+    no card exists). A reading has no effect on a corrected statement. `effort` is a factor on the
+    work limit.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
@@ -151,8 +160,9 @@ def lattice(
 def switched(scene: Scene, program: str) -> tuple[str, ...]:
     """Return the names of the program's defects and conjectures that can affect a run on a scene.
 
-    Under a constant torque only defects can affect the run, because the conjectures are about
-    varying torques.
+    A conjecture is an assumption about a torque statement for which no card exists. Under a
+    constant torque only defects can affect the run, because the conjectures are about varying
+    torques.
     """
     return switches(program) if scene.torque.varies else names_of("defect", program)
 

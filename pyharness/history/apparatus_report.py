@@ -41,7 +41,8 @@ _HALF = 48  # width, in characters, of each of two texts printed side by side
 def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
     """Return the report of the critical apparatus, with a line for each entry.
 
-    A line has the name, kind, certainty, flag (number of the switch in the programs) and summary.
+    An entry describes a doubtful or faulty passage of the printed programs. Its line has the name,
+    kind, certainty, flag (number of the switch in the programs) and summary.
     """
     rows = [
         [each["id"], each["kind"], each["certainty"], each.get("flag", "-"), each["summary"]]
@@ -58,10 +59,11 @@ def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
 def entry_report(
     entry: dict[str, Any], effects: Sequence[CaseEffects], names: Sequence[str] = FIELDS
 ) -> Report:
-    """Return the report of one entry of the apparatus, and of its effect by program and case.
+    """Return the report of one entry of the critical apparatus, and of its effect on the errors.
 
-    `names` are the fields of the entry that are shown. `effects` has the effect for each program
-    and case, and is empty if no effect is to be shown.
+    An entry describes a doubtful or faulty passage of the printed programs. `names` are the fields
+    of the entry that are shown. `effects` has the effect for each program and case, and is empty if
+    no effect is to be shown.
     """
     cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
     what = {each["siglum"]: each["what"] for each in facts("cards/scan")["ground"]}
@@ -87,7 +89,7 @@ def entry_report(
 def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
     """Return lines with two of the `texts` side by side.
 
-    `heads` are the keys of the two texts, and also the headings above them.
+    `heads` are two arguments: the keys of the two texts, and also the headings above them.
     """
     columns = [[head, "-" * _HALF, *textwrap.wrap(texts[head], _HALF)] for head in heads]
     pairs = zip_longest(*columns, fillvalue="")
@@ -95,10 +97,12 @@ def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
 
 
 def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
-    """Return a table for each program with the errors and stops of four listings, by case.
+    """Return a legend, and for each program a table with the errors and stops of four listings.
 
-    `is_reading` is true if the entry is a reading or a conjecture. The legend then describes the
-    listings as original and corrected, each with and without the entry.
+    A listing is a version of the program; a table has a row for each case. `is_reading` is true if
+    the effects are those of an interpretation of a doubtful card, or of an assumption where no card
+    exists. The legend then describes the listings as original and corrected, each with and without
+    it.
     """
     columns = ("original", "this alone corrected", "this alone kept", "all corrected")
     if is_reading:
@@ -124,8 +128,9 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
 def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
     """Return the report of every subset of each program's defects, with the errors it causes.
 
-    `found` has, by program, the outcomes in the order in which the report shows them. The report
-    writes a subset as letters, one for each active defect, conjecture or reading.
+    `scene` is the scene that was run. `found` maps each program to its outcomes, in the order in
+    which the report shows them. The report writes a subset as letters: one for each active defect,
+    reading (interpretation of a doubtful card) or conjecture (assumption where no card exists).
     """
     text: list[Section] = []
     rows = []

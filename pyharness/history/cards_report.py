@@ -22,11 +22,11 @@ _HALF = 48  # width, in characters, of each of two texts printed side by side
 
 
 def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
-    """Return the report of `cards`, with one block of lines for each card.
+    """Return the report of `cards` of the printed programs, with a block of lines for each card.
 
     A block shows the card, its line in the scan, and the corresponding lines of the Fortran port
-    and of the Python twin. The apparatus entries that name the card follow. `title` is the verb
-    that shows the report.
+    and of the Python version, the twin. The apparatus entries that name the card follow; they
+    describe doubtful or faulty passages. `title` is the name of the command that shows the report.
     """
     rows = [
         [each.program, each.number, each.statement, each.scan, " ".join(each.entries)]
@@ -41,8 +41,9 @@ def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
 
 
 def card_record(card: Card) -> dict[str, Any]:
-    """Return a card as a JSON record, with its lines in the Fortran port and in the Python twin.
+    """Return a card of a printed program as a JSON record, with its lines in Fortran and Python.
 
+    The keys `fortran` and `twin` have the corresponding lines of our Fortran and Python versions.
     The value of the key `scan` is the card's line in the scan if it differs from the card. It is
     null if the scan agrees with the card, and empty if the scan lacks the card.
     """
@@ -65,11 +66,12 @@ def card_record(card: Card) -> dict[str, Any]:
 def scan_report(
     faults: Sequence[str], undeclared: Sequence[str], lines: int, digest: str
 ) -> Report:
-    """Return the report on whether the tables of the edition explain every line of a scan.
+    """Return the report on whether our tables explain every line of a scan of the printed programs.
 
     `faults` has a sentence for each line in which the scan and the tables disagree. `undeclared`
-    has a sentence for each disagreement between the cards and the apparatus entries. `lines` is the
-    number of lines that the tables expect, and `digest` the SHA-256 of the scan.
+    has a sentence for each disagreement between the cards and the apparatus entries, which describe
+    doubtful or faulty cards. `lines` is the number of lines that the tables expect, and `digest`
+    the SHA-256 of the scan.
     """
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)
@@ -101,10 +103,11 @@ def scan_report(
 def classes_report() -> Report:
     """Return a report that counts the entries of the apparatus, and the cards they name, by kind.
 
-    There is a row for each kind of entry, such as `defect`. The first columns count the entries,
-    and the entries with a flag (a switch in the programs). The next columns count, for each
-    program, the cards that the entries name. The last column counts the passages in which the scan
-    differs from our text because of such an entry.
+    An entry describes a doubtful or faulty passage of the printed programs. There is a row for each
+    kind of entry, such as `defect`. The first columns count the entries, and the entries with a
+    flag (a switch in the programs). The next columns count, for each program, the cards that the
+    entries name. The last column counts the passages in which the scan differs from our text
+    because of such an entry.
     """
     entries = facts("apparatus")["entry"]
     rows = []

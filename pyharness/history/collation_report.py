@@ -19,7 +19,8 @@ _COLUMNS = (
 def collation_report(found: Sequence[Row]) -> Report:
     """Return the report on whether the decks and the text of the thesis agree on each operation.
 
-    Each row of `found` is one operation of the programs, with the reason for any disagreement.
+    A deck consists of the cards of one of the three programs. Each row of `found` is one operation
+    of the programs, with the reason for any disagreement.
     """
     told = faults([*found])
     rows = [

@@ -46,7 +46,7 @@ _END: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class FigurePlan:
-    """A figure to be drawn: which programs it shows on which case, before anything is computed.
+    """A figure of the thesis that is drawn again: its case and the programs whose curves it shows.
 
     `number` and `part` are those of the figure in the thesis; `part` is `A`, `B` or empty. `set` is
     ``original`` or ``corrected``, for the programs as printed or as corrected. `caption` is our own
@@ -80,14 +80,20 @@ class FigurePlan:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The trajectory of one program, which a figure shows as a curve of omega over time."""
+    """The trajectory of one program, which a figure shows as a curve of omega over time.
+
+    `listing` names the program and the defects with which it ran.
+    """
 
     listing: Listing
     trajectory: Trajectory
 
     @property
     def ending(self) -> str:
-        """Return at which step and why the program ended early; empty if it ran all steps."""
+        """Return text that states at which step and why the program ended early, or an empty text.
+
+        The text is empty if the program ran all steps.
+        """
         run = self.trajectory
         if run.stop is not None:
             return f"stopped at step {run.stop.step} by {run.stop.variable}"
@@ -95,19 +101,20 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Return the label of the curve in a legend: the program, and where and why it ended early.
+        """Return the curve's label in a legend: the program, and where and why its run ended early.
 
-        A program that ran all steps has its name alone.
+        The label of a complete run is the name of the program alone.
         """
         return self.listing.program + (f" ({self.ending})" if self.ending else "")
 
 
 @dataclass(frozen=True, eq=False)
 class FigureFinding:
-    """A planned figure with its scene, the reference solution and the computed curves.
+    """A figure with everything that is drawn: the scene, the reference solution and the curves.
 
-    Each curve ends where its program ended. `limit` is None or has a label and the values of a
-    function: the function to which one of the programs converges as its step size goes to zero.
+    `plan` states which programs the figure shows. The curve of a program ends where its run ended.
+    If `limit` is not None, it is a label and omega (rad/s) over time: the function to which one of
+    the programs converges as its step size goes to zero.
     """
 
     plan: FigurePlan
@@ -118,7 +125,10 @@ class FigureFinding:
 
 
 def plans() -> list[FigurePlan]:
-    """Return all figures to be drawn, first the figures of the original programs."""
+    """Return the plans of all figures to be drawn, first the figures of the original programs.
+
+    A plan states the number, the case and the programs of a figure.
+    """
     return [
         FigurePlan(
             entry["number"], entry.get("part", ""), each, entry["case"], tuple(entry[each]),
@@ -130,7 +140,7 @@ def plans() -> list[FigurePlan]:
 
 
 def findings() -> Iterator[FigureFinding]:
-    """Compute the curves and the reference of each figure, and yield the figures one by one.
+    """Compute the curves and the reference solution of each figure, and yield the figures.
 
     The figures are in the order of `plans`, and nothing is drawn.
     """
@@ -147,10 +157,11 @@ def findings() -> Iterator[FigureFinding]:
 def _limit(
     plan: FigurePlan, scene: Scene, truths: dict[int, Reference]
 ) -> tuple[str, Array] | None:
-    """Return the program's limit that a figure of the original programs shows: label and omega.
+    """Return the label and the omega (rad/s) of a program's limit that a figure shows, or None.
 
-    The limit is the omega (rad/s) to which a program converges as its step size goes to zero.
-    Return None if the figure shows no limit. `truths` has the reference solutions by case.
+    The limit is the omega to which a program converges as its step size goes to zero. Only figures
+    of the original programs show a limit, and not all of them. `plan` describes the figure, and
+    `truths` has the reference solutions by number of the case.
     """
     asked = {entry["number"]: entry.get("limit_of") for entry in facts("figures")["figure"]}
     program = asked[plan.number]
@@ -161,7 +172,7 @@ def _limit(
 
 
 def figures_report(findings: Sequence[FigureFinding]) -> Report:
-    """Return the report on the files that were drawn, with a line for each figure."""
+    """Return the report on the files that were drawn, with a line for each figure in `findings`."""
     rows = []
     for each in findings:
         curves = ", ".join(curve.label for curve in each.curves)
@@ -254,10 +265,10 @@ def figure_picture(finding: FigureFinding) -> Picture:
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
     """Draw omega1 of a figure of the original programs and of a corrected figure in one picture.
 
-    The figure of the original programs, `first`, must have the limit of a program. After the early
-    end of a run, this limit shows approximately how omega1 would have continued. Of the corrected
-    figure, `second`, only the last curve is drawn, because its other curves would cover the same
-    line.
+    The figure of the original programs, `first`, must contain a limit: the curve to which a program
+    converges as its step size goes to zero. It shows approximately how omega1 of a run that ended
+    early would have continued. Of the figure of the corrected programs, `second`, only the last
+    curve is drawn, because its other curves would cover the same line.
     """
     from matplotlib.figure import Figure
 
@@ -309,10 +320,10 @@ def _draw(
 
 
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
-    """Return the bottom and top (rad/s) of the vertical axis for the omega component `row`.
+    """Return the bottom and top (rad/s) of the vertical axis in the plot of one omega component.
 
-    `row` is 0, 1 or 2. The axis contains all curves that stay near the reference; a curve that
-    diverges may leave the frame.
+    `row` is the component: 0, 1 or 2. All curves of `finding` that stay near the reference solution
+    are within the axis. A curve that diverges may leave the frame.
     """
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())

@@ -48,8 +48,9 @@ Rate = Callable[[float, Sequence[float]], list[float]]
 class Halving:
     """The distances of one run from the limit of its program and from the reference solution.
 
-    Each distance is the largest difference of any omega component (rad/s) at the scene's times. The
-    run has the step size `step_size` (s). Both distances are infinite after an overflow.
+    The limit is the omega to which the program converges as its step size goes to zero. Each
+    distance is the largest difference of any omega component (rad/s) at the scene's times. The run
+    has the step size `step_size` (s). Both distances are infinite after an overflow.
     """
 
     step_size: float
@@ -61,10 +62,11 @@ class Halving:
 class Limit:
     """The limit of an original program as the step size goes to zero, and the order of convergence.
 
-    `tends_to` describes the limit. `halvings` has a run for each step size, the largest first.
-    `order` is the measured order of convergence to the limit, computed from the last two runs. It
-    is None if their distance from the limit is rounding error alone, if one of them overflows, or
-    if there is no limit. It is also None if the limit is unbounded at the time `blow_up` (s).
+    `program` is the program as printed, and `tends_to` describes its limit. `halvings` has the
+    distances of a run from the limit for each step size, the largest first. `order` is the measured
+    order of convergence to the limit, computed from the last two runs. It is None if their distance
+    from the limit is rounding error alone, if one of them overflows, or if there is no limit. It is
+    also None if the limit is unbounded at the time `blow_up` (s).
     """
 
     program: str
@@ -75,7 +77,7 @@ class Limit:
 
     @property
     def approach(self) -> str:
-        """Return a phrase for the convergence to the limit, as in `order 1.00 toward the limit`."""
+        """Return a phrase on the convergence to the limit, as in `order 1.00 toward the limit`."""
         if self.blow_up is not None:
             return f"no order: the limit grows without bound at t = {self.blow_up:.3g} s"
         if self.order is not None:
@@ -87,11 +89,11 @@ class Limit:
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
     """Measure how an original program, without its stop test, converges to its limit.
 
-    The limit is the omega to which the program tends as its step size goes to zero. The step size
-    of the scene is halved `halvings` times, with one run for each step size. If the torque varies
-    with time, the collocation programs have no limit, and the limit of the Runge-Kutta program is
-    computed from its limit equations. Raise InputError if a run exceeds the work limit, on which
-    `effort` is a factor.
+    `program` runs as printed. The limit is the omega to which it tends as its step size goes to
+    zero. The step size of the scene is halved `halvings` times, with one run for each step size. If
+    the torque varies with time, the collocation programs have no limit, and the limit of the
+    Runge-Kutta program is computed by integrating differential equations for it. Raise InputError
+    if a run exceeds the work limit (some ten seconds, multiplied by `effort`).
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
@@ -124,8 +126,9 @@ def limit_solution(
 ) -> Array:
     """Return the omega (rad/s) to which an original program tends as its step goes to zero.
 
-    The shape is (times, 3); rows are NaN where the program has no limit. `truth` is the reference
-    solution at `times`, and `effort` a factor on the work limit.
+    The shape is (times, 3); rows are NaN where the program has no limit. `program` is the program
+    as printed. `truth` is the reference solution at `times` (s). `effort` multiplies the work limit
+    of some ten seconds.
     """
     return _limit_solution(program, scene, times, truth, effort)[0]
 
@@ -135,8 +138,9 @@ def _limit_solution(
 ) -> tuple[Array, str, float | None]:
     """Return the limit of an original program, its description, and its blow-up time (s) or None.
 
-    The limit is the omega that `limit_solution` returns; it becomes unbounded at the blow-up time.
-    The arguments are those of `limit_solution`.
+    The limit is the omega (rad/s) to which the program as printed tends as its step size goes to
+    zero, at `times` (s), shape (times, 3). At the blow-up time it becomes unbounded. `truth` is the
+    reference solution at `times`, and `effort` multiplies the work limit of some ten seconds.
     """
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)
@@ -157,7 +161,8 @@ def _limit_solution(
 def _extrapolated(scene: Scene) -> Rate:
     """Return the right-hand side of the two-term program's limit equation.
 
-    The original program adds the step size h to its interval length DT in every step. In step n the
+    The solution of this equation is the omega to which the program tends as its step size h goes to
+    zero. The original program adds h to its interval length DT in every step. In step n the
     collocation points are therefore t/3 and 2t/3 after the beginning of the step, with t = n h. Let
     w be omega, F the right-hand side of Euler's equations at w, F' its Jacobian, and Q its
     quadratic part. At the time s after the beginning of the step, the slope along the first
@@ -183,10 +188,11 @@ def _extrapolated(scene: Scene) -> Rate:
 def _slow_slopes(scene: Scene) -> Rate:
     """Return the right-hand side of the Runge-Kutta program's limit equations, for varying torque.
 
-    Let p be the program's U(1), the omega at which it evaluates the first slopes of a step. Let F
-    be the right-hand side of Euler's equations. In every step of size h, p grows by h/2 F(p), and
-    the resulting omega by h F(p). The slopes are therefore taken at an omega that changes at half
-    speed. The state of the limit equations is p, then the resulting omega.
+    The solution of these equations is the omega to which the program tends as its step size goes to
+    zero. Let p be the program's U(1), the omega at which it evaluates the first slopes of a step.
+    Let F be the right-hand side of Euler's equations. In every step of size h, p grows by h/2 F(p),
+    and the omega that the program prints by h F(p). The slopes are therefore taken at an omega that
+    changes at half speed. The state of the limit equations is p, then the printed omega.
     """
     right_hand_side = scene.right_hand_side()
 
@@ -200,12 +206,13 @@ def _slow_slopes(scene: Scene) -> Rate:
 def _solved(
     rate: Rate, start: list[float], times: Sequence[float], scale: float, effort: float
 ) -> tuple[Array, float | None]:
-    """Integrate a limit equation, whose right-hand side is `rate`, from `start` at time 0.
+    """Integrate a differential equation, with the right-hand side `rate`, from `start` at time 0.
 
-    Return two values: the solution at `times`, shape (times, components), which is NaN after a
-    blow-up, and the time of the blow-up (s), or None. A blow-up is the growth of a component to a
-    million times `scale`, the largest omega of scene and reference (rad/s). `effort` is a factor on
-    the work limit.
+    The solution is the limit of a program as its step size goes to zero. Return two values. The
+    first is the solution at `times` (s), shape (times, components), which is NaN after a blow-up.
+    The second is the time of the blow-up (s), or None. A blow-up is the growth of a component to a
+    million times `scale`, the largest omega of scene and reference (rad/s). `effort` multiplies the
+    work limit of some ten seconds.
     """
     from scipy.integrate import solve_ivp
 
@@ -267,9 +274,11 @@ def _same(first: Array, second: Array) -> bool:
 def limits_report(
     scene: Scene, found: Sequence[Limit], invisible: Mapping[str, Sequence[str]]
 ) -> Report:
-    """Return the report of `limits`: the programs' distances from their limits, by step size.
+    """Return the report of `pyharness limits`: the programs' distances from their limits.
 
-    `invisible` has, by program, the names of the defects that do not change omega in this scene.
+    A limit is the omega to which an original program tends as its step size goes to zero. `found`
+    has, for each program, the distances by step size. `invisible` has, by program, the names of the
+    defects that do not change omega in this scene.
     """
     text: list[Section] = [heading(scene)]
     data = []

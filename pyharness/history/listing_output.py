@@ -26,7 +26,7 @@ _LARGEST = 1 << 24  # largest size of a page's file, in bytes
 
 @dataclass(frozen=True)
 class Difference:
-    """A number of a page from another machine that differs from the number on our page.
+    """A printed number that differs between a page from another machine and a page of our program.
 
     `row` is the row of the number, and `place` its position within the row; both count from 1.
     `theirs` and `ours` are the numbers as printed by the other machine and by our program.
@@ -50,9 +50,10 @@ class Fit:
     case : int
         The number of the case of our page in Table 1.
     fields : int
-        How many numbers the rows of the page have, on the one of the two pages that has more.
+        How many numbers are compared. A number at a place where the other page has none is
+        included.
     differences : tuple of Difference
-        The numbers that the two pages do not print alike.
+        The numbers that the two pages print differently.
     """
 
     program: str
@@ -64,14 +65,15 @@ class Fit:
 
     @property
     def is_whole(self) -> bool:
-        """Return whether the two pages print every number alike."""
+        """Return whether the page of the other machine and our page print every number alike."""
         return not self.differences
 
 
 def read_page(path: str) -> list[list[str]]:
-    """Return the lines of the file `path` that contain only numbers, split into printed numbers.
+    """Return the lines of a printed page that contain only numbers, split into these numbers.
 
-    Raise InputError if no line has at least six numbers.
+    The page is the file `path`, as a program printed it. Raise InputError if no line has at least
+    six numbers.
     """
     where = f"--listing-output '{path}'"
     content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
@@ -89,13 +91,14 @@ def fits(
     cases: Sequence[int],
     progress: Progress = no_progress,
 ) -> list[Fit]:
-    """Compare a page with each of our pages that has the same moments, torques and columns.
+    """Compare a page from another machine with those of our pages that have the same form.
 
     `lines` are the lines of numbers of the page, from `read_page`. Our pages are printed by the
-    `programs` in the `cases`, original and corrected, in every arithmetic. The heading of a page
-    shows the moments and torques. Return the comparisons, sorted by the number of differences, the
-    smallest first. Raise InputError if none of our pages has the same moments, torques and number
-    of columns. `progress` is called before each comparison.
+    `programs` in the `cases`, original and corrected, in every arithmetic that we emulate. Two
+    pages have the same form if their moments and torques (in the heading) and their numbers of
+    columns agree. Return the comparisons, sorted by the number of differences, the smallest first.
+    Raise InputError if none of our pages has the form of the page. `progress` is called before each
+    comparison.
     """
     found: list[Fit] = []
     every = len(programs) * len(cases) * 2 * len(WORD_NAMES)
@@ -122,7 +125,7 @@ def fits(
 def _form(program: str, case: int) -> tuple[list[list[str]], int]:
     """Return the lines of numbers in the heading of our page, and how many numbers each row has.
 
-    The page is that of the program `program` in the case `case`.
+    Our page is the one that the program `program` prints in the case `case`.
     """
     scene = replace(case_scene(case), steps=1)
     *head, row = _numbers(
@@ -146,7 +149,7 @@ def _fit(theirs: Sequence[Sequence[str]], listing: Listing, case: int, word: str
 
 
 def _numbers(text: str) -> list[list[str]]:
-    """Return the lines of `text` that contain only numbers, split into printed numbers."""
+    """Return the lines of `text` that contain only numbers, each as a list of its numbers."""
     lines = [line.split() for line in text.splitlines()]
     return [line for line in lines if line and all(map(_FIELD.fullmatch, line))]
 
@@ -154,8 +157,9 @@ def _numbers(text: str) -> list[list[str]]:
 def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
     """Return the report on which program, listing and arithmetic print the page in file `path`.
 
-    `found` has the comparisons of this page with our pages, the nearest page first. If no
-    comparison is without differences, the report shows the first differences from the nearest page.
+    `found` has the comparisons of this page with the pages of our programs, the page with the
+    fewest differences first. If every comparison has differences, the report shows the first
+    differences from the first page.
     """
     best = found[0]
     whole = [each for each in found if each.is_whole]
@@ -180,7 +184,11 @@ def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
 
 
 def name_of(fit: Fit) -> str:
-    """Return the description of our page in a comparison: program, case, listing, arithmetic."""
+    """Return text that names our page, as in `two-term, case 2, original, in binary64`.
+
+    The text has the program, the case, the listing (original or corrected) and the arithmetic of
+    the page in a comparison.
+    """
     return f"{fit.program}, case {fit.case}, {fit.listing}, in {fit.word}"
 
 

@@ -33,11 +33,12 @@ TERMS = 2
 
 @dataclass(frozen=True)
 class Attempt:
-    """The result of one weighting with one mistake, on Cases 1 and 2, whose solutions are known.
+    """The result of one method, programmed with one mistake, on Cases 1 and 2 of Table 1.
 
-    `mistake` is the identifier of the mistake in `data/lost.toml`. `shares` has, by case, the
-    largest error of omega divided by the largest omega; it is infinite after an overflow. `failed`
-    has the cases in which this ratio exceeds the limit in `data/lost.toml`.
+    `weighting` names the weighted residual method. `mistake` is the identifier of the mistake in
+    `data/lost.toml`. The solutions of both cases are known. `shares` maps a case to the largest
+    error of omega, divided by the largest omega; it is infinite after an overflow. `failed` has the
+    cases in which this ratio exceeds 0.1, the limit in `data/lost.toml`.
     """
 
     mistake: str
@@ -48,9 +49,10 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A conjectured mistake with its results, one `Attempt` for each weighting.
+    """A conjectured mistake in lost programs, with its results: an `Attempt` for each weighting.
 
-    `mistake` is its identifier, and `summary` its description, in `data/lost.toml`.
+    A weighting defines a weighted residual method. `mistake` is the identifier of the mistake, and
+    `summary` its description, in `data/lost.toml`.
     """
 
     mistake: str
@@ -59,21 +61,28 @@ class Ranked:
 
     @property
     def in_both(self) -> int:
-        """Return how many weightings fail, with this mistake, in both Case 1 and Case 2."""
+        """Return how many weighted residual methods fail, with this mistake, in both cases.
+
+        The cases are Case 1 and Case 2.
+        """
         return sum(len(each.failed) == len(CASES) for each in self.attempts)
 
     @property
     def in_either(self) -> int:
-        """Return how many weightings fail, with this mistake, in Case 1, in Case 2 or in both."""
+        """Return how many weighted residual methods fail, with this mistake, in at least one case.
+
+        The cases are Case 1 and Case 2.
+        """
         return sum(bool(each.failed) for each in self.attempts)
 
 
 def ranked(word: str = BINARY64) -> list[Ranked]:
-    """Run every weighting with every conjectured mistake, in the arithmetic named `word`.
+    """Run every method with every conjectured mistake, in the arithmetic named `word`.
 
-    Return the mistakes, sorted by the number of weightings that fail with them in both cases, the
-    largest number first. Mistakes with equal numbers are sorted by the number of weightings that
-    fail in at least one case.
+    The methods are the weighted residual methods `WEIGHTINGS`, on Cases 1 and 2. A method fails in
+    a case if its error exceeds a tenth of the largest omega. Return the mistakes, sorted by the
+    number of methods that fail with them in both cases, the largest number first. Mistakes with
+    equal numbers are sorted by the number of methods that fail in at least one case.
     """
     limit = facts("lost")["limit"]
     found = []
@@ -90,10 +99,11 @@ def ranked(word: str = BINARY64) -> list[Ranked]:
 
 
 def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> float:
-    """Return a weighting's largest error against the reference, relative to the largest omega.
+    """Return a method's largest error against the reference, relative to the largest omega.
 
-    `mistake` is the identifier of a mistake in `data/lost.toml`, or ``none``. `word` is the name of
-    the arithmetic. The result is infinite after an overflow.
+    `weighting` names the weighted residual method. `mistake` is the identifier of the mistake with
+    which it is programmed, from `data/lost.toml`, or ``none``. `word` is the name of the
+    arithmetic. The result is infinite after an overflow.
     """
     given = scene if word == BINARY64 else scene_in(scene, WORDS[word])
     omega = integrate(given, weighting, mistake)
@@ -104,11 +114,12 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
 
 
 def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
-    """Integrate a scene of constant torque by one of the `WEIGHTINGS`, programmed with one mistake.
+    """Integrate a scene of constant torque by a method that is programmed with one mistake.
 
-    `mistake` is the identifier of a mistake in `data/lost.toml`, or ``none``. Return omega (rad/s),
-    shape (steps, 3); NaN from an overflow on. The scene's numbers are floats, or numbers of an
-    arithmetic in `WORDS`; they determine the arithmetic of the integration.
+    `weighting` is the weighted residual method, one of `WEIGHTINGS`. `mistake` is the identifier of
+    the mistake in `data/lost.toml`, or ``none``. Return omega (rad/s), shape (steps, 3); NaN from
+    an overflow on. The scene's numbers are floats, or numbers of an arithmetic in `WORDS`; they
+    determine the arithmetic of the integration.
     """
     h = scene.step_size
     coefficients = scene.euler_coefficients
@@ -143,8 +154,8 @@ def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
     """Return A omega2 omega3, B omega1 omega3 and C omega1 omega2 as polynomials of the time t (s).
 
     The result has a column for each product, with its coefficients of 1, t, t**2, ... `estimate`
-    has the components of omega in the same form. `coefficients` are A, B and C of Euler's
-    equations.
+    has the components of omega as polynomials in the same form. `coefficients` are A, B and C of
+    Euler's equations.
     """
     columns = [
         polynomial.polymul(estimate[:, j], estimate[:, k]) * a
@@ -157,8 +168,8 @@ def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
 def _matrix(weighting: str, length: float) -> Array:
     """Return the weighted integrals over (0, length) of the derivatives of t and t**2.
 
-    The shape is (2, 2). A row belongs to one of the two weights of the weighting named `weighting`,
-    and a column to a power of t. `length` is in s.
+    The shape is (2, 2). A row belongs to one of the two weight functions of the weighted residual
+    method `weighting`, and a column to a power of the time t. `length` is in s.
     """
     columns = [_weighted(weighting, length, (i + 1) * _power(i)) for i in range(TERMS)]
     return np.array(columns).T
@@ -167,9 +178,10 @@ def _matrix(weighting: str, length: float) -> Array:
 def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
     """Return c1 and c2 of all components, for which the weighted residuals vanish; shape (2, 3).
 
-    c1 and c2 solve the linear equations with the matrix `matrix`. `right` has the right-hand sides,
-    one row for each component. `mistake` is the identifier of a mistake in `data/lost.toml`.
-    `second` is true for the correction, and false for the first estimate.
+    In a step omega is approximated by omega(0) + c1 t + c2 t**2. c1 and c2 solve the linear
+    equations with the matrix `matrix`. `right` has the right-hand sides, one row for each
+    component. `mistake` is the identifier of a programming mistake in `data/lost.toml`. `second` is
+    true for the correction, and false for the first estimate.
     """
     if mistake == "transposed":
         matrix = matrix.T
@@ -195,8 +207,8 @@ def _power(exponent: int) -> Array:
 def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
     """Return the integrals over (0, length) of a polynomial times each of the two weights.
 
-    The weights are those of the weighting named `weighting`. `residual` has the coefficients of the
-    polynomial, from the constant on; `length` is in s.
+    The weights are the two weight functions of the weighted residual method `weighting`. `residual`
+    has the coefficients of the polynomial, from the constant on; `length` is in s.
     """
     found = []
     for k in range(TERMS):
@@ -217,10 +229,10 @@ def _factors(matrix: Array) -> Array:
 
 
 def halved(scene: Scene, weighting: str) -> float:
-    """Return the factor by which halving the step size reduces the error of a weighting.
+    """Return the factor by which halving the step size reduces the error of a method.
 
-    The error is the largest one of omega over the run. The weighting has no mistake, and the end
-    time is the same with both step sizes.
+    `weighting` names the weighted residual method, programmed without a mistake. The error is the
+    largest one of omega over the run. The end time is the same with both step sizes.
     """
     finer = replace(scene, step_size=scene.step_size / 2.0, steps=2 * scene.steps)
     return _share(scene, weighting, "none") / _share(finer, weighting, "none")
@@ -235,9 +247,11 @@ _TABLE = (
 
 
 def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
-    """Return the report of every mistake: its errors, and how many weightings fail with it.
+    """Return the report on every conjectured mistake, with its errors and its number of failures.
 
-    `word` is the name of the arithmetic in which `found` was computed.
+    The failures are those of weighted residual methods that are programmed with the mistake.
+    `found` has the mistakes with their results, and `word` is the name of the arithmetic in which
+    they were computed.
     """
     rows = [
         [

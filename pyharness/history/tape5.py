@@ -16,8 +16,9 @@ _RECORD = np.dtype([("head", "<i4"), ("items", "<f8", (7,)), ("tail", "<i4")])
 def records(trajectory: Trajectory) -> bytes:
     """Return the bytes of a program's file TAPE5, with one record for each row of its trajectory.
 
-    The trajectory must have translational velocities. A record has the recorded time (s), omega
-    (rad/s) and the translational velocity (m/s).
+    TAPE5 is the file of unformatted records that a program of the thesis writes. The trajectory
+    must have translational velocities. A record has the recorded time (s), omega (rad/s) and the
+    translational velocity (m/s).
     """
     assert trajectory.velocity is not None
     result = np.empty(len(trajectory.time), dtype=_RECORD)

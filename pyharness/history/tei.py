@@ -52,11 +52,11 @@ _TOLD = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why
 
 
 class _Page(NamedTuple):
-    """A page of the scan with its lines.
+    """A page of the scan of the thesis, with its lines.
 
-    `number` is the position of the page in the scan, from 1. `moved` is the identifier of the
-    apparatus entry that explains why the page is not in its proper place; None for a page in its
-    proper place.
+    `number` is the position of the page in the scan, from 1. `moved` is None if the page is in its
+    proper place. Otherwise it is the identifier of the note in the critical apparatus that explains
+    why the page is elsewhere.
     """
 
     number: int
@@ -69,7 +69,10 @@ class _Page(NamedTuple):
 
 
 def tei_document() -> bytes:
-    """Return the three decks and their apparatus as a TEI document, in UTF-8."""
+    """Return the cards of the programs and the critical apparatus as a TEI document, in UTF-8.
+
+    TEI is an XML format for editions of texts.
+    """
     root = xml.Element("TEI", xmlns="http://www.tei-c.org/ns/1.0")
     root.set(_XML + "lang", "en")
     _header(root)
@@ -138,9 +141,10 @@ def _header(root: xml.Element) -> None:
 
 
 def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]:
-    """Append the deck of a program to `body`, and yield the XML element of each card with the card.
+    """Append the cards of a program to `body`, and yield a pair for each card.
 
-    The elements are yielded in the order of the cards. They do not yet contain the card's text.
+    A pair consists of the XML element of the card, which does not yet contain the card's text, and
+    the card itself. The pairs are yielded in the order of the cards.
     """
     div = _named(body, "div", program, type="deck")
     _with_text(div, "head", f"The {program} program")
@@ -227,9 +231,10 @@ def _apparatus(div: xml.Element) -> None:
 
 
 def _targets(entry: dict[str, Any]) -> Iterator[str]:
-    """Yield the XML identifiers of the cards that an apparatus entry names.
+    """Yield the XML identifiers of the cards that an entry of the critical apparatus names.
 
-    For a program of which the entry names no card, yield the identifier of the whole deck.
+    An entry describes, for example, a defect of the printed programs. For a program of which the
+    entry names no card, yield the identifier of the program's whole deck of cards.
     """
     for program in entry["programs"]:
         cards = deck(program).cards

@@ -19,8 +19,8 @@ def text_digest(table: Callable[[str], Mapping[str, Any]] = facts) -> str:
     """Return the first 12 hexadecimal digits of the SHA-256 of the edition's text.
 
     The text is the content of `TABLES`: the cards, the scan's variants and the critical apparatus.
-    The Fortran port, the Python twins, the project's version and comments in the tables do not
-    change the digest.
+    The digest does not depend on the Fortran and Python versions of the programs, on the project's
+    version number, or on comments in the tables.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ class WordRun:
     case : int
         The number of the case in Table 1 of the thesis.
     program, listing : str
-        The name of the program, and the label of its listing: ``original`` or ``corrected``.
+        The name of the program, and the form in which it ran: ``original`` or ``corrected``.
     p : int
         Bits of the significand.
     rule : str
@@ -68,11 +68,11 @@ class WordRun:
 
 @dataclass(frozen=True)
 class WordCell:
-    """The runs of one listing on one case, in several arithmetics.
+    """The runs of one program on one case of Table 1, in several arithmetics.
 
-    A listing is a program, original or corrected. `double` is the run in binary64, and `widest` the
-    run with 113 bits. `runs` has one run for each pair of a chosen number of bits and a rounding
-    rule.
+    The program is either original or corrected. `double` is the run in binary64, and `widest` the
+    run with 113 bits of significand. `runs` has one run for each pair of a chosen number of bits
+    and a rounding rule.
     """
 
     double: WordRun
@@ -80,7 +80,10 @@ class WordCell:
     runs: tuple[WordRun, ...]
 
     def of(self, p: int, rule: str) -> WordRun | None:
-        """Return the run with p bits and the rounding rule `rule`, or None if there is none."""
+        """Return the run with p bits and the rounding rule `rule`, or None if there is none.
+
+        The bits are those of the significand.
+        """
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
     def settled(self, rule: str, same: Callable[[WordRun], bool]) -> int | None:
@@ -105,9 +108,10 @@ def cells(
 ) -> Iterator[WordCell]:
     """Run the programs, original and corrected, on the cases in every arithmetic.
 
-    An arithmetic is a pair of a number of bits in `lengths` and a rounding rule in `RULES`;
-    binary64 and 113 bits are always added. Yield a `WordCell` for each listing and case. `progress`
-    is called with the number of finished runs and the number of all runs.
+    An arithmetic is a pair of a number of bits of significand, from `lengths`, and a rounding rule
+    in `RULES`; binary64 and 113 bits are always added. Yield a `WordCell`, which has the runs, for
+    each program, form (original or corrected) and case. `progress` is called with the number of
+    finished runs and the number of all runs.
     """
     words = [Word(p, rule) for rule in RULES for p in lengths]
     chosen = [
@@ -128,10 +132,11 @@ def cells(
 
 
 class _Judge:
-    """The comparison of a listing's runs on a scene with its run in binary64 and the reference.
+    """The comparison of a program's runs on a scene with its run in binary64 and the reference.
 
-    The constructor computes the page that the listing prints in binary64, and the reference
-    solution. `run` compares a run in another arithmetic with both.
+    `listing` is the program, original or corrected. The constructor computes the page that it
+    prints in binary64, and the reference solution. `run` compares a run in another arithmetic with
+    both.
     """
 
     def __init__(self, scene: Scene, listing: Listing) -> None:

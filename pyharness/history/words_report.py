@@ -26,10 +26,10 @@ _STYLES: dict[str, dict[str, Any]] = {
 
 
 def words_report(cells: Sequence[WordCell]) -> Report:
-    """Return the report of `words`: how the arithmetic changes printed pages and errors.
+    """Return the report of `pyharness words`: how the arithmetic changes printed pages and errors.
 
-    Each of the `cells` has the runs of one listing on one case, in several arithmetics. All cells
-    must have the same word lengths.
+    Each of the `cells` has the runs of one program, original or corrected, on one case, in several
+    arithmetics. All cells must have the same word lengths.
     """
     runs = [run for cell in cells for run in cell.runs]
     data = numbers(_FIELDS, [list(asdict(run).values()) for run in runs])
@@ -97,8 +97,8 @@ def _machine(cells: Sequence[WordCell]) -> Table:
 def _changes(cells: Sequence[WordCell]) -> list[str]:
     """Return, for each arithmetic of the CDC, a sentence on how its runs differ from binary64.
 
-    The two arithmetics have 48 bits. One has unrounded operations, and the other rounded
-    operations.
+    `cells` have the runs. The two arithmetics have 48 bits of significand. One has unrounded
+    operations, and the other rounded operations.
     """
     told = []
     for name, p, rule in _MACHINE:
@@ -150,8 +150,9 @@ def _errors(cells: Sequence[WordCell]) -> Table:
 def _picture(cells: Sequence[WordCell]) -> Picture:
     """Draw the largest error of omega (rad/s) against the word length p (bits).
 
-    There is a plot for each program and listing. A dashed line shows the truncation error of the
-    method, which is the error with 113 bits.
+    `cells` have the runs with their errors. There is a plot for each program, original and
+    corrected. A dashed line shows the truncation error of the method, which is the error with 113
+    bits.
     """
     from matplotlib.figure import Figure
 

@@ -130,9 +130,9 @@ def animation(scene: Scene, method: str, tolerance: float | None, end: float, pa
 def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: float) -> Any:
     """Draw the static parts of an animated brick, and return the function that draws a frame.
 
-    The returned function takes the number of a frame, counted from 0. The frame shows the row of
-    the trajectory `found` with the same number. `rate` is the number of seconds of the motion that
-    pass in one second of the animation.
+    `scene` supplies the moments of the brick. The returned function takes the number of a frame,
+    counted from 0. The frame shows the row of the trajectory `found` with the same number. `rate`
+    is the number of seconds of the motion that pass in one second of the animation.
     """
     axes: Any = figure.add_axes((0.02, 0.02, 0.96, 0.86), projection="3d")
     _frame(axes)

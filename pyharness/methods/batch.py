@@ -30,16 +30,16 @@ _EFFORT = 1e9  # in effect no work limit: the caller has requested the whole bat
 
 @dataclass(frozen=True)
 class Solver:
-    """The method or the program of the thesis that solves the scenes of a batch, with settings.
+    """The method, or the program of the thesis, that solves the scenes of a batch, with settings.
 
-    Exactly one of `method` and `program` is not None; it is a name. `tolerance` is the relative
-    tolerance of the method. `t_end` is the final time (s). If it is None, the final time is the
-    product of the scene's step size and its number of steps.
+    Exactly one of `method` and `program` is not None; it is a name. `tolerance` is the largest
+    allowed error of the method, relative to the largest |omega|. `t_end` is the final time (s). If
+    it is None, the final time is the product of the scene's step size and its number of steps.
 
-    The other fields apply only to programs. `listing` and `reading` are texts as in a sweep:
-    `listing` selects the mistakes of the printed program that are corrected, and `reading` the
-    interpretations of its doubtful statements. `lipschitz` is the limit of the Lipschitz test
-    (1/s), and `may_stop` states whether this test may end a run.
+    The other fields apply only to programs. `listing` is text that selects the mistakes of the
+    printed program that remain, for example ``original`` or ``corrected``. `reading` is text that
+    selects the interpretations of its doubtful statements. `lipschitz` is the limit of the
+    Lipschitz test (1/s), and `may_stop` states whether this test may end a run.
     """
 
     method: str | None = "auto"
@@ -67,7 +67,7 @@ class Batch:
     solver : Solver
         The method or program that solves the scenes, with its settings.
     listing : Listing, or None
-        The listing of the program; None for a method.
+        The program with a choice of its mistakes; None for a method.
     t_end : ndarray, shape (n,)
         The final time of each scene, s.
     arrays : mapping
@@ -84,7 +84,7 @@ class Batch:
 
     @property
     def omega0(self) -> Array:
-        """Return the initial angular velocities, shape (n, 3), rad/s."""
+        """Return the initial angular velocities of the scenes, shape (n, 3), rad/s."""
         return self.arrays["omega0"]
 
     @property
@@ -109,7 +109,7 @@ class Batch:
     def omega(self) -> Array:
         """Return the omega of each scene at `t_end`, shape (n, 3), rad/s.
 
-        It is NaN for a scene whose integration ended before `t_end`.
+        Omega is NaN for a scene whose integration ended before `t_end`.
         """
         return self._program.omega[:, -1] if self.is_program else self._ends.omega
 
@@ -126,8 +126,8 @@ class Batch:
     def n_rows(self) -> NDArray[np.int32]:
         """Return the number of steps that the program completed in each scene, shape (n,).
 
-        It is smaller than the requested number if the run overflowed or was stopped. The batch must
-        be solved by a program.
+        The number is smaller than the requested number if the run overflowed or was stopped. The
+        batch must be solved by a program.
         """
         return self._program.n_rows
 
@@ -185,9 +185,9 @@ class Batch:
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
         """Return omega (rad/s) of each scene at the time `part` * `t_end`, shape (n, 3).
 
-        It is computed by `method`, in place of the method or program of the batch, for example for
-        a comparison. `tolerance` is relative to the largest |omega|. If it is below the smallest
-        tolerance of the method, the smallest tolerance is used.
+        Omega is computed by `method`, in place of the method or program of the batch, for example
+        for a comparison. `tolerance` is the largest allowed error, relative to the largest |omega|.
+        If it is below the smallest tolerance of the method, the smallest tolerance is used.
         """
         return self._solve(method, tolerance, self.t_end * part).omega
 
@@ -203,9 +203,9 @@ class Batch:
 
         `at` contains step numbers, from 1, in ascending order. If possible, all scenes are run in
         one call. They are run one by one if the linear terms of their torques (`torque_rate`)
-        differ, or if the program can't run one of them. Only a scene that it can't run then has the
-        status REFUSED. Results of scenes that are run one by one do not include the program's error
-        code IER.
+        differ, or if the program can't run one of them. In this case only a scene that the program
+        can't run has the status REFUSED. Results of scenes that are run one by one do not include
+        the program's error code IER.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:
@@ -244,9 +244,10 @@ class Batch:
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
         """Return the states of all scenes at `t_end` (s, shape (n,)), computed by `method`.
 
-        A method in `PREPARED` solves all scenes in one call of `solve_many`. Any other method
-        solves the scenes one by one. `tolerance` is relative to the largest |omega|, and `more`
-        contains additional arguments of `solve_many`, such as `attitude0`.
+        A method in `PREPARED`, which has a kernel for many scenes, solves all scenes in one call of
+        `solve_many`. Any other method solves the scenes one by one. `tolerance` is the largest
+        allowed error, relative to the largest |omega|, and `more` contains additional arguments of
+        `solve_many`, such as `attitude0`.
         """
         if method not in PREPARED:
             return self._solve_each(method, tolerance, t_end)

@@ -21,9 +21,10 @@ def known_solution(
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) from its closed form.
 
-    `tolerance` is relative to the largest |omega|. It does not change the rows. The trajectory ends
-    as `sensitive` if its amplified rounding errors exceed the tolerance. `effort` is a factor on
-    the work limit. Raise InputError if the scene has no closed form.
+    `tolerance` is the largest allowed error, relative to the largest |omega|. It does not change
+    the computed omegas. If the amplified rounding errors exceed it, the trajectory ends as
+    `sensitive`. `effort` multiplies the work limit of some ten seconds. Raise InputError if the
+    scene has no closed form, or if the work limit is exceeded.
     """
     work = np.array([effort, 0.0])
     attitudes = None

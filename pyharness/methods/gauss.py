@@ -128,12 +128,13 @@ class _Solution:
         """Return whether this solution and a coarser one end because omega grows without bound.
 
         `coarser` is the solution with longer steps. Both solutions must end before the last
-        requested time, at nearly the same time. One of two conditions must also be satisfied.
-        Either the largest |omega| at the end is above 1e300 rad/s in both solutions. Or it exceeds
-        1.5 times its value in the coarser solution, and this product exceeds 1000 times `start`
-        and 1000 times every |omega| at a requested time. `start` is the largest initial |omega|
-        (rad/s), or the omega that torque alone would cause if that is larger. It is needed because
-        the solution may have reached no requested time.
+        requested time, at nearly the same time. Let m be the largest |omega| (rad/s) at the end of
+        a solution. One of two conditions must also be satisfied. The first is that m exceeds 1e300
+        in both solutions. The second is that m of this solution exceeds 1.5 times m of the coarser
+        solution, and that this product exceeds 1000 times `start` and 1000 times every |omega| of
+        this solution at a requested time. `start` is the largest initial |omega| (rad/s), or the
+        omega that torque alone would cause if that is larger. It is needed because the solution may
+        have reached no requested time.
         """
         if COMPLETE in (self.status, coarser.status):
             return False
@@ -148,19 +149,20 @@ class _Solution:
 def _counts(lengths: Array, step: float) -> Array:
     """Return the number of equal steps that the kernel takes in each interval between times.
 
-    `lengths` are the lengths of the intervals (s). Except for a relative excess of 1e-6, no step is
-    longer than `step` (s).
+    `lengths` are the lengths of the intervals (s). No step is longer than `step` (s), except for a
+    relative excess of 1e-6.
     """
     with np.errstate(over="ignore", divide="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 
 
 def _first_step(scene: Scene, shortest: float) -> float:
-    """Return the first step size (s), with which phases grow by at most half a radian in a step.
+    """Return a first step size (s), in which each phase grows by at most about half a radian.
 
-    The phases are the phase of the motion and the phase of each torque wave. `shortest` is the
-    shortest interval between requested times (s). It is a multiple of the step size, so that the
-    number of steps in this interval exactly doubles when the step size is halved.
+    The phases are the phase of the motion, estimated from the initial omega, and the phase of each
+    torque wave. `shortest` is the shortest interval between requested times (s). This interval is a
+    multiple of the step size, so that its number of steps exactly doubles when the step size is
+    halved.
     """
     rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
     for amplitude, frequency in scene.torque.sines + scene.torque.cosines:

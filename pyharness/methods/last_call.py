@@ -20,7 +20,8 @@ from pyharness.model.values import Triple
 class LastCall:
     """The base class of all prepared solvers, which reports how the last call in a thread ended.
 
-    The reports are status, error estimate, error amplification and number of steps.
+    A prepared solver solves one scene by one method, for many initial omegas. The reports are
+    status, error estimate, error amplification and number of steps.
     """
 
     plan: Plan
@@ -44,12 +45,13 @@ class LastCall:
         """Return how this thread's last call ended, as text.
 
         The texts are ``complete``, ``sensitive``, ``overflow``, ``refused`` and ``gave up``. The
-        last one means that the work limit was exceeded or that no correct digit of the phase was
-        left. A ``sensitive`` call has a result, but rounding errors amplified by the motion exceed
-        the tolerance; `digits` is the number of correct digits. Whether a call was sensitive is
-        computed when the status is read, if the method is a closed form or Gauss collocation. This
-        takes microseconds and milliseconds respectively. Before the first call the status is
-        ``complete``. A call that raised an InputError or was interrupted does not count.
+        text ``gave up`` means that the work limit was exceeded, or that no correct digit of the
+        phase was left. A ``sensitive`` call has a result, but rounding errors amplified by the
+        motion exceed the tolerance; `digits` is its number of correct digits. For a closed form and
+        for Gauss collocation, whether a call was sensitive is computed when the status is read.
+        This takes microseconds for a closed form, and milliseconds for Gauss collocation. Before
+        the first call the status is ``complete``. A call that raised an InputError or was
+        interrupted does not count.
         """
         return self._found()[0]
 
@@ -59,8 +61,8 @@ class LastCall:
 
         The error of omega is relative to the largest component of omega from 0 to the end. If the
         solver computes the attitude too, the estimate is the larger of two errors: that of omega
-        and that of the attitude's angle (rad). It is None if the method does not estimate its
-        error, or if the call had no result.
+        and that of the attitude's angle (rad). The estimate is None if the method does not estimate
+        its error, or if the call had no result.
         """
         return self._found()[1]
 
@@ -68,9 +70,9 @@ class LastCall:
     def growth(self) -> float | None:
         """Return the error amplification of the motion of this thread's last call, at least 1.
 
-        It is the largest norm of the state-transition matrices, the derivatives of omega at the end
-        with respect to omega at any earlier time. It is None if the method does not determine it,
-        or if the call had no result.
+        The error amplification is the largest norm of the state-transition matrices, the
+        derivatives of omega at the end with respect to omega at any earlier time. The result is
+        None if the method does not determine it, or if the call had no result.
         """
         return self._found()[2]
 
@@ -78,7 +80,7 @@ class LastCall:
     def digits(self) -> float | None:
         """Return the number of correct decimal digits of this thread's last result.
 
-        It follows from the estimated error, and is None if the error is unknown.
+        The number follows from the estimated error, and is None if the error is unknown.
         """
         return digits_left(self.error)
 
@@ -86,16 +88,16 @@ class LastCall:
     def steps(self) -> int:
         """Return the number of steps of this thread's last call.
 
-        For Gauss collocation it is instead the number of evaluations of the right-hand side. For a
-        closed form and before the first call it is 0.
+        For Gauss collocation the result is the number of evaluations of the right-hand side
+        instead. For a closed form, and before the first call, it is 0.
         """
         return abs(self._counted())
 
     def _counted(self) -> int:
         """Return the number of steps of the last call, negative if the kernel chose `quick`.
 
-        `quick` is a Runge-Kutta method. Only if the plan's method is `quick or taylor`, the kernel
-        chooses between `quick` and the Taylor series.
+        The method `quick` is a Runge-Kutta method for few digits. The kernel chooses between
+        `quick` and the Taylor series only if the solver's plan names the method `quick or taylor`.
         """
         ending = self._ending
         return 0 if ending is None else ending[1]
@@ -103,7 +105,8 @@ class LastCall:
     def _found(self) -> tuple[str, float | None, float | None]:
         """Return the status of this thread's last call, its estimated error and its `growth`.
 
-        `growth` is the error amplification. Each of the two numbers is None if it is unknown.
+        `growth` is the error amplification of the motion. The error and `growth` are None if they
+        are unknown.
         """
         ending = self._ending
         if ending is None:

@@ -241,8 +241,8 @@ class _Bodies:
 
     The constructor takes the arrays by name (`given`), the final times `t_end` (s), and the integer
     that selects the method in the kernel (`code`). An array of one row is shared by all bodies.
-    `tolerance` is relative to the largest |omega|, and `effort` is a factor on the work limit of a
-    body.
+    `tolerance` is the largest allowed error, relative to the largest |omega|, and `effort`
+    multiplies the work limit of a body.
     """
 
     def __init__(

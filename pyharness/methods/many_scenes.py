@@ -24,8 +24,8 @@ class Axes:
     def __init__(self, axes: Array, turns: Array) -> None:
         """Store the principal axes of each body, which are the columns of `axes`, shape (n, 3, 3).
 
-        `turns` contains the same rotations, from principal axes to the axes of the inertia matrix,
-        as quaternions, scalar first, shape (n, 4).
+        `turns` contains the rotations from principal axes to the axes of the inertia matrix once
+        more, as quaternions, scalar first, shape (n, 4).
         """
         self.axes, self.turns = axes, turns
 
@@ -65,8 +65,8 @@ def from_rows(rows: Sequence[Scene | None]) -> dict[str, Any]:
 
     The result is a dict of the arrays of `solve_many`, with one row for each scene, and the `Axes`.
     If `rows` contains None in place of a scene, the row is NaN, and the kernel refuses it. The
-    arrays contain the coefficients A, B, C instead of moments, because `principal` computes the
-    coefficients more accurately than they can be computed from rounded moments.
+    arrays contain the coefficients A, B, C instead of moments, because the function `principal`
+    computes them more accurately than they can be computed from rounded moments.
     """
     each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
     axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))
@@ -99,7 +99,7 @@ def _full_row(scene: Scene) -> dict[str, Any]:
 def _filled(laws: list[Any]) -> list[Any]:
     """Return the sine or cosine terms of several torque laws as lists of equal length.
 
-    `laws` has a list of such terms for each law. Terms of amplitude 0 are appended to shorter
+    `laws` has a list of terms for each torque law. Terms of amplitude 0 are appended to shorter
     lists.
     """
     most = max(map(len, laws))
@@ -109,8 +109,9 @@ def _filled(laws: list[Any]) -> list[Any]:
 def from_scene(scene: Scene) -> dict[str, Any]:
     """Return the quantities of a scene as a dict of arguments of `solve_many`.
 
-    The keys are names such as `omega0` and `torque_constant`. `body` contains the moments (kg m2)
-    if `by_moments` is true, else the coefficients A, B, C.
+    The keys are names such as `omega0` and `torque_constant`. The key `by_moments` states whether
+    the body is given by moments. The key `body` has the moments (kg m2) in this case, else the
+    coefficients A, B, C.
     """
     law = checked_scene(scene).body_torque
     return {

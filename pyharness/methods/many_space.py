@@ -48,10 +48,11 @@ def solve_in_space(
 ) -> Ensemble:  # fmt: skip
     """Return the final states of many bodies under a torque about the axes of space.
 
-    The arguments are the same as in `solve_many`. `arrays` contains its arrays by name. If an array
-    was not given, its value is None, and the scene supplies the quantity. A body whose numbers are
-    not allowed has NaN and the status REFUSED, and all other bodies are solved. Raise InputError if
-    no initial attitude is given, or if bodies are given by coefficients.
+    The arguments are the same as in `solve_many`, except that `arrays` contains its arrays by name.
+    The value None stands for an array that was not given; the scene then supplies the quantity. A
+    body whose numbers are not allowed has NaN and the status REFUSED, and all other bodies are
+    solved. Raise InputError if no initial attitude is given, or if bodies are given by
+    coefficients.
     """
     check_torque(scene, method, attitude=True)
     if arrays["coefficients"] is not None or scene.coefficients is not None:
@@ -109,9 +110,10 @@ def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
 
 
 def _rows(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return the arrays of bodies and torques, with checked shapes; omit all other arrays.
+    """Return those of several arrays that describe bodies and torques, with checked shapes.
 
-    `arrays` maps names of arguments of `solve_many` to their values. Values of None are omitted.
+    `arrays` maps names of arguments of `solve_many` to their values. Other arguments and values of
+    None are omitted.
     """
     shapes = {"moments": (3,), "inertia": (3, 3), "torque_constant": (3,), "torque_rate": (3,)}
     rows = {}

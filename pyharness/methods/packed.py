@@ -12,8 +12,8 @@ def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Ar
     """Return a scene and the settings of its method as one array, for a prepared solver's kernel.
 
     `pyharness.model.codes.Places` defines the order of the elements. `code` is the integer of
-    `pyharness.model.codes.Methods` that selects the method. `tolerance` is relative to the largest
-    |omega|, and `effort` is a factor on the work limit.
+    `pyharness.model.codes.Methods` that selects the method. `tolerance` is the largest allowed
+    error, relative to the largest |omega|. `effort` multiplies the work limit.
     """
     coefficients, constant, rate, sines, cosines = _torque_of(scene)
     packed = np.zeros(Places.WAVES)

@@ -23,8 +23,8 @@ _WAVES_DIGITS = 1e-9
 class Decision:
     """The decision whether one part of a computation is carried out, with the reason.
 
-    `part` is the name of the part, for example ``torque`` or ``attitude``. `kept` states whether
-    the part is computed, and `why` is the reason as text.
+    `part` is the name of the part, for example ``torque`` or ``attitude``. `kept` is true if the
+    part is computed, and `why` is the reason as text.
     """
 
     part: str
@@ -36,10 +36,10 @@ class Decision:
 class Plan:
     """The choices that are made before a scene is solved: the method and the computed quantities.
 
-    `method` is the name of the method that solves `scene`. `closed_form` is the kind of closed form
-    if one is used, else None. `fallback` is the name of the method that is used if `method` refuses
-    the scene. `velocity` and `rows` state whether the translational velocity and output at
-    intermediate times are requested.
+    `method` is the name of the method that solves `scene`. `closed_form` is the kind of closed
+    form, such as ``sphere``, if one is used, else None. `fallback` is the name of the method that
+    is used if `method` refuses the scene. `velocity` and `rows` state whether the translational
+    velocity and output at intermediate times are requested.
     """
 
     scene: Scene
@@ -72,10 +72,11 @@ def plan(
 ) -> Plan:
     """Return the plan for a scene: the method that solves it and the parts that are computed.
 
-    `method` is a name in the registry, where `auto` requests a choice of the method. `tolerance` is
-    relative to the largest |omega|; None means the method's default. `velocity` requests the
-    translational velocity, and `rows` requests output at intermediate times. Raise InputError if
-    the method can't solve the scene, or if the tolerance is out of range.
+    `method` is a name in the registry of methods. The name `auto` requests that the plan chooses
+    the method. `tolerance` is the largest allowed error, relative to the largest |omega|; None
+    means the method's default. `velocity` requests the translational velocity, and `rows` requests
+    output at intermediate times. Raise InputError if the method can't solve the scene, or if the
+    tolerance is out of range.
     """
     tolerance = requested_tolerance(method, tolerance)
     finest = REGISTRY["quick"].finest if method == "quick" else FINEST

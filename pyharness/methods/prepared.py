@@ -56,8 +56,8 @@ def prepare(
         A scene with a full inertia matrix is solved about principal axes; each call then takes some
         microseconds more.
     method : str
-        A name in `pyharness.methods.solver.PREPARED`; `auto` takes the fastest method that meets
-        the tolerance.
+        A name in `pyharness.methods.solver.PREPARED`; the name `auto` selects the fastest method
+        that meets the tolerance.
     tolerance : float
         Largest allowed error of any component of omega at the end, relative to the largest |omega|
         from 0 to the end. The default depends on the method, as in `solve`. Methods with a fixed

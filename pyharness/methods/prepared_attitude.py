@@ -46,9 +46,9 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
         """Create a solver and pack the data that all calls share; users call `prepare` instead.
 
-        `chosen` is the plan, which contains the scene. `tolerance` is relative to the largest
-        |omega|. `asked` is the name of the requested method, such as `auto`. `effort` is a factor
-        on the work limit of a call.
+        `chosen` is the plan: the scene, and the chosen method. `tolerance` is the largest allowed
+        error, relative to the largest |omega|. `asked` is the name of the requested method, such as
+        `auto`. `effort` multiplies the work limit of a call.
         """
         scene, code = chosen.scene, Methods.TAYLOR
         attitude = scene.attitude or IDENTITY
@@ -72,19 +72,20 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
 def prepared_attitude(scene: Scene, method: str, tolerance: float, effort: float) -> AttitudeSolver:
     """Return a prepared solver whose calls return omega and attitude of a scene.
 
-    `method` is a name in `pyharness.methods.solver.PREPARED`. `tolerance` is relative to the
-    largest |omega|, and it also limits the error of the attitude's angle (rad). `effort` is a
-    factor on the work limit of a call. Raise InputError if the method can't propagate attitudes.
+    `method` is a name in `pyharness.methods.solver.PREPARED`. `tolerance` limits the error of
+    omega, relative to the largest |omega|, and the error of the attitude's angle (rad). `effort`
+    multiplies the work limit of a call, some ten seconds. Raise InputError if the method can't
+    propagate attitudes.
     """
     return AttitudeSolver(attitude_plan(scene, method, tolerance), tolerance, method, effort)
 
 
 def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
-    """Return the plan for computing omega and attitude of a scene.
+    """Return the plan for omega and attitude of a scene: the method, and the computed parts.
 
-    `method` is the name of the requested method, and `tolerance` is relative to the largest
-    |omega|. If the scene has no attitude, its attitude at time 0 is (1, 0, 0, 0). Raise InputError
-    if the method can't propagate attitudes.
+    `method` is the name of the requested method, and `tolerance` is the largest allowed error,
+    relative to the largest |omega|. If the scene has no attitude, its attitude at time 0 is (1, 0,
+    0, 0). Raise InputError if the method can't propagate attitudes.
     """
     check_attitude(method)
     return plan(replace(scene, attitude=scene.attitude or IDENTITY), method, tolerance, rows=True)
@@ -93,11 +94,12 @@ def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
 def _check(
     usual: Quaternion, omega0: object, t_end: object, attitude0: object
 ) -> tuple[tuple[float, ...], float]:
-    """Convert arguments of a solver call that are of types which the C function can't read.
+    """Convert arguments of a solver call whose types the C function can't read.
 
     Return two values. The first is a tuple of the three numbers of `omega0` (rad/s) and the four
-    numbers of the initial quaternion. The second is `t_end` (s) as a float. `usual` is the initial
-    quaternion if `attitude0` is None. Raise InputError for a wrong type or number of values.
+    numbers of the initial quaternion. The second is `t_end` (s) as a float. The initial quaternion
+    is `attitude0`, or `usual` if `attitude0` is None. Raise InputError for a wrong type or number
+    of values.
     """
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     attitude = usual if attitude0 is None else unit_quaternion("attitude0", attitude0)[0]

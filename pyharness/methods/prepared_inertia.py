@@ -29,8 +29,9 @@ class InertiaSolver(Solver):
     """A prepared solver of a scene with a full inertia matrix, used in the same way as a `Solver`.
 
     The omegas that a call takes and returns are about the axes of the inertia matrix. The attribute
-    `plan` is the plan for the scene about principal axes. The attribute `growth` is the error
-    amplification: the largest norm of the state-transition matrices of omega about principal axes.
+    `plan` has the chosen method and the scene about principal axes. The attribute `growth` is the
+    error amplification: the largest norm of the state-transition matrices of omega about principal
+    axes.
     """
 
     def __new__(
@@ -39,9 +40,10 @@ class InertiaSolver(Solver):
     ) -> Self:  # fmt: skip
         """Create a solver of the scene about principal axes; users call `prepare` instead.
 
-        `chosen` is the plan for the scene about principal axes, and `scene` is the scene with the
-        inertia matrix. `tolerance` is relative to the largest |omega|. `asked` is the name of the
-        requested method, such as `auto`. `effort` is a factor on the work limit of a call.
+        `chosen` is the plan: the scene about principal axes, and the chosen method. `scene` is the
+        scene with the inertia matrix. `tolerance` is the largest allowed error, relative to the
+        largest |omega|. `asked` is the name of the requested method, such as `auto`. `effort`
+        multiplies the work limit of a call.
         """
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
@@ -59,8 +61,8 @@ class InertiaSolver(Solver):
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array:
         """Return omega (rad/s) at `t_end` (s), shape (3,), about the axes of the inertia matrix.
 
-        `omega0` is the initial omega (rad/s), about the same axes. If `out`, an array of three
-        floats, is not None, the result is written into it and `out` is returned.
+        `omega0` is the initial omega (rad/s), about the axes of the matrix, too. If `out`, an array
+        of three floats, is not None, the result is written into it and `out` is returned.
         """
         start = np.array(three_floats("omega0", omega0))
         if out is not None and (found := no_buffer(out)):
@@ -75,7 +77,10 @@ class InertiaSolver(Solver):
 
     @property
     def many(self) -> Any:
-        """Return the function that solves the scene from many initial omegas: see `Solver.many`."""
+        """Return the function that solves the scene from many initial omegas in one call.
+
+        Call it as ``solver.many(omega0, t_end)``; `Solver.many` describes its arguments.
+        """
         return self._many
 
     def _many(
@@ -91,7 +96,8 @@ class InertiaSolver(Solver):
     def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
         """Return the trajectory from the initial `omega0` (rad/s) at `times` (s).
 
-        Both are about the axes of the inertia matrix. For the arguments see `Solver.trajectory`.
+        The initial omega and the trajectory are about the axes of the inertia matrix. For the
+        arguments see `Solver.trajectory`.
         """
         return self._rows(replace(self._scene, omega=three("omega0", omega0)), times)
 
@@ -109,9 +115,10 @@ class InertiaAttitudeSolver(AttitudeSolver):
     ) -> Self:  # fmt: skip
         """Create a solver of the scene about principal axes; users call `prepare` instead.
 
-        `chosen` is the plan for the scene about principal axes, and `scene` is the scene with the
-        inertia matrix. `tolerance` is relative to the largest |omega|. `asked` is the name of the
-        requested method, such as `auto`. `effort` is a factor on the work limit of a call.
+        `chosen` is the plan: the scene about principal axes, and the chosen method. `scene` is the
+        scene with the inertia matrix. `tolerance` is the largest allowed error, relative to the
+        largest |omega|. `asked` is the name of the requested method, such as `auto`. `effort`
+        multiplies the work limit of a call.
         """
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
@@ -134,7 +141,8 @@ class InertiaAttitudeSolver(AttitudeSolver):
 
         Omega is about the axes of the inertia matrix, and the attitude is a quaternion from these
         axes to space, scalar first. `omega0` is the initial omega (rad/s), and `attitude0` the
-        initial quaternion. By default it is the scene's, or (1, 0, 0, 0) if the scene has none.
+        initial quaternion. The default quaternion is the scene's, or (1, 0, 0, 0) if the scene has
+        none.
         """
         start = np.array(three_floats("omega0", omega0))
         attitude = self._scene.attitude or IDENTITY
@@ -150,7 +158,7 @@ def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:
     """Return the principal axes of a scene's inertia matrix, as a matrix and as a quaternion.
 
     The columns of the matrix, shape (3, 3), are the axes. The quaternion, scalar first, is the same
-    rotation. It transforms components about principal axes to components about the axes of the
+    rotation. Both transform components about principal axes to components about the axes of the
     inertia matrix.
     """
     about_principal, axes = principal(replace(scene, attitude=IDENTITY))
@@ -188,8 +196,9 @@ def turned_back(attitudes: Array, turn: Any) -> Array:
 def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float) -> InertiaSolver:
     """Return a prepared solver of a scene with a full inertia matrix, without attitude.
 
-    `method` is a name in `pyharness.methods.solver.PREPARED`. `tolerance` is relative to the
-    largest |omega|, and `effort` is a factor on the work limit of a call.
+    `method` is a name in `pyharness.methods.solver.PREPARED`. `tolerance` is the largest allowed
+    error, relative to the largest |omega|. `effort` multiplies the work limit of a call, some ten
+    seconds.
     """
     from pyharness.methods.plan import plan
 
@@ -202,8 +211,9 @@ def prepared_inertia_attitude(
 ) -> InertiaAttitudeSolver:
     """Return a prepared solver of omega and attitude of a scene with a full inertia matrix.
 
-    `method` is a name in `pyharness.methods.solver.PREPARED`. `tolerance` is relative to the
-    largest |omega|, and `effort` is a factor on the work limit of a call.
+    `method` is a name in `pyharness.methods.solver.PREPARED`. `tolerance` is the largest allowed
+    error, relative to the largest |omega|. `effort` multiplies the work limit of a call, some ten
+    seconds.
     """
     from pyharness.methods.prepared_attitude import attitude_plan
 

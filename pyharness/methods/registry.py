@@ -76,8 +76,8 @@ def _from(room: str, name: str, *arguments: str | int) -> Integrator:
     """Return a function that solves scenes, and imports its module when it is first called.
 
     `room` is the name of a module of `pyharness.methods`, and `name` is the name of a function in
-    this module. If there are no `arguments`, this function solves scenes itself. Otherwise it
-    returns the function that solves scenes when it is called with `arguments`.
+    this module. Without `arguments`, the function `name` solves scenes itself. With `arguments`, it
+    is called with them and returns the function that solves scenes.
     """
 
     def solve(*given: Any) -> Trajectory:
@@ -194,8 +194,8 @@ SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if meth
 def requested_tolerance(method: str, tolerance: Number | None) -> float:
     """Return the requested tolerance as a float, or the method's default if it is None.
 
-    `method` is a name in the registry. Raise InputError if the tolerance is not a number. Whether
-    the tolerance is in the method's range is not checked.
+    `method` is a name in the registry of methods. Raise InputError if the tolerance is not a
+    number. Whether the tolerance is in the method's range is not checked.
     """
     chosen = REGISTRY[method]
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
@@ -211,9 +211,9 @@ def check_attitude(method: str) -> None:
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
     """Raise InputError if a torque about the axes of space acts and the method can't solve it.
 
-    `method` is a name in the registry. The error is also raised if `attitude` is false, which means
-    that the attitude is not computed, because such a torque depends on the attitude. A scene
-    without such a torque raises no error.
+    `method` is a name in the registry of methods. The error is also raised if `attitude` is false,
+    which means that the attitude is not computed. The reason is that such a torque depends on the
+    attitude. A scene without such a torque raises no error.
     """
     if not scene.torque.in_space:
         return

@@ -48,9 +48,9 @@ def trajectory_report(
     """Return the report of one trajectory of a scene, with a table of its rows and a picture.
 
     `method` is the name of the method or program, and `title` is the line under the scene's
-    heading. `listing` is the listing of the program, or None for a method. `word` is the name of
-    the arithmetic of a program that did not run in binary64, else None. `form` is the form in which
-    an attitude is shown: ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``.
+    heading. `listing` is the program with a choice of its defects, or None for a method. `word` is
+    the name of the arithmetic of a program that did not run in binary64, else None. `form` is the
+    form in which an attitude is shown: ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``.
     """
     columns = [*_TIMES, *_OMEGA]
     parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]
@@ -153,9 +153,10 @@ def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
 
 
 def plan_report(scene: Scene, plan: "Plan") -> Report:
-    """Return the report of a plan, with a table of the parts of the computation.
+    """Return the report of a plan: the chosen method, and a table of the parts of the computation.
 
-    The table states for each part whether it is computed, and why. `plan` is the plan for `scene`.
+    `plan` is the plan for `scene`, made before the scene is solved. The table states for each part
+    whether it is computed, and why.
     """
     table = Table(
         words("part computed why"),

@@ -72,8 +72,9 @@ _SHORTEST_SPAN = 2.0**-300
 class _Ahead(NamedTuple):
     """The results of a preliminary integration with few digits, which set the local tolerance.
 
-    They are the largest |omega|, the phase of the motion and of the torque waves, the error
-    amplification, and the angle by which the body rotates.
+    The local tolerance is the tolerance of one step. The results are the largest |omega|, the phase
+    of the motion and of the torque waves, the error amplification, and the angle by which the body
+    rotates.
     """
 
     largest: float  # largest abs(omega) of any component from 0 to the end, rad/s
@@ -98,8 +99,8 @@ def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> 
 def finest_tolerance(name: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method of SciPy can meet from 0 to `time` (s).
 
-    `name` is SciPy's name of the method, such as DOP853. The tolerance is relative to the largest
-    |omega|.
+    `name` is SciPy's name of the method, such as DOP853. The tolerance is for the error of omega at
+    `time`, relative to the largest |omega|.
     """
     ahead = _Run(scene, time, name).ahead()
     return _FINEST_STEP * steps_sum(name, *ahead[1:])
@@ -108,8 +109,8 @@ def finest_tolerance(name: str, scene: Scene, time: float) -> float:
 def scipy_method(name: str) -> Integrator:
     """Return a function that solves a scene by the method `name` of SciPy's `solve_ivp`.
 
-    The returned function chooses the local tolerance of `solve_ivp` so that the error at the
-    requested times meets the requested tolerance.
+    The returned function chooses the tolerance per step (the local tolerance of `solve_ivp`) so
+    that the error at the requested times meets the requested tolerance.
     """
 
     def solve(
@@ -224,9 +225,9 @@ class _NoNumberError(Exception):
 class _Run:
     """The integrations of one scene from 0 to `end` (s) by `solve_ivp`, with one work limit.
 
-    They are the preliminary integrations and the main one. The work limit applies to the number of
-    right-hand sides of all of them. `name` is SciPy's name of the main method, and `effort` is a
-    factor on the work limit.
+    Preliminary integrations with few digits precede the main integration. The work limit applies to
+    the number of right-hand sides of all of them, and `effort` multiplies it. `name` is SciPy's
+    name of the method of the main integration.
     """
 
     def __init__(self, scene: Scene, end: float, name: str, effort: float = 1.0) -> None:
@@ -260,7 +261,8 @@ class _Run:
 
         `relative` and `absolute` are the tolerances `rtol` and `atol` of `solve_ivp`, and `longest`
         is the longest allowed step (s). The result contains the solution at `times` (s), or dense
-        output if `times` is None. Times in the result are in the unit `self.unit` (s).
+        output if `times` is None. Times in the result are in the unit of time `self.unit`, which is
+        a number of seconds.
         """
         from scipy.integrate import solve_ivp
 
@@ -326,9 +328,9 @@ class _Run:
         The absolute tolerance is a fraction of the largest |omega| that is expected. The
         integration is repeated with a smaller expected value until the solution's |omega| is not
         much smaller than expected. If omega grows without bound, there is no largest |omega|. The
-        result then contains the larger of the expected value and the omega that torque alone would
-        cause. In this case the phase and the error amplification are unknown and have their least
-        values, 0 and 1.
+        result then contains, in its place, the larger of the expected value and the omega that
+        torque alone would cause. In this case the phase and the error amplification are unknown and
+        have their least values, 0 and 1.
         """
         scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()
         if scale == 0.0:
@@ -360,10 +362,11 @@ class _Run:
 
 
 def _pushes(scene: Scene) -> list[tuple[float, float]]:
-    """Return two numbers for each torque wave: its largest amplitude over moment, and frequency.
+    """Return two numbers for each torque wave: the size of its amplitude, and its frequency.
 
-    The first number is the largest of the three components of the amplitude over the moments
-    (1/s2). The second is the absolute value of the frequency (rad/s).
+    Each of the three components of the amplitude is divided by its moment of inertia. The first
+    number is the largest absolute value of these quotients (1/s2). The second is the absolute value
+    of the frequency (rad/s).
     """
     moments = scene.moments or (1.0, 1.0, 1.0)
     return [
@@ -375,8 +378,9 @@ def _pushes(scene: Scene) -> list[tuple[float, float]]:
 def _turned(scene: Scene, span: float, largest: float) -> float:
     """Return the sum of the phases (rad) of all torque waves over the time `span` (s).
 
-    The phase of a wave is limited to the ratio of the omega that the wave can add to `largest`, the
-    largest |omega| (rad/s). Therefore a wave that hardly changes omega hardly contributes.
+    The phase of a wave is limited to a ratio: the omega that the wave can add, divided by
+    `largest`, the largest |omega| (rad/s). Therefore a wave that hardly changes omega hardly
+    contributes.
     """
     found = 0.0
     for push, frequency in _pushes(scene):

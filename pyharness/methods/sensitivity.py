@@ -45,11 +45,12 @@ def torque_noise(
 ) -> float:
     """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
 
-    The result is an estimate without unit. Its numerator is the sum of the omegas that the terms of
-    the torque law would cause one by one until `t_end` (s). It includes the rounding of the terms
-    in each of `steps` steps. The denominator is `scale`, the largest |omega| (rad/s). If `scale` is
-    None, it is the larger of the initial |omega|, from `omega0` (rad/s), and the omega that the
-    whole torque causes. If the terms do not nearly cancel, the result is 0.
+    The result is an estimate of the ratio of the two rounding errors. Its numerator is the sum of
+    the omegas that the terms of the torque law would cause one by one until `t_end` (s). It
+    includes the rounding of the terms in each of `steps` steps. The denominator is `scale`, the
+    largest |omega| (rad/s). If `scale` is None, it is the larger of the initial |omega|, from
+    `omega0` (rad/s), and the omega that the whole torque causes. If the terms do not nearly cancel,
+    the result is 0.
     """
     if not (scene.torque.sines or scene.torque.cosines):
         return 0.0
@@ -88,10 +89,11 @@ def closed_form_estimate(
 def motion_growth(scene: Scene, t_end: float) -> float | None:
     """Return the error amplification of a scene's motion from time 0 to `t_end` (s).
 
-    It is a property of the motion and does not depend on the method that solves the scene. It is
-    the largest norm of the state-transition matrices, the derivatives of omega at the end with
-    respect to omega at any earlier time. It is computed from the closed form if the scene has one,
-    else by a Taylor series with few digits. The result is None if neither can determine it.
+    The error amplification is a property of the motion and does not depend on the method that
+    solves the scene. It is the largest norm of the state-transition matrices, the derivatives of
+    omega at the end with respect to omega at any earlier time. It is computed from the closed form
+    if the scene has one, else by a Taylor series with few digits. The result is None if neither can
+    determine it.
     """
     if closed_form(scene):
         _, growth = closed_form_estimate(scene, scene.omega, t_end)

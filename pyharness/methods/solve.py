@@ -137,10 +137,11 @@ def solve(
 def finest(method: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method of the registry can meet from 0 to `time` (s).
 
-    For most methods it does not depend on the scene: it is the tolerance that the method claims to
-    meet (`Method.finest`). Methods of SciPy's `solve_ivp` accept no local tolerance below some
-    2e-14. Their smallest tolerance exceeds the claimed one if many local errors add up or if the
-    motion amplifies them. Raise InputError if too many steps would be needed to determine it.
+    For most methods this tolerance does not depend on the scene and is the one that the method
+    claims to meet (`Method.finest`). Methods of SciPy's `solve_ivp` accept no local tolerance below
+    some 2e-14. Their smallest tolerance exceeds the claimed one if many local errors add up or if
+    the motion amplifies them. Raise InputError if too many steps would be needed to determine their
+    smallest tolerance.
     """
     claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:
@@ -156,8 +157,8 @@ def by_plan(
     """Return the trajectory at `times` (s) by the method that `plan` chooses for the scene.
 
     This function is the method `auto`. If the chosen method refuses the scene, the second method
-    that `plan` names (`fallback`) solves it. `tolerance` is relative to the largest |omega|, and
-    `effort` is a factor on the work limit.
+    that `plan` names (`fallback`) solves it. `tolerance` is the largest allowed error, relative to
+    the largest |omega|. `effort` multiplies the work limit of some ten seconds.
     """
     chosen = plan(scene, "auto", tolerance, rows=True)
     method = METHODS[chosen.method]
@@ -181,7 +182,8 @@ def _integrate(
 
     If necessary, the scene is solved in another unit of time, in which products of two components
     of omega neither overflow nor underflow. The trajectory is converted back to seconds.
-    `tolerance` is relative to the largest |omega|, and `effort` is a factor on the work limit.
+    `tolerance` is the largest allowed error, relative to the largest |omega|. `effort` multiplies
+    the work limit of some ten seconds.
     """
     if not chosen.is_fixed_step and not is_ordinary(scene):
         # The method does not use the step size, but in the new unit it might not be finite.
@@ -210,7 +212,8 @@ def _joined(before: Trajectory, after: Trajectory) -> Trajectory:
 
     `before` is the trajectory at negative times, with its rows in ascending order of time, and
     `after` is the trajectory from time 0. Steps and evaluations are added. The error and the error
-    amplification are the larger of the two values, and the ending is the worse of the two.
+    amplification are the larger of the two values, and the ending is the worse of the two, where an
+    overflow is the worst.
     """
     both = before, after
     rows: dict[str, Any] = {
@@ -234,8 +237,8 @@ def _larger(first: float | None, second: float | None) -> float | None:
 def _ascending(times: object) -> tuple[list[float], bool]:
     """Return a user's times (s) in ascending order, and whether they had to be reversed.
 
-    `times` is a number or an iterable of numbers. Raise InputError unless it is strictly monotonic,
-    finite and not empty.
+    `times` is a number or an iterable of numbers. Raise InputError unless the numbers are finite
+    and strictly monotonic, and at least one is given.
     """
     if not isinstance(times, Iterable) or getattr(times, "shape", None) == ():
         times = (times,)

@@ -97,9 +97,9 @@ class Solver(LastCall, BoundKernel):
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
         """Create a solver and pack the data that all calls share; users call `prepare` instead.
 
-        `chosen` is the plan, which contains the scene. `tolerance` is relative to the largest
-        |omega|. `asked` is the name of the requested method, such as `auto`. `effort` is a factor
-        on the work limit of a call.
+        `chosen` is the plan: the scene, and the chosen method. `tolerance` is the largest allowed
+        error, relative to the largest |omega|. `asked` is the name of the requested method, such as
+        `auto`. `effort` multiplies the work limit of a call.
         """
         kernel = extension().solve_packed
         packed = packed_scene(chosen.scene, _code(chosen), tolerance, effort)
@@ -139,8 +139,9 @@ class Solver(LastCall, BoundKernel):
     def method(self) -> str:
         """Return the name of the method that solved the scene in this thread's last call.
 
-        It is the plan's method, with two exceptions. The kernel may have chosen between `quick` and
-        `taylor`, or it may have used the plan's `fallback` because the closed form was refused.
+        It is the method for which the solver was prepared (`plan.method`), with two exceptions. The
+        kernel may have chosen between the methods `quick` (Runge-Kutta) and `taylor`. Or the closed
+        form did not apply to the motion, and the kernel used the method `plan.fallback`.
         """
         steps = self._counted()
         if not steps:
@@ -201,9 +202,10 @@ def no_buffer(out: object) -> str:
 
 
 def _code(chosen: Plan) -> int:
-    """Return the integer that selects the method of the plan `chosen` in the compiled kernel.
+    """Return the integer that selects the chosen method in the compiled kernel.
 
-    The integers are defined in `pyharness.model.codes.Methods`.
+    `chosen` is the plan, which names the method. The integers are defined in
+    `pyharness.model.codes.Methods`.
     """
     if chosen.closed_form == "sphere":
         return CODES["sphere"]

@@ -18,15 +18,15 @@ def taylor(
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) by Taylor series.
 
-    The attitude is computed too if the scene has one. `tolerance` is relative to the largest
-    |omega|, and `effort` is a factor on the work limit. If the error of the first integration is
-    too large, the scene is integrated again.
+    The attitude is computed too if the scene has one. `tolerance` is the largest allowed error,
+    relative to the largest |omega|. `effort` multiplies the work limit of some ten seconds. If the
+    error of the first integration is too large, the scene is integrated again.
 
     In the trajectory, `steps` is the number of steps of the last integration. `evaluations` is the
     number of steps of all integrations, because each step computes one Taylor series. Under a
     torque about the axes of space there are at least two integrations, the later ones with a
-    smaller local tolerance. Their difference is the estimate of the error, and the error
-    amplification (`growth`) is unknown.
+    smaller local tolerance. The difference of the integrations is the estimate of the error, and
+    the error amplification (`growth`) is unknown.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     # The first column is the attitude at time 0. A column for each time follows.

@@ -20,8 +20,9 @@ OPTIONAL = {
 class Build:
     """The versions, the Fortran compiler and the compiler flags of one installation.
 
-    `extension` is the path of the compiled extension. It is None, like `compiler` and `flags`, if
-    the extension is not built. `numpy` and `scipy` are None if the package is missing.
+    `extension` is the path of the compiled extension module. If the extension is not built,
+    `extension`, `compiler` and `flags` are None. `numpy` and `scipy` are None if the package is
+    missing.
     """
 
     version: str
@@ -35,7 +36,10 @@ class Build:
 
 
 def build() -> Build:
-    """Return the versions, the Fortran compiler and the compiler flags of this installation."""
+    """Return the versions, the Fortran compiler and the compiler flags of this installation.
+
+    A value is None if the extension, which records the compiler, or a package is missing.
+    """
     compiler = flags = extension = None
     try:
         from pyharness import _build, _kernels
@@ -60,8 +64,8 @@ def build() -> Build:
 def machine(packages: Iterable[str]) -> dict[str, str]:
     """Return a description of this machine: processor, number of cores, and installed packages.
 
-    The result is a dictionary with the keys "processor" and "cores". It also has the name of each
-    installed package among `packages` as a key, whose value is the version.
+    The result is a dictionary with the keys "processor" and "cores". For each installed package
+    among `packages` it also has the name of the package as a key, with the version as its value.
     """
     found = {"processor": _processor(), "cores": str(os.cpu_count())}
     return found | {name: text for name in packages if (text := _version(name)) is not None}
@@ -90,10 +94,10 @@ def _version(package: str) -> str | None:
 
 
 def doctor_report(build: Build) -> Report:
-    """Return the report of the verb `doctor`, which lists the versions and optional packages.
+    """Return the report of the subcommand `doctor` about this installation.
 
-    It shows the versions, compiler and flags in `build`. For each optional package it shows whether
-    the package is installed, and what it is needed for.
+    It shows the versions, the compiler and the compiler flags in `build`. For each optional package
+    it shows whether the package is installed, and what it is needed for.
     """
     rows = {
         "pyharness": build.version,

@@ -6,7 +6,7 @@ the same values in both languages.
 
 
 class Statuses:
-    """The integers, from 0, with which a compiled kernel reports how a computation ended."""
+    """The integers, from 0, with which a compiled Fortran kernel reports how its run ended."""
 
     COMPLETE = 0  # all requested rows are present
     STOPPED = 1  # the Lipschitz test ended the run
@@ -18,9 +18,10 @@ class Statuses:
 
 
 class Methods:
-    """The integers that select a method in the kernel of a prepared solver.
+    """The integers that select a method in the compiled kernel of a prepared solver.
 
-    A prepared solver solves one scene by one method, for many initial conditions.
+    A prepared solver integrates one scene (body and torque) by one method, for many initial
+    conditions.
     """
 
     CLOSED_FORM = 1  # for scenes without torque
@@ -39,7 +40,8 @@ class Methods:
 class Places:
     """Indices, from 0, into the array of parameters that a prepared solver passes to its kernel.
 
-    A prepared solver solves one scene by one method, for many initial conditions.
+    A prepared solver integrates one scene (body and torque) by one method, for many initial
+    conditions. Its kernel is a compiled Fortran routine.
     """
 
     METHOD = 0
@@ -67,12 +69,19 @@ class Series:
 
 
 class Waves:
-    """The largest angle, a power of 2, that our binary128 sine accepts (`wide_functions.f90`)."""
+    """The limit, as a power of 2, of the angles (rad) that our binary128 sine accepts.
+
+    This sine function is in the Fortran file `wide_functions.f90`. It returns NaN unless the
+    absolute angle is below the limit.
+    """
 
     ANGLE_BITS = 60  # the angle must be below 2**ANGLE_BITS rad; otherwise its sine is NaN
 
 
 class Blocks:
-    """The number of bodies that a compiled program of the thesis computes at once, as vectors."""
+    """The number of bodies that a compiled program of the thesis integrates simultaneously.
+
+    The program treats these bodies as vectors, so that the compiler can use vector instructions.
+    """
 
     LANE_COUNT = 32  # several vector registers, so that some compute while others wait

@@ -43,8 +43,8 @@ class Diagonal:
 def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
     """Return the eigenvalues and eigenvectors of a symmetric 3 x 3 matrix of finite floats.
 
-    The method is Jacobi's. If the matrix is already diagonal, the eigenvalues are its diagonal
-    elements, in their order.
+    The result is a `Diagonal`. The method is Jacobi's, in integers. If the matrix is already
+    diagonal, the eigenvalues are its diagonal elements, in their order.
     """
     exponent = min((_last_bit(x) for row in matrix for x in row if x), default=0)
     whole = [[_in_unit(x, exponent) for x in row] for row in matrix]
@@ -69,10 +69,11 @@ def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
 
 
 def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: int) -> None:
-    """Rotate the matrix `a` and the `vectors` in place, so that element p, q of `a` becomes 0.
+    """Apply a Jacobi rotation to `a` and `vectors` in place, which makes element p, q of `a` 0.
 
-    The rotation is about the axis other than p and q, by the smaller of the two possible angles
-    (Rutishauser 1966). The integers in `vectors` are components in units of 2**-bits.
+    `a` is the symmetric matrix, and `vectors` are the approximate eigenvectors. The rotation is in
+    the plane of the axes p and q, by the smaller of the two possible angles (Rutishauser 1966). All
+    numbers are integers; the components in `vectors` have the unit 2**-bits.
     """
     r = 3 - p - q
     gap, twice = a[q][q] - a[p][p], 2 * a[p][q]

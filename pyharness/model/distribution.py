@@ -5,7 +5,7 @@ DISTRIBUTION = "rigid-body-harness"
 
 
 def version() -> str:
-    """Return the version of the installed distribution."""
+    """Return the version of the installed distribution of this project, as text."""
     from importlib.metadata import version
 
     return version(DISTRIBUTION)

@@ -35,18 +35,23 @@ _MOST_STEPS_OF_ALL = 1e9
 class Integrator(Protocol):
     """The type of a function that integrates a scene and returns a trajectory at requested times.
 
-    The times (s) have one sign, and their distance from 0 increases. `tolerance` is relative to the
-    largest component of omega. `effort` is the factor on the work limit.
+    Its arguments are the scene, the times, the tolerance, and a factor on the limit of computing
+    work. The times (s) have one sign, and their distance from 0 increases. The tolerance is
+    relative to the largest component of the angular velocity omega.
     """
 
     def __call__(
         self, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, /
     ) -> Trajectory:
-        """Return the trajectory of `scene` at `times` (s), or raise InputError."""
+        """Return the trajectory of `scene` at `times` (s), or raise InputError if this fails.
+
+        `tolerance` is relative to the largest component of omega. `effort` is the factor by which
+        the limit of computing work is multiplied.
+        """
 
 
 def checked_effort(effort: Number) -> float:
-    """Return `effort`, the user's factor on the work limits, as a float.
+    """Return `effort`, the user's factor on the limits of computing work, as a float.
 
     Raise InputError unless it is a finite number above 0.
     """
@@ -60,18 +65,19 @@ def advice(instead: str, effort: float, needed: float | None = None) -> str:
     """Return the end of a message about an exceeded work limit, which says what the user can do.
 
     `instead` is a remedy that does not exceed the limit, as in "use fewer steps". `effort` is the
-    present factor on the limit. `needed` is an estimate of the factor with which the computation
-    completes, or None if there is no estimate.
+    factor by which the limit has been multiplied. `needed` is an estimate of the factor with which
+    the computation completes, or None if there is no estimate.
     """
     factor = suggested(effort, needed)
     return f"{instead}, or allow more work: --effort {factor} (effort={factor} in Python)"
 
 
 def suggested(effort: float, needed: float | None = None) -> str:
-    """Return, as text, a factor on the work limit that should suffice, rounded up to two digits.
+    """Return, as text, a factor on the work limit with which a computation should complete.
 
     `effort` is the present factor, which did not suffice. `needed` is an estimate of the factor
-    with which the computation completes. Without an estimate the result is ten times `effort`.
+    with which the computation completes. The result is twice this estimate, but at least `effort`.
+    Without an estimate it is ten times `effort`. The result is rounded up to two digits.
     """
     factor = max(_SLACK * needed, effort) if needed else _UNFORESEEN * effort
     factor = min(1e300, factor)
@@ -88,8 +94,9 @@ def waves(scene: Scene) -> int:
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
     """Raise InputError if the run of a program on one scene would exceed its work limit.
 
-    `program` is the name of the program, for the message. `implementation` is a key of `_LIMITS`
-    and selects the limit, as in "fortran" or "binary128". `effort` is the factor on the limit.
+    The work is the number of steps, increased for each sine and cosine of the torque. `program` is
+    the name of the program, for the message. `implementation` selects the limit, as in "fortran",
+    "python" or "binary128". `effort` is the factor by which the limit is multiplied.
     """
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)
@@ -106,8 +113,9 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
     """Raise InputError if the run of a compiled program on many bodies would exceed the work limit.
 
-    The work is the number of steps, summed over the bodies. `program` is the name of the program,
-    for the message. `bodies` is the number of bodies, and `effort` the factor on the limit.
+    The work is the product of `bodies`, the number of steps, and one plus the number of sines and
+    cosines in the torque. `program` is the name of the program, for the message. `bodies` is the
+    number of bodies, and `effort` the factor by which the limit is multiplied.
     """
     cost = 1.0 + _LIMITS["fortran"][1] * waves(scene)
     needed = bodies * scene.steps * cost / _MOST_STEPS_OF_ALL

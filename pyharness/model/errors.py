@@ -8,7 +8,7 @@ _LONGEST = 900
 
 
 class InputError(ValueError):
-    """The exception for an error in the user's input; the command then has exit status 2.
+    """The exception for an error in the user's input; a command that it ends has exit status 2.
 
     The message is one line of printable characters, even if it quotes other text.
 
@@ -37,10 +37,11 @@ class InputError(ValueError):
 
 
 class TimedError(InputError):
-    """An InputError whose message contains a time (s), as when a method reached its work limit.
+    """An InputError of a method, whose message contains a time (s) of the integrated scene.
 
-    The time is that of the scene that was integrated. This scene may be a copy of the user's scene
-    with rescaled time; `slower` then converts the time.
+    An example is the time at which the method reached its work limit. The integrated scene may be a
+    copy of the user's scene with rescaled time. The function `slower` then converts the time to
+    that of the user's scene.
     """
 
     def __init__(self, message: str, time: float) -> None:
@@ -50,19 +51,23 @@ class TimedError(InputError):
         self._message = message
 
     def __reduce__(self) -> tuple[type["TimedError"], tuple[str, float]]:
-        """Return the class and its arguments, so that multiprocessing can pickle the error."""
+        """Return the class and the arguments that recreate the error, so that it can be pickled.
+
+        Python's multiprocessing pickles errors.
+        """
         return type(self), (self._message, self.time)
 
     def slower(self, factor: float) -> "TimedError":
         """Return the same error with its time multiplied by `factor`.
 
-        The factor converts from the rescaled time of the solved scene to the user's time.
+        The error was raised for a copy of the user's scene with rescaled time. `factor` converts
+        the time of this copy to that of the user's scene.
         """
         return TimedError(self._message, self.time * factor)
 
 
 class NotBuiltError(RuntimeError):
-    """The exception for a missing compiled extension; the command then has exit status 3.
+    """The exception for a missing Fortran extension; a command that it ends has exit status 3.
 
     Examples
     --------

@@ -18,7 +18,7 @@ ENDS = tuple(name.lower().replace("_", " ") for name in vars(Statuses) if name.i
 
 
 def extension() -> ModuleType:
-    """Return the compiled extension, a module; raise NotBuiltError if it is missing."""
+    """Return the compiled Fortran extension, a module; raise NotBuiltError if it is missing."""
     try:
         from pyharness import _kernels
     except ImportError as error:
@@ -31,10 +31,11 @@ def extension() -> ModuleType:
 
 
 def columns(waves: tuple[Wave, ...], kind: type = float) -> NDArray[Any]:
-    """Return n torque waves as an array for the kernels, shape (4, n), in Fortran order.
+    """Return n waves of a torque as an array for the compiled kernels, shape (4, n).
 
-    A column consists of the three amplitudes of a wave, one for each axis, and its frequency
-    (rad/s). `kind` is the type of the numbers in the array.
+    A wave is a sine or cosine term. Each column has the three amplitudes of a wave, one for each
+    axis, and its frequency (rad/s). `kind` is the type of the numbers in the array, whose elements
+    are in Fortran order.
     """
     columns: NDArray[Any] = np.empty((4, len(waves)), dtype=kind, order="F")
     for index, (amplitude, frequency) in enumerate(waves):

@@ -14,7 +14,7 @@ _FOLDER = _PACKAGE / "data"
 
 @cache
 def facts(name: str) -> dict[str, Any]:
-    """Return the content of ``data/<name>.toml`` as a dictionary.
+    """Return the content of the file ``data/<name>.toml`` of this package as a dictionary.
 
     The dictionary is cached, so callers must not change it.
     """
@@ -23,10 +23,10 @@ def facts(name: str) -> dict[str, Any]:
 
 
 def shipped(name: str) -> Path:
-    """Return the path of a folder of the project outside the package, as in ``fortran/original``.
+    """Return the path of a project folder that a checkout has beside the Python package.
 
-    `name` is ``docs``, ``web`` or a folder in ``fortran``. An installed package contains these
-    folders in its folder ``data``, except ``docs``. In a checkout they are beside the package.
+    `name` is ``docs``, ``web`` or a folder in ``fortran``, as in ``fortran/original``. An installed
+    package contains these folders, except ``docs``, in its folder ``data``.
     """
     installed = _FOLDER / name
     return installed if installed.exists() else _PACKAGE.parent / name

@@ -14,7 +14,7 @@ def is_finite(x: Any) -> bool:
 
 
 def square_root(x: Any) -> Any:
-    """Return the square root of a number; raise ValueError for a float below zero."""
+    """Return the square root of a number in any format; raise ValueError for a float below 0."""
     return math.sqrt(x) if isinstance(x, float) else x.sqrt()
 
 

@@ -44,7 +44,10 @@ class PrincipalFrame:
     exact_axes: tuple[Exact, Exact, Exact]
 
     def into(self, vector: Exact) -> Exact:
-        """Return a vector's principal components from its components about the body's axes."""
+        """Return the components of a vector about the principal axes.
+
+        `vector` contains its components about the body's own axes. All components are Fractions.
+        """
         first, second, third = (
             sum((x * v for x, v in zip(axis, vector, strict=True)), Fraction(0))
             for axis in self.exact_axes
@@ -86,9 +89,9 @@ def checked_inertia(where: str, values: object) -> Matrix:
 def principal_frame(inertia: Matrix) -> PrincipalFrame:
     """Return the principal moments and axes of a symmetric inertia matrix (kg m2).
 
-    The moments are not sorted by size, because each principal axis has the number of the body axis
-    that it is nearest to. Every moment is accurate to its last digit, even if it is much smaller
-    than the others. The result is cached.
+    The result is a `PrincipalFrame`, and is cached. The moments are not sorted by size, because
+    each principal axis has the number of the body axis that it is nearest to. Every moment is
+    accurate to its last digit, even if it is much smaller than the others.
     """
     found = diagonalised(inertia)
     order: list[int] = []
@@ -121,10 +124,10 @@ def principal_axes(inertia: Matrix) -> tuple[Triple, Array]:
 
 
 def breaks_triangle(inertia: Matrix) -> bool:
-    """Return whether the largest principal moment exceeds the sum of the other two.
+    """Return whether the largest principal moment of a matrix exceeds the sum of the other two.
 
-    In a flat body the largest moment equals this sum. An excess that may only be due to rounding
-    errors of the matrix elements is ignored.
+    `inertia` is the inertia matrix (kg m2). In a flat body the largest moment equals the sum. An
+    excess that may only be due to rounding errors of the matrix elements is ignored.
     """
     low, middle, high = sorted(principal_frame(inertia).exact_moments)
     return high - low - middle > _ROUNDED * high
@@ -135,7 +138,10 @@ def _turned(axis: Exact) -> Exact:
 
 
 def _determinant(axes: list[Exact]) -> float:
-    """Return the determinant, 1 or -1, of three orthonormal axes; floats suffice for its sign."""
+    """Return the determinant of three orthonormal axes, which is 1 or -1 up to rounding errors.
+
+    It is computed with floats, which suffice for its sign.
+    """
     (a, b, c), (d, e, f), (g, h, k) = ([float(x) for x in axis] for axis in axes)
     return a * (e * k - f * h) - b * (d * k - f * g) + c * (d * h - e * g)
 

@@ -28,12 +28,12 @@ class Listing:
     defects : frozenset of str
         The active defects, which are mistakes of the printed program that are not corrected.
     readings : frozenset of str
-        The active readings. An active reading interprets an original statement in the way that this
-        edition of the programs does not adopt. A corrected program has no readings, because no
-        reading changes a corrected statement.
+        The active readings. A reading is an interpretation of a doubtful original statement, other
+        than the one that we adopt. A corrected program has no readings, because no reading changes
+        a corrected statement.
     conjectures : frozenset of str
-        The active assumptions about statements for which no card exists. Names of conjectures and
-        readings are also accepted among `defects`.
+        The active assumptions about statements that are on no printed card. Names of conjectures
+        and readings are also accepted among `defects`.
 
     Raises
     ------
@@ -67,7 +67,10 @@ class Listing:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Assign each name to its kind; raise InputError for a name that the program lacks."""
+        """Check the names, and assign each to its kind: defect, reading or conjecture.
+
+        Raise InputError for an unknown program, or for a name that the program does not have.
+        """
         _check_program(self.program)
         given = {field: _names(field, getattr(self, field)) for field in _FIELDS.values()}
         for kind in ("reading", "conjecture"):
@@ -85,8 +88,9 @@ class Listing:
     def label(self) -> str:
         """The kind of listing, as text: `original`, `corrected` or `custom`.
 
-        The label is `corrected` if no name is active. It is `original` if, apart from readings,
-        exactly the names that `switches` returns are active. It is `custom` otherwise.
+        The label is `corrected` if no defect, reading or conjecture is active. It is `original` if,
+        apart from readings, exactly the defects and conjectures that `switches` returns are active.
+        It is `custom` otherwise.
         """
         if not self.active:
             return "corrected"
@@ -96,25 +100,32 @@ class Listing:
 
     @property
     def active(self) -> frozenset[str]:
-        """The names of all active defects, readings and conjectures."""
+        """The names of all active defects, readings and conjectures of the listing."""
         return self.defects | self.readings | self.conjectures
 
     @property
     def flags(self) -> int:
-        """The active names as the bit mask, an integer, that the compiled programs take."""
+        """The active defects, readings and conjectures as a bit mask, an integer.
+
+        The compiled programs take this integer as an argument.
+        """
         return sum(1 << entry["flag"] for entry in flagged() if entry["id"] in self.active)
 
     @classmethod
     def original(cls, program: str, readings: Iterable[str] = ()) -> "Listing":
         """Return the listing of the original program, with all its defects active.
 
-        The conjectures that `switches` returns, and the given `readings`, are active too.
+        The conjectures (assumptions) that belong to the original, as `switches` says, are active
+        too. So are the given `readings`, which are interpretations of doubtful statements.
         """
         return cls(program, frozenset(switches(program)), frozenset(readings))
 
     @classmethod
     def corrected(cls, program: str) -> "Listing":
-        """Return the listing of the corrected program: no defects, readings or conjectures."""
+        """Return the listing of the corrected program.
+
+        No defect, reading or conjecture is active in this listing.
+        """
         return cls(program, frozenset())
 
     def has(self, name: str) -> bool:
@@ -125,8 +136,9 @@ class Listing:
 def flagged() -> list[dict[str, Any]]:
     """Return the entries of the critical apparatus that a listing can switch on or off.
 
-    They are the defects, readings and conjectures. Each entry is a table of `data/apparatus.toml`,
-    and its key "flag" is the number of its bit in `Listing.flags`.
+    A listing is a program with a choice of its defects (mistakes), readings (interpretations) and
+    conjectures (assumptions). The critical apparatus, the file `data/apparatus.toml`, has an entry
+    for each of them. The key "flag" of an entry is the number of its bit in `Listing.flags`.
     """
     return [entry for entry in facts("apparatus")["entry"] if "flag" in entry]
 
@@ -134,8 +146,10 @@ def flagged() -> list[dict[str, Any]]:
 def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
     """Return the names of all defects, of all readings or of all conjectures.
 
-    `kind` is "defect", "reading" or "conjecture". If `program` is given, only the names that this
-    program has are returned.
+    `kind` is "defect", "reading" or "conjecture". A defect is a mistake of a printed program, a
+    reading an interpretation of a doubtful statement, and a conjecture an assumption about a
+    statement that is on no card. If `program` is given, only the names that this program has are
+    returned.
     """
     return tuple(
         entry["id"]
@@ -147,17 +161,20 @@ def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
 def switchable(program: str | None = None) -> tuple[str, ...]:
     """Return the names of all defects, readings and conjectures, in this order.
 
-    The options --fix and --keep accept these names. If `program` is given, only the names that this
-    program has are returned.
+    A defect is a mistake of a printed program, a reading an interpretation of a doubtful statement,
+    and a conjecture an assumption about a statement that is on no card. The options --fix and
+    --keep accept these names. If `program` is given, only the names that this program has are
+    returned.
     """
     return tuple(name for kind in _FIELDS for name in names_of(kind, program))
 
 
 def switches(program: str) -> tuple[str, ...]:
-    """Return the names that are active in the original program: its defects and some conjectures.
+    """Return the names of the defects and conjectures that are active in the original program.
 
-    A conjecture is active in the original if its entry in `data/apparatus.toml` has the key
-    `in_original`, with the value true.
+    All its defects (mistakes) are active. A conjecture (an assumption about a statement that is on
+    no card) is active if its entry in `data/apparatus.toml` has the key `in_original`, with the
+    value true.
     """
     return tuple(
         entry["id"]
@@ -176,10 +193,11 @@ def subset(
     readings: Iterable[str] = (),
     conjectures: Iterable[str] | None = None,
 ) -> Listing:
-    """Return the listing of a program with a selection of defects, readings and conjectures.
+    """Return a Listing: a program with a selection of its defects, readings and conjectures.
 
-    The parameters correspond to the options --program, --listing (`base`), --fix, --keep, --reading
-    and --conjecture of the command line.
+    A defect is a mistake of the printed program, and a reading an interpretation of a doubtful
+    statement. The parameters correspond to the options --program, --listing (`base`), --fix,
+    --keep, --reading and --conjecture of the command line.
 
     Parameters
     ----------

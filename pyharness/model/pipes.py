@@ -33,7 +33,7 @@ def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) 
     ------
     InputError
         For a file that can't be read, a folder, a device, a file larger than `limit`, or a pipe
-        that delivers no data for `PATIENCE` seconds.
+        that delivers no data for `PATIENCE` (10) seconds.
     """
     try:
         content = _read(os.fspath(path), limit)
@@ -73,17 +73,17 @@ def _read(path: str, limit: int) -> bytes:
 
 
 def _is_quiet(handle: int) -> bool:
-    """Return whether the open file `handle` is one of the character devices that may be read.
+    """Return whether an open character device is a terminal or the null device.
 
-    These are terminals and the null device. `handle` is the file descriptor of a character device.
+    Only these character devices may be read. `handle` is the file descriptor of the device.
     """
     return os.isatty(handle) or os.fstat(handle).st_rdev == os.stat(os.devnull).st_rdev
 
 
 def write_waiting(path: str, content: bytes) -> None:
-    """Write `content` to a device, or to a pipe once the pipe has a reader.
+    """Write the bytes `content` to a device, or to a pipe once the pipe has a reader.
 
-    Raise OSError if the pipe has no reader within `PATIENCE` seconds.
+    Raise OSError if the pipe has no reader within `PATIENCE` (10) seconds.
     """
     end = time.monotonic() + PATIENCE
     while True:

@@ -15,7 +15,7 @@ from pyharness.model.waves import exact_law
 
 @dataclass(frozen=True)
 class PrincipalScene(Scene):
-    """A scene in components about principal axes, with moments in double-double precision.
+    """A scene (problem) about the principal axes, with moments in double-double precision.
 
     The coefficients A, B, C of Euler's equations (13-15 of the thesis) contain differences of
     moments. If two moments are nearly equal, rounding errors in binary64 would be a large part of
@@ -111,7 +111,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
 
 
 def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
-    """Return a trajectory about principal axes, transformed back to the body's own axes.
+    """Return a trajectory, transformed from the principal axes back to the body's own axes.
 
     `found` is a trajectory of the scene that `principal` returned. `axes` is the array of principal
     axes, shape (3, 3), that `principal` returned with this scene.

@@ -11,7 +11,7 @@ that is computed next.
 
 
 def no_progress(done: int, total: int, what: str) -> None:
-    """Report nothing; this is the default of every computation that can report its progress.
+    """Ignore a report of progress; this is the default function of computations that report it.
 
     `done` is the number of completed parts, `total` the number of all parts, and `what` the name of
     the current part.

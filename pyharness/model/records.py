@@ -11,10 +11,10 @@ from pyharness.model.trajectory import Trajectory
 
 
 def scene_record(scene: Scene) -> dict[str, Any]:
-    """Return a scene as a dictionary for JSON.
+    """Return a scene (body, torque, initial conditions and steps) as a dictionary for JSON.
 
-    It has the tables and keys of a scene file. In addition it has the key "case", the number of the
-    scene's case in Table 1 of the thesis, or None.
+    The dictionary has the tables and keys of a scene file. In addition it has the key "case", the
+    number of the scene's case in Table 1 of the thesis, or None.
     """
     body, values = body_of(scene)
     return {
@@ -42,9 +42,10 @@ def _wave(wave: Wave) -> dict[str, Any]:
 
 
 def listing_record(listing: Listing) -> dict[str, Any]:
-    """Return a listing as a dictionary for JSON.
+    """Return a listing, a program with a choice of its defects, as a dictionary for JSON.
 
-    It has the listing's label, and the names of its active defects, readings and conjectures.
+    Its keys are "label", as in "corrected", and "defects", "readings" and "conjectures". These
+    three have lists of the active names.
     """
     return {
         "label": listing.label,
@@ -80,5 +81,8 @@ def estimate_record(trajectory: Trajectory) -> dict[str, float | None]:
 
 
 def build_record() -> dict[str, Any]:
-    """Return the versions, compiler and flags of this installation, as a dictionary for JSON."""
+    """Return the versions, compiler and compiler flags of this installation, for JSON.
+
+    The result is a dictionary with the attributes of `Build`.
+    """
     return asdict(build())

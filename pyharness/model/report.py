@@ -42,7 +42,7 @@ def short(x: float | None) -> str:
 
 
 def digits(form: str, scale: float = 1.0) -> Callable[[float | None], str]:
-    """Return a function that formats `scale` times a number.
+    """Return a function that formats `scale` times a number as text.
 
     `form` is the format specification, as in ``.3g``. The function returns a dash for None.
     """
@@ -57,8 +57,9 @@ def counted(number: int, what: str) -> str:
 class Column(NamedTuple):
     """A column of a table: its heads, its unit, and the functions that format its values.
 
-    In formatted output `head` is the head, and `write` formats the values. In CSV `name` is the
-    head, and `full` formats the values.
+    A table can be written with rounded numbers, or as CSV with all digits. With rounded numbers
+    `head` is the head, and `write` formats the values. In CSV `name` is the head, and `full`
+    formats the values.
     """
 
     head: str
@@ -71,7 +72,10 @@ class Column(NamedTuple):
 
 
 def words(heads: str) -> list[Column]:
-    """Return a left-aligned column for each head in the text `heads`, separated by blanks."""
+    """Return a list of left-aligned columns, one for each head in the text `heads`.
+
+    The heads in the text are separated by blanks.
+    """
     return [Column(head, left=True) for head in heads.split()]
 
 
@@ -85,11 +89,17 @@ class Table(NamedTuple):
     rows: "Sequence[Sequence[Any]] | Array"
 
     def written(self) -> list[list[str]]:
-        """Return the heads and all rows as text, with formatted (rounded) numbers."""
+        """Return the table as lists of texts, first the heads and then the rows.
+
+        The numbers are rounded, as the function `write` of each column formats them.
+        """
         return self._cells([(each.head, each.write) for each in self.columns])
 
     def in_full(self) -> list[list[str]]:
-        """Return the heads and all rows as text, with all digits of the numbers, for CSV."""
+        """Return the table for CSV as lists of texts, first the heads and then the rows.
+
+        The numbers have all their digits.
+        """
         return self._cells([(each.name or each.head, each.full) for each in self.columns])
 
     def _cells(self, columns: list[tuple[str, Callable[[Any], str]]]) -> list[list[str]]:
@@ -99,7 +109,10 @@ class Table(NamedTuple):
 
 
 def numbers(names: str, rows: Sequence[Sequence[Any]]) -> Table:
-    """Return a table of `rows` for CSV only; `names` has its heads, separated by blanks."""
+    """Return a table of `rows` for CSV only.
+
+    The text `names` has the heads of its columns, separated by blanks.
+    """
     return Table([Column(name) for name in names.split()], rows)
 
 
@@ -121,7 +134,10 @@ Section = Sequence[str | Field | Table]
 
 
 class Picture:
-    """A matplotlib figure, the table of the numbers that it shows, and its title in paragraphs."""
+    """A matplotlib figure, the table of the numbers that it shows, and the text of its title.
+
+    The title is a sequence of paragraphs.
+    """
 
     def __init__(self, figure: "Figure", numbers: Table, title: Sequence[str] = ()) -> None:
         """Store the figure, the table of the numbers that it shows, and its title."""
@@ -133,7 +149,10 @@ Case = tuple[str, str, str, str]
 
 
 class Report(NamedTuple):
-    """The results of a verb (subcommand) as data, from which every output format is written."""
+    """The results of a subcommand as data, from which every output format is written.
+
+    The formats are text, JSON, CSV, Markdown, JUnit and pictures.
+    """
 
     title: str  # the verb that made the report
     text: Sequence[Section]  # for the terminal; empty sections are skipped

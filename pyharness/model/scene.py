@@ -106,7 +106,10 @@ class TorqueLaw:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the values and convert them to floats; raise InputError for an invalid value."""
+        """Check the fields of the torque law, and convert its numbers to floats.
+
+        Raise InputError for an invalid value.
+        """
         for name in ("constant", "rate"):
             object.__setattr__(self, name, three(f"[torque] {name}", getattr(self, name)))
         for name in ("sines", "cosines"):
@@ -136,7 +139,8 @@ class TorqueLaw:
     def at(self, time: float) -> Triple:
         """Return the three components of the torque N at `time` (s).
 
-        The terms are added in the order of the definition, so that rounding is always the same.
+        The terms are added in the order constant, linear, sines and cosines, so that rounding is
+        always the same.
         """
         torque = list(self.constant)
         if self.varies:
@@ -229,7 +233,10 @@ class Scene:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the values and convert them to floats; raise InputError for an invalid value."""
+        """Check the fields of the scene, and convert its real numbers to floats.
+
+        Raise InputError for an invalid value.
+        """
         if not isinstance(self.name, str):
             raise InputError(f"name is {kind_of(self.name)}; it must be text")
         self._set("name", printable(" ".join(self.name.split()))[:_LONGEST_NAME].rstrip())
@@ -299,9 +306,10 @@ class Scene:
 
     @property
     def exact_moments(self) -> "Exact | None":
-        """The principal moments (kg m2) as exact fractions, or None if only A, B, C are known.
+        """The principal moments (kg m2) as exact fractions; None for a body with coefficients.
 
-        Raise InputError if the scene has a full inertia matrix.
+        The coefficients A, B, C of Euler's equations do not determine the moments. Raise InputError
+        if the scene has a full inertia matrix.
         """
         if self.coefficients is not None:
             return None
@@ -320,7 +328,11 @@ class Scene:
 
     @property
     def is_impossible(self) -> bool:
-        """Whether no rigid body has these moments: the largest exceeds the sum of the other two."""
+        """Whether no rigid body has the moments of inertia of the scene.
+
+        The largest moment then exceeds the sum of the other two. The result is false for a body
+        with coefficients.
+        """
         if self.inertia is not None:
             from pyharness.model.inertia import breaks_triangle
 

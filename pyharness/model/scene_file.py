@@ -25,12 +25,12 @@ _WAVES = ("sines", "cosines")
 
 
 def case_numbers() -> list[int]:
-    """Return the numbers of the cases of Table 1 of the thesis."""
+    """Return the list of the numbers, 1 to 7, of the cases of Table 1 of the thesis."""
     return [entry["number"] for entry in facts("cases")["case"]]
 
 
 def case_scene(number: SupportsIndex) -> Scene:
-    """Return the scene of a case of Table 1 of the thesis.
+    """Return the scene (the problem to solve) of a case of Table 1 of the thesis.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def case_scene(number: SupportsIndex) -> Scene:
 
 
 def read_scene(path: str | os.PathLike[str]) -> Scene:
-    """Return the scene that a TOML file describes.
+    """Return the scene (the problem to solve) that a TOML file describes.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
-    """Return the scene that the content of a scene file describes.
+    """Return the scene that a TOML file, a scene file with the bytes `content`, describes.
 
     `default_name` is the name of the scene if the file has no key ``name``. Raise InputError, with
     `where` in front of the message, if the content is invalid.
@@ -247,8 +247,9 @@ def _waves(where: str, entries: object) -> list[tuple[Any, Any]]:
 def check_written_schema(data: dict[str, Any], kind: str) -> None:
     """Raise InputError if a file that users write has a schema number that is not supported.
 
-    `data` are the data of the file. A missing schema number is accepted, and stands for the
-    supported one. `kind` is the kind of the file, a key of `SCHEMAS`.
+    A schema number is the version of a file format. `data` are the data of the file, as a
+    dictionary. A missing schema number is accepted, and stands for the supported one. `kind` is the
+    kind of the file, as in "scene file".
     """
     given = data.get("schema", SCHEMAS[kind])
     check_schema("top level", kind, given, "write it in that form, or take a version that reads it")

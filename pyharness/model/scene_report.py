@@ -52,7 +52,10 @@ def _tuple(values: Sequence[float]) -> str:
 
 
 def ending(trajectory: Trajectory) -> str:
-    """Return a line about how a run ended: its status, and the numbers of steps and evaluations."""
+    """Return a line that says how a run ended, and how many steps and evaluations it took.
+
+    The evaluations are those of the right-hand side.
+    """
     steps = counted(trajectory.steps, "step")
     counts = f"{steps}, {counted(trajectory.evaluations, 'right-hand side')}"
     if trajectory.stop is not None:
@@ -78,7 +81,10 @@ def sensitive(growth: float | None, digits: float | None) -> str:
 
 
 def estimates(trajectory: Trajectory) -> list[str]:
-    """Return a list of at most one line, with a method's estimates of its own error, if known."""
+    """Return a line with a method's estimates of its own error, in a list of one element.
+
+    The list is empty if no estimate is known.
+    """
     told = []
     if trajectory.error is not None and trajectory.digits is not None:
         told.append(f"estimated error {short(trajectory.error)} of the largest |omega|")

@@ -25,12 +25,14 @@ The number is increased if an old version would misread a new file, or a new ver
 def check_schema(where: str, kind: str, found: object, remedy: str) -> None:
     """Raise InputError if a file's schema number is not the one that this version reads.
 
+    A schema number is the version of a file format.
+
     Parameters
     ----------
     where : str
-        The file, or the level in the file, with which the message begins: "scene file 'a.toml'".
+        The file, or the place in it, with which the message begins, as in "scene file 'a.toml'".
     kind : str
-        Kind of the file, a key of `SCHEMAS`.
+        Kind of the file, a key of `SCHEMAS`, as in "scene file".
     found : object
         The schema number in the file; None if the file has none. If the file may omit the number,
         the caller passes the number in `SCHEMAS` instead of None.

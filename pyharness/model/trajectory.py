@@ -61,7 +61,7 @@ class Trajectory:
         The true time of each row, s.
     recorded_time : ndarray, shape (n,)
         The variable TIME that a program writes to its output file TAPE5, s. A defect may make it
-        differ from `time`. For methods it is the same as `time`.
+        differ from `time`. For methods, which are our own solvers, it is the same as `time`.
     omega : ndarray, shape (n, 3)
         Angular velocity about the body axes, rad/s.
     velocity : ndarray, shape (n, 3), or None
@@ -199,12 +199,19 @@ class Trajectory:
 
     @property
     def digits(self) -> float | None:
-        """The number of correct decimal digits of omega, from `error`; None if `error` is None."""
+        """The number of correct decimal digits of omega; None if it is unknown.
+
+        It is computed from the estimated relative error, the attribute `error`.
+        """
         return digits_left(self.error)
 
     @property
     def has_all_rows(self) -> bool:
-        """Whether all requested rows are present, even if the result is sensitive."""
+        """Whether all requested rows are present in the trajectory.
+
+        A sensitive result has all rows too, although its amplified rounding error exceeds the
+        tolerance.
+        """
         return self.ended in WITH_ALL_ROWS
 
 

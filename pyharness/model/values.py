@@ -149,8 +149,8 @@ def boolean(where: str, value: object) -> bool:
 def tolerance_of(value: object, finest: float) -> float:
     """Return a user's tolerance as a float; raise InputError if it is no number.
 
-    The caller checks the range of the tolerance. `finest` is the smallest tolerance that it allows,
-    and is only used in the message.
+    The caller checks the range of the tolerance. `finest` is the smallest tolerance that the caller
+    allows, and is only used in the message.
     """
     found = converted(value)
     if isinstance(found, float):

@@ -41,7 +41,10 @@ class ExactLaw:
     frame: str
 
     def turned(self, turn: Callable[[Exact], Exact]) -> "ExactLaw":
-        """Return the law with every vector of three components rotated by the function `turn`."""
+        """Return the law with each of its vectors rotated by the function `turn`.
+
+        The vectors are the constant, the rate and the amplitudes, which have three components each.
+        """
 
         def waves(each: tuple[ExactWave, ...]) -> tuple[ExactWave, ...]:
             return tuple((turn(amplitude), frequency) for amplitude, frequency in each)
@@ -94,7 +97,11 @@ def is_mergeable(law: TorqueLaw) -> bool:
 
 
 def exact_law(law: TorqueLaw) -> ExactLaw:
-    """Return a torque law in exact fractions, with waves merged as by `merged`."""
+    """Return a torque law in exact fractions, with its waves merged.
+
+    Waves are sine and cosine terms. After merging there is at most one sine and one cosine per
+    frequency, and none of frequency 0.
+    """
     constant = _exact(law.constant)
     cosines = _summed(law.cosines, even=True)
     # A cosine of frequency 0 is 1 at all times, whereas a sine is 0.
@@ -113,8 +120,9 @@ def exact_law(law: TorqueLaw) -> ExactLaw:
 def _summed(waves: Iterable[Wave], even: bool) -> list[ExactWave]:
     """Return the sums of waves of equal or opposite frequency, without sums of amplitude 0.
 
-    All `waves` are cosines if `even` is true, otherwise sines. A sine of negative frequency is
-    added as the opposite of a sine of positive frequency.
+    All `waves` are cosines if `even` is true, otherwise sines. A sine whose frequency is opposite
+    to that of the first sine in the sum is subtracted. The result is a list of pairs: an amplitude
+    in exact fractions, and a frequency.
     """
     found: dict[float, tuple[float, Exact]] = {}
     for amplitude, frequency in waves:
@@ -147,7 +155,10 @@ def _rounded(values: Exact) -> Triple:
 
 
 def with_merged_waves(scene: Scene) -> Scene:
-    """Return the scene with at most one sine and one cosine per frequency in its torque."""
+    """Return the scene with at most one sine and one cosine per frequency in its torque.
+
+    Terms of the same frequency are added exactly, by the function `merged`.
+    """
     law = merged(scene.torque)
     return scene if law is scene.torque else replace(scene, torque=law)
 
@@ -155,10 +166,11 @@ def with_merged_waves(scene: Scene) -> Scene:
 def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Array, Array, Array]:
     """Return the constants, sines and cosines of many torque laws, with merged waves in each law.
 
-    The shapes are (m, 3), (m, k, 4) and (m, l, 4), where a wave is three amplitudes and a frequency
-    (rad/s). In each array m is the number of laws, or 1 if all laws share one row. Each law becomes
-    the law that `merged` returns for it, filled up with waves of amplitude and frequency 0. A law
-    that is not finite is unchanged.
+    A law with merged waves has at most one sine and one cosine per frequency, as `merged` returns
+    it. The arrays have the shapes (m, 3), (m, k, 4) and (m, l, 4), where a wave is three amplitudes
+    and a frequency (rad/s). In each array m is the number of laws, or 1 if all laws share one row.
+    Each law is filled up with waves of amplitude and frequency 0. A law that is not finite is
+    unchanged.
     """
     concerned = _mergeable_rows(sines, cosines)
     if not concerned.any():
@@ -191,10 +203,11 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
 
 
 def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
-    """Return whether `is_mergeable` is true, for each torque law: a boolean array, shape (m,).
+    """Return, for each of m torque laws, whether it has waves that `merged` would merge or remove.
 
-    `sines` and `cosines` have the waves of m laws, or of one law, as in `with_merged_rows`. The
-    result has one element if both arrays are of one law.
+    The result is a boolean array, shape (m,). `sines` and `cosines` have the waves of the laws,
+    shape (m, k, 4), or one row, shape (1, k, 4), that all laws share. If both arrays have one row,
+    the result has one element.
     """
     found = np.zeros(1, bool)
     for waves in (sines, cosines):
@@ -218,10 +231,11 @@ def _waves_of(rows: Array) -> list[Wave]:
 
 
 def _without_empty(waves: Array) -> Array:
-    """Return the waves of m torque laws without the indices at which no law has a wave.
+    """Return the waves of m torque laws without the positions at which no law has a wave.
 
-    `waves` has the shape (m, k, 4), and the index is its second, from 0 to k - 1. An index at which
-    a law has a frequency that is not finite is kept, so that the solver refuses only this law.
+    `waves` has the shape (m, k, 4), and the position is its second index, from 0 to k - 1. A wave
+    of amplitude 0 only fills its position. A position at which a law has a frequency that is not
+    finite is kept, so that the solver rejects only this law.
     """
     is_one = waves[..., :3].any(axis=-1) | ~np.isfinite(waves[..., 3])
     return np.ascontiguousarray(waves[:, is_one.any(axis=0)])

@@ -26,8 +26,9 @@ _PORT = "fortran/original"
 class Difference(NamedTuple):
     """A passage of a card that has different characters in our text and in the scan.
 
-    `ours` and `scans` are the characters in our text and in the scan, without blanks. `entry` is
-    the identifier of the apparatus entry that explains the difference.
+    A card is a line of a printed program, and the scan is that of the thesis. `ours` and `scans`
+    are the characters in our text and in the scan, without blanks. `entry` is the identifier of the
+    entry of the critical apparatus that explains the difference.
     """
 
     ours: str
@@ -44,7 +45,7 @@ class Place(NamedTuple):
 
 
 class Card(NamedTuple):
-    """A card of a deck, and the way in which the scan of the thesis shows it.
+    """A card (line) of a printed program, and the way in which the scan of the thesis shows it.
 
     Attributes
     ----------
@@ -59,7 +60,7 @@ class Card(NamedTuple):
         first occurrence of its characters after the previous passage; blanks are ignored.
     printed : tuple of (str, str) or None
         If the scan shows another card number than `number`: this other number, and the identifier
-        of the apparatus entry that explains it.
+        of the entry of the critical apparatus (our notes on the text) that explains it.
     lost : str or None
         If the card is missing from the scan: the identifier of the apparatus entry about its loss.
     """
@@ -93,7 +94,10 @@ class Card(NamedTuple):
 
     @property
     def scan(self) -> str | None:
-        """Return the card's line in the scan, without blanks; None if the scan lacks the card."""
+        """Return the card's number and text in the scan of the thesis, without blanks.
+
+        The result is one text, with a dash after the number. It is None if the scan lacks the card.
+        """
         if self.lost:
             return None
         number = self.printed[0] if self.printed else str(self.number)
@@ -101,7 +105,7 @@ class Card(NamedTuple):
         return f"{number}-{''.join(shown)}"
 
     def passages(self) -> Iterator[tuple[str, Difference | None]]:
-        """Yield the card's text in passages, each with its difference from the scan.
+        """Yield pairs: a passage of the card's text, and its difference from the thesis's scan.
 
         The difference is None for a passage that is the same in the scan.
         """
@@ -109,12 +113,15 @@ class Card(NamedTuple):
 
     @property
     def deviates(self) -> bool:
-        """Return whether the card's line in the scan differs from our text, or is missing."""
+        """Return whether the scan of the thesis lacks the card, or differs from our text of it."""
         return bool(self.lost or self.printed or self.differences)
 
     @property
     def entries(self) -> tuple[str, ...]:
-        """Return the identifiers of the entries of the critical apparatus that name the card."""
+        """Return the identifiers of the entries of the critical apparatus that name the card.
+
+        These entries record and explain the mistakes and deviations of the printed programs.
+        """
         return tuple(
             each["id"]
             for each in facts("apparatus")["entry"]
@@ -125,7 +132,8 @@ class Card(NamedTuple):
 class Deck:
     """The cards of a program by card number, and the source lines that correspond to each card.
 
-    The source lines are those of the program's Fortran port and of its Python twin.
+    A card is a line of the printed program. The source lines are those of the program's Fortran
+    port and of its Python version (twin).
     """
 
     def __init__(self, program: str) -> None:
@@ -146,7 +154,11 @@ class Deck:
 
     @cached_property
     def executable(self) -> frozenset[int]:
-        """Return the numbers of the cards that are not comments or specification statements."""
+        """Return the numbers of the cards with executable statements.
+
+        Every other card is a comment, or contains a PROGRAM, DIMENSION, REAL, FORMAT or END
+        statement.
+        """
         found, computes = set(), False
         for card in self.cards.values():
             if not card.continues:
@@ -157,12 +169,19 @@ class Deck:
 
     @cached_property
     def absent(self) -> dict[int, str]:
-        """Return, by card number, the reasons why the Fortran port omits executable cards."""
+        """Return, by card number, the reasons why the Fortran port omits executable cards.
+
+        The result is a dictionary. It has a key only for each card that the port omits.
+        """
         return {n: why for cards, why in self._places["absent"] for n in numbers(cards)}
 
     @cached_property
     def otherwise(self) -> dict[int, str]:
-        """Return, by card number, the reasons why the Fortran port has other statements."""
+        """Return, by card number, the reasons why the port's statements differ from those on cards.
+
+        The result is a dictionary. It has a key only for each card whose statement the Fortran port
+        has in another form.
+        """
         return {n: why for cards, why in self._places["otherwise"] for n in numbers(cards)}
 
     @cached_property
@@ -175,14 +194,17 @@ class Deck:
 
     @cached_property
     def twin(self) -> dict[int, list[Place]]:
-        """Return, by card number, the lines of the Python twin that correspond to the card."""
+        """Return, by card number, the lines of the Python twin that correspond to the card.
+
+        The twin is the Python version of the program.
+        """
         places = self._places["twin"]
         return _by_card((cards, _line_of(file, text)) for cards, file, text in places)
 
 
 @cache
 def deck(program: str) -> Deck:
-    """Return the deck of a program.
+    """Return the deck of a program, which contains the cards (lines) of the printed program.
 
     The deck is read only once and then shared, so that callers must not change it.
     """
@@ -190,7 +212,7 @@ def deck(program: str) -> Deck:
 
 
 def numbers(ranges: str) -> list[int]:
-    """Return the card numbers that a text names.
+    """Return the list of the card numbers that a text of numbers and ranges names.
 
     The text ``750-770, 800`` names 750, 760, 770 and 800.
     """
@@ -238,7 +260,7 @@ def chosen(asked: Iterable[str]) -> list[Card]:
 
 
 def parallels(card: Card) -> list[Card]:
-    """Return the cards of the two other decks that have the same text as `card`.
+    """Return the cards of the two other programs that have the same text as `card`.
 
     Blanks are ignored. The list is empty for a comment or a blank card.
     """
@@ -296,10 +318,10 @@ def _cards_of(asked: str) -> list[Card]:
 
 
 def margin(program: str) -> Iterator[tuple[Place, str]]:
-    """Yield each line of a program's Fortran port that names cards, with the card numbers.
+    """Yield each line of a program's Fortran port that corresponds to cards, with their numbers.
 
-    The numbers are in the margin of the line, which is a comment at its end. They are yielded as
-    text, as in ``750-770, 800``.
+    A card is a line of the printed program. The Fortran port names the cards in a comment at the
+    end of the line. Their numbers are yielded as text, as in ``750-770, 800``.
     """
     file = f"{program.replace('-', '_')}.fypp"
     for number, text in enumerate(_lines(shipped(_PORT) / file), 1):
@@ -310,7 +332,7 @@ def margin(program: str) -> Iterator[tuple[Place, str]]:
 def passages(
     text: str, differences: Iterable[Difference]
 ) -> Iterator[tuple[str, Difference | None]]:
-    """Yield the text of a card in passages, each with its difference from the scan.
+    """Yield pairs: a passage of a card's text, and its difference from the scan of the thesis.
 
     `differences` are all differences of the card, in the order of the text. For a passage that is
     the same in the scan, None is yielded as its difference. Raise ValueError if the text does not

@@ -19,10 +19,11 @@ def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
 
 
 def all_listings(program: str) -> Iterator[Listing]:
-    """Yield every listing of a program: each subset of its switches with each subset of readings.
+    """Yield every listing of a program, a choice of its defects, readings and conjectures.
 
-    The switches are the names that are active in the original program: its defects and some
-    conjectures.
+    Each subset of the switches is combined with each subset of the readings. The switches are the
+    names that are active in the original program: its defects (mistakes) and some conjectures
+    (assumptions). Readings are interpretations of doubtful cards.
     """
     for readings in subsets(names_of("reading", program)):
         for defects in subsets(switches(program)):
@@ -30,10 +31,10 @@ def all_listings(program: str) -> Iterator[Listing]:
 
 
 def all_cells() -> Iterator[tuple[Listing, int]]:
-    """Yield every listing of every program with the number of every case of Table 1.
+    """Yield every pair of a listing and the number of a case of Table 1, for all programs.
 
-    For a case with an initial torque, each listing is also yielded with the conjecture
-    `initial-torque`.
+    A listing is a program with a choice of its defects, readings and conjectures. For a case with
+    an initial torque, each listing is also yielded with the conjecture `initial-torque`.
     """
     for program in PROGRAMS:
         for listing in all_listings(program):
@@ -45,15 +46,16 @@ def all_cells() -> Iterator[tuple[Listing, int]]:
 
 
 def cell_name(listing: Listing, case: int) -> str:
-    """Return a name for a listing and a case number.
+    """Return a name for the combination of a listing and a case of Table 1.
 
-    An example is ``two-term/case-3/dt-accumulates+torque-held``.
+    A listing is a program with a choice of its defects. An example of a name is
+    ``two-term/case-3/dt-accumulates+torque-held``.
     """
     return f"{listing.program}/case-{case}/{listing_name(listing)}"
 
 
 def listing_name(listing: Listing) -> str:
-    """Return the name of a listing, without blanks.
+    """Return a name, without blanks, for a listing (a choice of a program's defects).
 
     The name is ``corrected``, or ``original`` followed by the active readings, each after a colon.
     For any other listing it consists of the names of all active defects, readings and conjectures,

@@ -15,11 +15,11 @@ HEADING = "APPENDIX AND PROGRAMS"
 
 
 def expected_lines() -> list[tuple[str, str]]:
-    """Return every line that the appendix of the scan has by our tables, as pairs (text, name).
+    """Return the lines that our tables expect in the appendix of the scan, as pairs (text, name).
 
-    The text is the line without blanks. The name is usually that of a card, as in
-    ``two-term:1660``. It is ``furniture`` for a line that an editor added, and ``phantom`` for text
-    that belongs to no card at its place.
+    The appendix of the thesis has the cards (lines) of the programs. The text is the line without
+    blanks. The name is usually that of a card, as in ``two-term:1660``. It is ``furniture`` for a
+    line that an editor added, and ``phantom`` for text that belongs to no card at its place.
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -35,7 +35,7 @@ def expected_lines() -> list[tuple[str, str]]:
 
 
 def unexplained(scan: str) -> list[str]:
-    """Return one sentence for each line in which a scan and our tables of cards disagree.
+    """Return one sentence for each line in which a scan disagrees with our tables of cards.
 
     `scan` is the text of the whole thesis, as scanned. The list is empty if all lines agree.
 
@@ -70,10 +70,10 @@ def unexplained(scan: str) -> list[str]:
 def undeclared() -> list[str]:
     """Return one sentence for each disagreement between the cards and the critical apparatus.
 
-    A card names an entry of the apparatus for each deviation of the scan from its text. This entry
-    must declare the deviation. Conversely, each deviation that an entry declares must be recorded
-    with a card. A card that is missing from the scan must name an entry of the kind ``missing
-    text``.
+    The apparatus has entries that explain the deviations of the scan from our text of the cards. A
+    card names an entry for each deviation. This entry must declare the deviation. Conversely, each
+    deviation that an entry declares must be recorded with a card. A card that is missing from the
+    scan must name an entry of the kind ``missing text``.
     """
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):

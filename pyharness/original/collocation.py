@@ -32,11 +32,14 @@ def integrate(
 ) -> Trajectory:
     """Run a collocation program on a scene, and return its trajectory.
 
-    The function `points_of` returns the collocation points, in seconds from the start of an
-    interval, for DT, the step size (s) as the program computes it. The function `rates` returns the
-    right-hand sides of all unknowns at one point. Its first argument is the torques over the
-    moments (1/s2) at the start and at all collocation points. The others are the number k of the
-    collocation point (0 for the start), and the unknowns at this point.
+    `listing` is the program with its active defects. The function `points_of` returns the
+    collocation points, in seconds from the start of a step. Its argument is DT, the step size (s)
+    as the program computes it.
+
+    The function `rates` returns the right-hand sides of all unknowns at one point. Its first
+    argument is the list of the torques over the moments (1/s2) at the start and at all collocation
+    points. The others are the number k of the point (0 for the start), and the unknowns at this
+    point.
     """
     h = scene.step_size
     dt = h
@@ -68,12 +71,13 @@ def integrate(
 def interval(
     start: Vector, points: Sequence[float], end: float, rates: Rates
 ) -> tuple[list[float], int]:
-    """Return all unknowns after one interval, which is one step, and an error code.
+    """Return all unknowns after one interval, which is one step, and the error code IER.
 
     `start` contains the unknowns at the start of the interval. The collocation points `points` and
-    the time `end` of the result are in seconds from the start. `rates` returns the right-hand
-    sides. The error code is IER of the linear solver LEQT1F in the correction, for which LEQT1F is
-    called the second time in the interval. The programs print this code.
+    the time `end` of the result are in seconds from the start. The function `rates` returns the
+    right-hand sides at point k (0 for the start), from k and the unknowns. IER is the code of the
+    linear solver LEQT1F in its second call, which computes the correction. The programs print this
+    code.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))
@@ -85,9 +89,9 @@ def interval(
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
     """Return the coefficients c1, c2, ... of each unknown's polynomial, and the error code IER.
 
-    With these coefficients the polynomials have the derivatives `rates` at the collocation points
-    `points` (s). `rates` has one row for each point. IER is the error code of the linear solver
-    LEQT1F.
+    The polynomials are x(0) + c1 t + c2 t**2 + ... Their derivatives at the collocation points
+    `points` (s) are `rates`, which has one row for each point. IER is the error code of the linear
+    solver LEQT1F.
     """
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(collocation_matrix(points), by_unknown)

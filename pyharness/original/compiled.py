@@ -22,7 +22,9 @@ def run(
 ) -> Trajectory:
     """Run the compiled program of a listing on a scene, and return its trajectory.
 
-    The parameters and the result are those of `run_program`, but the arguments are not checked.
+    `listing` is the program with its active defects. `lipschitz` is the constant of the stop test
+    (1/s), and `may_stop` says whether the test may end the run. `velocity` requests the
+    translational velocity. The result is that of `run_program`, but the arguments are not checked.
     Raise NotBuiltError if the extension is not built.
     """
     rows, ier, n_rows, status, evaluations, variable, quotient = extension().run_program(
@@ -39,11 +41,12 @@ def read_rows(
 ) -> Trajectory:  # fmt: skip
     """Return the output of a compiled program as a trajectory.
 
-    `rows` has shape (n, 8): true time and recorded TIME (s), omega (rad/s) and translational
-    velocity (m/s). `ier` contains at least n error codes of the linear solver. `evaluations` is the
-    number of evaluations of the right-hand sides. `ended` says how the run ended, as in
-    `Trajectory`. `stop_variable` is 0, or the number, from 1, in `STOP_VARIABLES` of the variable
-    that failed the stop test. `stop_quotient` is the quotient of this variable (1/s).
+    `listing` supplies the name of the program. `rows` has shape (n, 8): true time and recorded TIME
+    (s), omega (rad/s) and translational velocity (m/s). `ier` contains at least n error codes of
+    the linear solver. `evaluations` is the number of evaluations of the right-hand sides. `ended`
+    says how the run ended, as in `Trajectory`. `stop_variable` is the number, from 1 in
+    `STOP_VARIABLES`, of the variable that failed the stop test, or 0 if the test did not end the
+    run. `stop_quotient` is the Lipschitz quotient of this variable (1/s).
     """
     n = len(rows)
     is_stopped = stop_variable > 0
@@ -61,7 +64,7 @@ def read_rows(
 
 
 class Arguments(NamedTuple):
-    """The arguments of the extension's function `run_program`, in the order of its signature.
+    """The arguments of the compiled extension's function `run_program`, in its order.
 
     `flags` is a bit mask of the active defects, readings and conjectures. `body` contains the
     moments (kg m2) if `by_moments`, else the coefficients A, B and C. `torque_first` is the initial
@@ -91,10 +94,11 @@ class Arguments(NamedTuple):
 def program_arguments(
     scene: Scene, listing: Listing, lipschitz: float, may_stop: bool, velocity: bool
 ) -> Arguments:
-    """Return the arguments of the extension's function `run_program` for a scene and a listing.
+    """Return the arguments of the compiled function `run_program` for a scene and a listing.
 
-    `lipschitz` is the constant of the stop test (1/s), and `may_stop` says whether the test may end
-    the run. `velocity` says whether the translational velocity is requested.
+    A listing is a program with a choice of its defects. `lipschitz` is the constant of the stop
+    test (1/s), and `may_stop` says whether the test may end the run. `velocity` says whether the
+    translational velocity is requested.
     """
     first = initial_torque(scene) if listing.has("initial-torque") else None
     if first is None and listing.has("initial-torque"):

@@ -25,9 +25,11 @@ def run(
 ) -> Trajectory:
     """Run the compiled program of a listing in a word, which is a floating-point format.
 
-    The parameters and the result are those of `in_word.run`, which runs the Python twin. Raise
-    InputError if the extension's compiler does not support the word, or if angles of the torque's
-    waves are too large for the extension's sine. Raise NotBuiltError if the extension is not built.
+    `listing` is the program with its active defects. `lipschitz` is the constant of the stop test
+    (1/s), and `may_stop` says whether the test may end the run. The result is that of
+    `in_word.run`, which runs the Python version (twin). Raise InputError if the extension's
+    compiler does not support the word, or if angles of the torque's waves are too large for the
+    extension's sine. Raise NotBuiltError if the extension is not built.
     """
     if word.p > 53:
         _check_angles(scene)

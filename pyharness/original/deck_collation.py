@@ -16,7 +16,7 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 
 
 class Row(NamedTuple):
-    """A row of the collation table: one operation, and whether decks and thesis agree on it.
+    """An operation of the programs, and whether the decks of cards and the thesis agree on it.
 
     Attributes
     ----------
@@ -54,23 +54,29 @@ class Row(NamedTuple):
     def is_explained(self) -> bool:
         """Return whether decks and thesis agree on the operation, or the row explains why not.
 
-        They agree if all three decks have the same statements, and the thesis agrees with them.
+        A deck contains the cards of a program. Decks and thesis agree if all three decks have the
+        same statements, and the thesis agrees with them.
         """
         agrees = self.decks == "agree" and len(self.cards) == len(PROGRAMS)
         return (agrees and self.thesis == "agrees") or bool(self.entries or self.reason)
 
 
 def rows() -> list[Row]:
-    """Return the rows of the collation table, in the order of the operations in the decks."""
+    """Return the rows of the table that compares the decks of cards with the thesis's text.
+
+    Each row is for one operation of the programs. The rows have the order of the operations in the
+    decks.
+    """
     return [_row(each) for each in facts("cards/collation")["row"]]
 
 
 def faults(found: list[Row]) -> list[str]:
-    """Return one sentence for each mistake or unexplained disagreement in the collation table.
+    """Return one sentence for each mistake or unexplained disagreement in the table `found`.
 
-    `found` contains the rows of the table. An apparatus entry is a mistake if it is unknown, is in
-    no row, or names no card of its row. A card is a mistake if it is unknown, in no row, or in two
-    rows.
+    The rows of the table compare the cards (lines) of the programs with the text of the thesis.
+    They name entries of the critical apparatus that explain disagreements. An entry is a mistake if
+    it is unknown, is in no row, or names no card of its row. A card is a mistake if it is unknown,
+    in no row, or in two rows.
     """
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}
@@ -126,9 +132,11 @@ def _row(given: dict[str, Any]) -> Row:
 
 
 def _decks(given: dict[str, Any]) -> str:
-    """Return whether the decks that have an operation agree, in the terms of `Row.decks`.
+    """Return whether the decks that have an operation have the same statements.
 
-    `given` is the operation's row in `data/cards/collation.toml`.
+    The result is ``agree``, ``names`` (only names differ), ``order`` (only names and order differ),
+    ``differ``, or ``-`` if no deck has the operation. `given` is the operation's row in
+    `data/cards/collation.toml`.
     """
     found = {program: statements(program, cards) for program, cards in given["cards"].items()}
     if not found:
@@ -165,7 +173,10 @@ def _renamed(statement: str, names: str) -> str:
 
 
 def _names_a_card(entry: dict[str, Any], row: Row) -> bool:
-    """Return whether an apparatus entry names a card of a row of the table, or no card at all."""
+    """Return whether an entry of the critical apparatus names a card of a row, or no card at all.
+
+    The row is one of the table that compares the programs' cards with the text of the thesis.
+    """
     return not entry["cards"] or any(
         set(numbers(entry["cards"].get(program, ""))) & set(numbers(cards))
         for program, cards in row.cards.items()

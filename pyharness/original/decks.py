@@ -145,9 +145,10 @@ def _is_made(
 ) -> bool:
     """Return whether an alteration of cards applies to a listing, a dialect and a case.
 
-    `alteration` is an entry of `data/cards/alterations.toml`, and applies if all its conditions are
-    satisfied. `case` is the number of the case of Table 1, or None for the case on the published
-    cards.
+    An alteration deletes, replaces or inserts cards, for example to correct a defect. `alteration`
+    is an entry of `data/cards/alterations.toml`, and applies if all its conditions are satisfied.
+    `listing` is a program with a choice of its defects. `case` is the number of the case of Table
+    1, or None for the case on the published cards.
     """
     named = alteration.get
     return (
@@ -185,7 +186,7 @@ def model_cards(terms: int) -> dict[int, str]:
     end = f"T{terms + 1}"
 
     def made(start: str, last: str, new: list[str]) -> None:
-        """Replace the cards from the one with text `start` to the one with text `last` by `new`."""
+        """Replace the cards from the text `start` to the text `last` by the statements `new`."""
         first = next(n for n, each in enumerate(text) if each.strip() == start)
         after = next(n for n in range(first, len(text)) if text[n].strip() == last)
         text[first : after + 1] = [f"      {each}" for each in new]
@@ -291,7 +292,7 @@ def compiler() -> str | None:
 
 
 def run_deck(text: str, folder: Path | None = None) -> Run:
-    """Compile and run a deck in the dialect `gfortran`, and return the contents of its files.
+    """Compile and run a deck in the dialect `gfortran`, and return its output files' contents.
 
     Parameters
     ----------

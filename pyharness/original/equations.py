@@ -14,7 +14,7 @@ Vector = Sequence[float]
 
 
 def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
-    """Return F, G, H of equations 16-18, the rates of change of omega (rad/s2).
+    """Return F, G, H of the thesis's equations 16-18, the rates of change of omega (rad/s2).
 
     `coefficients` contains A, B, C of Euler's equations, `m` the torque over the moment of inertia
     about each axis (1/s2), and `u` the angular velocity omega (rad/s).
@@ -50,7 +50,7 @@ def initial_torque(scene: Scene) -> Vector | None:
     """Return the initial torque of a scene over its moments of inertia (1/s2), or None.
 
     The result is None if the scene has no moments, or is not a case of Table 1 with an initial
-    torque. By the conjecture `initial-torque` this torque acts during the first step.
+    torque. By the conjecture (assumption) `initial-torque` this torque acts during the first step.
     """
     given = card_torque(scene)
     if given is None or scene.moments is None:
@@ -73,10 +73,13 @@ def all_finite(values: Vector) -> bool:
 
 
 class Record:
-    """The rows of a twin's run, collected step by step, from which a trajectory is made."""
+    """The rows of the run of a program's Python version, from which a trajectory is made.
+
+    The rows are added step by step.
+    """
 
     def __init__(self, scene: Scene, evaluations_per_step: int) -> None:
-        """Start without rows.
+        """Create a record of a run without rows.
 
         `scene` supplies the step size. `evaluations_per_step` is the number of evaluations of the
         right-hand sides in a step.
@@ -101,10 +104,10 @@ class Record:
     ) -> Trajectory:
         """Return the trajectory of all rows that were added.
 
-        `ended` says how the run ended, as in `Trajectory`. `stop` is the result of the stop test if
-        this test ended the run. If `prints_ier`, the program prints the error code IER, and the
-        trajectory contains it. A step that overflows has no row, but its evaluations of the
-        right-hand sides are counted.
+        `ended` says how the run ended, as in "complete". `stop` is the result of the stop test if
+        this test ended the run. If `prints_ier`, the program prints the error code IER of its
+        linear solver, and the trajectory contains it. A step that overflows has no row, but its
+        evaluations of the right-hand sides are counted.
         """
         given = np.array(self._rows).reshape(-1, 8)
         rows = given.astype(np.float64)

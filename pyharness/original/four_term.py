@@ -15,7 +15,7 @@ from pyharness.original.equations import Vector, accelerations, omega_rate, velo
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the four-term program on a scene, and return its trajectory.
+    """Run the four-term collocation program on a scene, and return its trajectory.
 
     `listing` is the program with its active defects, readings and conjectures. `lipschitz` and
     `may_stop` have no effect, because the program has no stop test.

@@ -20,11 +20,12 @@ Of = TypeVar("Of", Scene, TorqueLaw)
 def run(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the Python twin of a listing's program in a word, which is a floating-point format.
+    """Run the Python version of a listing's program in a word, which is a floating-point format.
 
-    The other parameters are those of `run_program`, but no argument is checked. The trajectory
-    contains the results rounded to floats. Its attribute `exact` contains the results as numbers of
-    the word.
+    `listing` is the program with its active defects. `lipschitz` is the constant of the stop test
+    (1/s), and `may_stop` says whether the test may end the run. No argument is checked. The
+    trajectory contains the results rounded to floats. Its attribute `exact` contains the results as
+    numbers of the word.
     """
     twin = importlib.import_module(f"pyharness.original.{listing.program.replace('-', '_')}")
     found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)
@@ -34,9 +35,10 @@ def run(
 
 
 def scene_in(scene: Scene, word: Word) -> Scene:
-    """Return a copy of `scene` with all its numbers, except counts, converted to a word.
+    """Return a copy of `scene` with all its numbers, except counts, in the format `word`.
 
-    The numbers of the copy are not checked. Therefore `scene` itself must have been checked.
+    A word is a floating-point format. The numbers of the copy are not checked. Therefore `scene`
+    itself must have been checked.
     """
     law = scene.torque
 
@@ -59,9 +61,10 @@ def scene_in(scene: Scene, word: Word) -> Scene:
 
 
 def _with(frozen: Of, **fields: Any) -> Of:
-    """Return a copy of a frozen dataclass with the values `fields` in place of its own.
+    """Return a copy of a frozen dataclass in which some fields have new values.
 
-    The checks of the dataclass are skipped, because they would convert the values to floats.
+    The new values are the keyword arguments `fields`. The checks of the dataclass are skipped,
+    because they would convert the values to floats.
     """
     changed = copy.copy(frozen)
     vars(changed).update(fields)

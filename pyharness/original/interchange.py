@@ -18,17 +18,18 @@ _BITS = {24: 32, 53: 64, 113: 128}
 
 
 def n_bytes(word: Word) -> int:
-    """Return the number of bytes of a number in the interchange format of a word.
+    """Return the number of bytes of a number in the IEEE 754 interchange format of a word.
 
-    `word` is binary32, binary64 or binary128.
+    A word is a floating-point format: here binary32, binary64 or binary128.
     """
     return _BITS[word.p] // 8
 
 
 def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
-    """Return numbers of a word as an array of bytes, in column-major order.
+    """Return an array of numbers as an array of the bytes of their IEEE 754 format `word`.
 
-    `shape` is the shape of the array of numbers. The result has the shape (n_bytes(word), *shape).
+    `numbers` are in column-major order, and `shape` is the shape of their array. The result has the
+    shape (n_bytes(word), *shape), and column-major order too.
     """
     size = n_bytes(word)
     written = b"".join(_pattern(each).to_bytes(size, sys.byteorder) for each in numbers)
@@ -37,10 +38,10 @@ def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
 
 
 def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
-    """Return the numbers of a word that an array of bytes, as `to_bytes` returns it, represents.
+    """Return the array of numbers of the IEEE 754 format `word` that `given` represents.
 
-    `given` is the array of bytes, in column-major order. Its first axis is the bytes of a number.
-    The shape of the result is that of the other axes.
+    `given` is an array of bytes in column-major order, as `to_bytes` returns it. Its first axis is
+    the bytes of a number. The shape of the result is that of the other axes.
     """
     size = n_bytes(word)
     written = given.tobytes(order="F")
@@ -52,7 +53,10 @@ def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
 
 
 def _pattern(x: Number) -> int:
-    """Return the bits of a number in its interchange format (sign, exponent, fraction)."""
+    """Return the bits of a number in its IEEE 754 format, as an integer.
+
+    The bits are the sign, the exponent and the fraction, from the highest to the lowest.
+    """
     p = x.word.p
     places, most = p - 1, (1 << _BITS[p] - p) - 1
     if x.m:

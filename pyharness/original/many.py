@@ -37,7 +37,7 @@ _NOT_REACHED = -1
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ProgramEnsemble(BatchResult):
-    """The results of a program for n bodies, with rows for m steps of each body.
+    """The results of a program of the thesis for n bodies, with a row for each of m steps.
 
     A row is NaN, and -1 in `ier`, if the run of the body ended before that step. `run_many` returns
     a ProgramEnsemble.
@@ -98,7 +98,7 @@ def run_many(
     threads: SupportsIndex = 1,
     effort: Number = 1.0,
 ) -> ProgramEnsemble:
-    """Run a listing's compiled program for n bodies.
+    """Run a compiled program of the thesis for n bodies in one call.
 
     Each result is bit-for-bit identical to the result of `run_program`.
 
@@ -202,10 +202,11 @@ def _run(
     scene: Scene, listing: Listing, by_moments: bool, inputs: dict[str, Array], n: int,
     wanted: NDArray[np.int32], may_stop: bool, velocity: bool, threads: int,
 ) -> ProgramEnsemble:  # fmt: skip
-    """Run the program of `run_many` for n bodies, with arguments that have been checked.
+    """Run a compiled program of the thesis for n bodies, with arguments that have been checked.
 
-    `inputs` contains the arrays of the arguments by name. ``inputs["body"]`` contains moments if
-    `by_moments`, else coefficients. `wanted` contains the steps whose results are returned.
+    The arguments are those of `run_many`. `inputs` contains its arrays by name. ``inputs["body"]``
+    contains moments if `by_moments`, else coefficients. `wanted` contains the steps whose results
+    are returned.
     """
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())

@@ -66,7 +66,7 @@ def _value(x: Any) -> float:
 
 
 class _Number:
-    """A floating-point value whose operations are counted by its counter.
+    """A floating-point value that belongs to a counter of the operations on it.
 
     The same operation on the same operands returns the same object. Therefore two objects are
     identical exactly if their values were computed in the same way.
@@ -126,9 +126,10 @@ class _Array(defaultdict[tuple[int, ...], Any]):
 
 
 def operations_per_step(listing: Listing) -> Count:
-    """Return the operation counts of the first step that the program of a listing performs.
+    """Return the number of arithmetic operations of a listing's program in its first step.
 
-    The scene is the case of Table 1 that is on the published cards of the program's deck.
+    The result is a `Count`. A listing is a program with a choice of its defects. The scene is the
+    case of Table 1 that is on the published cards of the program.
     """
     statements = list(_statements(deck_text(listing)))
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))
@@ -147,9 +148,10 @@ def operations_per_step(listing: Listing) -> Count:
 
 
 def _moved(value: Any, counter: _Counter) -> Any:
-    """Return a copy of a value from before the step, whose operations `counter` counts.
+    """Return a copy of a value that was computed before the step.
 
-    `value` is a number or an array of numbers. Any other object is returned unchanged.
+    `counter` counts the operations on the copy. `value` is a number or an array of numbers. Any
+    other object is returned unchanged.
     """
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}

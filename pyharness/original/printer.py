@@ -63,9 +63,10 @@ def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
 
 
 def _to_places(x: Any, places: int) -> float:
-    """Return the number `x` rounded to `places` decimals, with ties away from zero.
+    """Return the number `x` rounded to `places` decimals, with ties away from zero, as a float.
 
-    `x` is a float or a `Number` of a word. A number that is not finite becomes nan.
+    `x` is a float, or a `Number` in another floating-point format. A number that is not finite
+    becomes nan.
     """
     if not is_finite(x):
         return math.nan
@@ -91,10 +92,10 @@ def formats_of(program: str) -> dict[str, Any]:
 
 
 def _torque_cards(scene: Scene) -> tuple[float, float, float]:
-    """Return the three torques (N m) that the cards of the deck hold for a scene.
+    """Return the three torques (N m) on the punched input cards for a scene.
 
-    For a case of Table 1 with initial torques these are the initial torques, because no card has a
-    torque that varies with time. For any other scene they are its constant torques.
+    If the scene is a case of Table 1 with initial torques, these are on the cards, because no card
+    has a torque that varies with time. For any other scene the result is its constant torques.
     """
     cards = {entry["case"]: entry["torque"] for entry in facts("printer")["initial_torque"]}
     first, second, third = cards.get(scene.case, scene.torque.constant)

@@ -20,7 +20,7 @@ WORD_NAMES = (*COMPILED_WORDS, "cdc48", "cdc48-rounded")
 
 @dataclass(frozen=True)
 class Program:
-    """A program from the appendix of the thesis.
+    """One of the three programs from the appendix of the thesis.
 
     Its corrected version has a global error of O(h**order), where h is the step size. `source`
     names the equation and the sections of the thesis that describe the program.
@@ -41,7 +41,7 @@ class Program:
         effort: float = 1.0,
         word: str = BINARY64,
     ) -> Trajectory:
-        """Run a listing of this program and return its trajectory.
+        """Run this program, with the defects that `listing` selects, and return its trajectory.
 
         The parameters, the result and the exceptions are those of the function `run_program`. In
         addition, InputError is raised if the listing belongs to another program.
@@ -73,7 +73,8 @@ class Program:
     ) -> Trajectory:
         """Run the program in binary64, with arguments that have been checked.
 
-        `options` are `lipschitz`, `may_stop` and `velocity`, as in `run`.
+        `options` are the arguments `lipschitz`, `may_stop` and `velocity` of `run`, in this order.
+        `implementation` is ``fortran`` or ``python``.
         """
         if implementation == "fortran":
             return compiled.run(scene, listing, *options)
@@ -84,10 +85,11 @@ class Program:
 
 
 def work_of(word: str, implementation: str) -> str:
-    """Return the key by which `check_steps` finds the work limit of a program.
+    """Return the key under which the function `check_steps` finds the work limit of a program.
 
-    `word` is the name of the arithmetic, as in ``binary64``. `implementation` is ``fortran`` for
-    the compiled program or ``python`` for its twin.
+    The limit depends on the arithmetic and the implementation. `word` is the name of the
+    arithmetic, as in ``binary64``. `implementation` is ``fortran`` for the compiled program or
+    ``python`` for its Python port.
     """
     if word == BINARY64:
         return implementation
@@ -130,14 +132,15 @@ def run_program(
     effort: float = 1.0,
     word: str = BINARY64,
 ) -> Trajectory:
-    """Run the program of a listing on a scene.
+    """Run one of the three programs of the thesis, with a choice of its defects, on a scene.
 
     Parameters
     ----------
     scene : Scene
         The body, the initial condition, the torque, the step size and the number of steps.
     listing : Listing
-        The program with its active defects, readings and conjectures.
+        The program with its active defects (mistakes that are not corrected), readings
+        (interpretations of doubtful cards) and conjectures (assumptions about missing cards).
     implementation : {"fortran", "python"}
         The compiled program or its Python port, the twin. Their results are bit-for-bit identical.
     lipschitz : float

@@ -92,12 +92,12 @@ def _to_even(m: int, shift: int) -> int:
 
 
 def ieee(p: int, largest: int, cut: bool) -> Rules:
-    """Return the arithmetic of IEEE 754 for coefficients of p bits and exponents up to `largest`.
+    """Return the `Rules` of IEEE 754 for coefficients of p bits and exponents up to `largest`.
 
-    Numbers are below 2**(largest + 1). If `cut`, sums, products and quotients are truncated towards
-    zero, else rounded to nearest. A truncated result that is too large becomes infinite, as on
-    machines that truncated. In this point the arithmetic deviates from IEEE 754, by which it would
-    become the largest number.
+    `Rules` contains the arithmetic as functions. Numbers are below 2**(largest + 1). If `cut`,
+    sums, products and quotients are truncated towards zero, else rounded to nearest. A truncated
+    result that is too large becomes infinite, as on machines that truncated. In this point the
+    arithmetic deviates from IEEE 754, by which the result would become the largest number.
     """
     least, most = 2 - largest - p, largest - p + 1
     fit = rounding(p, least, most, cut, gradual=True)

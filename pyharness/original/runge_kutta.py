@@ -26,8 +26,9 @@ def run(
 ) -> Trajectory:
     """Run the Runge-Kutta program on a scene, and return its trajectory.
 
-    `listing` is the program with its active defects, readings and conjectures. `lipschitz` is the
-    constant of the stop test (1/s). If `may_stop` is false, the stop test is skipped.
+    `listing` is the program with its active defects, readings (interpretations of doubtful cards)
+    and conjectures (about missing cards). `lipschitz` is the constant of the stop test (1/s). If
+    `may_stop` is false, the stop test is skipped.
     """
     a, b, c = scene.euler_coefficients
     acceleration = accelerations(scene, listing)
@@ -105,15 +106,15 @@ def run(
 def lipschitz_test(
     listing: Listing, change_k: Vector, change_u: Vector, lipschitz: float
 ) -> tuple[str, float] | None:
-    """Return the variable that violates the condition of eq. 19, and its quotient (1/s), or None.
+    """Return the name of a variable that violates eq. 19, and its quotient (1/s), or None.
 
-    `change_k` and `change_u` are the magnitudes of the changes of the six right-hand sides and of
-    the six unknowns within one step. The condition is violated if the change of the right-hand
-    sides exceeds `lipschitz` (1/s) times the change of the unknowns. The compared changes are the
-    norms over omega. With the defect `lipschitz-per-component` in `listing`, each component is
-    compared by itself. With the defect `lipschitz-tests-velocity` the velocity is included. The
-    quotient is the change of the right-hand sides over the change of the unknowns. It is infinite
-    if the unknowns do not change.
+    Equation 19 is the Lipschitz condition, by which the program may stop. `change_k` and `change_u`
+    are the magnitudes of the changes of the six right-hand sides and of the six unknowns within one
+    step. The condition is violated if the change of the right-hand sides exceeds `lipschitz` (1/s)
+    times the change of the unknowns. The compared changes are the norms over omega. With the defect
+    `lipschitz-per-component` in `listing`, each component is compared by itself. With the defect
+    `lipschitz-tests-velocity` the velocity is included. The quotient is the change of the
+    right-hand sides over the change of the unknowns. It is infinite if the unknowns do not change.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

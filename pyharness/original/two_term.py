@@ -17,8 +17,9 @@ def run(
 ) -> Trajectory:
     """Run the two-term program on a scene, and return its trajectory.
 
-    `listing` is the program with its active defects, readings and conjectures. `lipschitz` and
-    `may_stop` have no effect, because the program has no stop test.
+    `listing` is the program with its active defects, readings (interpretations of doubtful cards)
+    and conjectures (about missing cards). `lipschitz` and `may_stop` have no effect, because the
+    program has no stop test.
     """
     a, b, c = scene.euler_coefficients
     unset_c1 = 0.0

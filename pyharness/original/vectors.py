@@ -23,7 +23,7 @@ _FIELDS = ("name", "op", "x", "y", "result")
 
 
 class Vector(NamedTuple):
-    """A test vector: its name, a CDC instruction, two operands and the expected result.
+    """A test vector of CDC arithmetic: its name, an instruction, two operands, expected result.
 
     `op` is the instruction. The operands `x` and `y` and the result are CDC words in octal.
     """
@@ -36,7 +36,7 @@ class Vector(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A test vector, and `found`, the result in octal that we compute for its instruction."""
+    """A test vector of CDC arithmetic, and our own result of its instruction, `found` (octal)."""
 
     vector: Vector
     found: str
@@ -50,8 +50,9 @@ class Answer(NamedTuple):
 def answers(path: str | Path = OURS) -> list[Answer]:
     """Return the test vectors of a JSON file, each with the result that we compute.
 
-    By default `path` is our own file, `data/words/cdc.json`. Raise InputError if the file cannot be
-    read, does not have the form of a vector file, or has no vectors.
+    A test vector is an instruction of CDC arithmetic with operands and expected result. By default
+    `path` is our own file, `data/words/cdc.json`. Raise InputError if the file cannot be read, does
+    not have the form of a vector file, or has no vectors.
     """
     content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:

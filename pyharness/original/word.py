@@ -57,7 +57,7 @@ class Number:
         return self._special(operator.add, -other)
 
     def __rsub__(self, other: Any) -> "Number":
-        """Return `other` minus this number, where `other` is converted to the word first."""
+        """Return `other` minus this number; `other` is first converted to this number's format."""
         return self.word(other) - self
 
     def __mul__(self, other: Any) -> "Number":
@@ -84,7 +84,7 @@ class Number:
         return self._special(_quotient, other)
 
     def __rtruediv__(self, other: Any) -> "Number":
-        """Return `other` divided by this number, where `other` is converted to the word first."""
+        """Return `other` over this number; `other` is first converted to this number's format."""
         return self.word(other) / self
 
     def __neg__(self) -> "Number":
@@ -139,7 +139,7 @@ class Number:
             return math.copysign(math.inf, self.m)
 
     def __repr__(self) -> str:
-        """Return the word and the value as text, as in ``Word(48, 'FX')(m * 2**e)``."""
+        """Return the word (the format) and the value as text: ``Word(48, 'FX')(m * 2**e)``."""
         value = f"{self.m} * 2**{self.e}" if self.m else str(self.e)
         return f"{self.word}({value})"
 
@@ -153,7 +153,7 @@ class Number:
         return Fraction(self.m) * Fraction(2) ** self.e if self.m else Fraction(self.e)
 
     def sqrt(self) -> "Number":
-        """Return the square root, correctly rounded to nearest.
+        """Return the square root of this number, correctly rounded to nearest.
 
         It is rounded to nearest even if the other operations of the word truncate. The root of a
         number below zero is nan.
@@ -166,11 +166,17 @@ class Number:
         return self.__class__(*self.rules.nearest(root << 1 | rest, (self.e - shift) // 2 - 1))
 
     def sin(self) -> "Number":
-        """Return the sine of this number (rad), rounded to nearest even if the word truncates."""
+        """Return the sine of this number (rad), rounded to nearest.
+
+        It is rounded to nearest even if the other operations of the word truncate.
+        """
         return self._wave("mpf_sin")
 
     def cos(self) -> "Number":
-        """Return the cosine of this number (rad), rounded to nearest even if the word truncates."""
+        """Return the cosine of this number (rad), rounded to nearest.
+
+        It is rounded to nearest even if the other operations of the word truncate.
+        """
         return self._wave("mpf_cos")
 
     def _wave(self, name: str) -> "Number":
@@ -187,8 +193,9 @@ class Number:
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
         """Return the result of an operation in which an operand is zero, infinite or nan.
 
-        The operands are this number and `other`. `operation` is the same operation on floats. It
-        determines whether the result is zero, infinite or nan.
+        The operands are this number and `other`. `operation` is the same operation on floats, such
+        as their sum. It determines whether the result is zero, infinite or nan. If it is none of
+        these, zero was added, and the result is the operand that is not zero.
         """
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):
@@ -200,10 +207,10 @@ class Number:
 
     @property
     def _shadow(self) -> float:
-        """Return a float that replaces this number in `_special`.
+        """Return a float of the same sign and kind (zero, finite, infinite or nan) as this number.
 
-        It is 1.0 or -1.0, with the sign of the number, if the number is finite and not zero.
-        Otherwise it is the zero, infinity or nan that the number represents.
+        The float is 1.0 or -1.0 if the number is finite and not zero. Otherwise it is the zero,
+        infinity or nan that the number represents.
         """
         if self.m:
             return 1.0 if self.m > 0 else -1.0
@@ -228,7 +235,7 @@ def _quotient(x: float, y: float) -> float:
 
 
 class Word:
-    """A floating-point format with its arithmetic: p bits, and a rounding rule of `RULES`.
+    """A floating-point format with its arithmetic: a number of bits p, and a rounding rule.
 
     A word is called like a function, with a float, an integer, a fraction or the text of a decimal.
     It returns this value as a `Number` of the word.
@@ -262,7 +269,10 @@ class Word:
         largest: int | None = None,
         cut_literals: bool = False,
     ) -> None:
-        """Select the arithmetic for the parameters, and make the class of the word's numbers."""
+        """Select the arithmetic for p bits and the rule, and make the class of the word's numbers.
+
+        A word is a floating-point format.
+        """
         if rule not in RULES:
             raise unknown("rounding", rule, RULES)
         if p < 4:
@@ -280,14 +290,15 @@ class Word:
         self._literals: dict[float, Number] = {}
 
     def __repr__(self) -> str:
-        """Return the number of bits and the rounding rule as text, as in ``Word(48, 'FX')``."""
+        """Return the format's number of bits and rounding rule as text: ``Word(48, 'FX')``."""
         return f"Word({self.p}, {self.rule!r})"
 
     def __call__(self, value: Any) -> Number:
-        """Return `value` as a number of the word: rounded to nearest, or truncated.
+        """Return `value` as a number of the word, which is a floating-point format.
 
-        The value is truncated if the word was made with `cut_literals`. `value` is a float, an
-        integer, a fraction, the text of a decimal, or a number of this word. Raise TypeError for
+        The value is truncated if the word was made with `cut_literals`, and rounded to nearest
+        otherwise. `value` is a float, which is converted from its shortest decimal representation,
+        an integer, a fraction, the text of a decimal, or a number of this word. Raise TypeError for
         any other type, and for a number of another word.
         """
         if isinstance(value, Number) and value.word is self:

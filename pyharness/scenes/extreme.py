@@ -34,10 +34,10 @@ def speed(scene: Scene, largest: float) -> float:
 
 
 def in_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene with another step size and number of steps, such that it ends at `time` (s).
+    """Return the scene with such a step size and number of steps that it ends at `time` (s).
 
-    The step size times the largest rate of change of omega, which `speed` returns, is about .002.
-    However, there are at least 10 and at most 20 000 steps.
+    The step size times the bound of the relative rate of change of omega, which the function
+    `speed` returns, is about 0.002. However, there are at least 10 and at most 20 000 steps.
     """
     rate = speed(scene, max(map(abs, scene.omega)))
     count = max(10, min(20_000, math.ceil(rate * abs(time) / 0.002)))
@@ -73,8 +73,9 @@ def quarter(disturbance: float) -> float:
 def _separatrix() -> Iterator[Circumstance]:
     """Yield scenes that begin with a perturbed rotation about the axis of the middle moment.
 
-    The perturbations are from 1e-1 to 1e-15 rad/s. The end times are before the first flip of the
-    body, in the middle of the first flip, and in the middle of the fifth flip.
+    The perturbations are from 1e-1 to 1e-15 rad/s. At a flip, omega about that axis changes its
+    sign. The end times are before the first flip, in the middle of the first flip, and in the
+    middle of the fifth flip. Other scenes are on the separatrix, where the body flips only once.
     """
     for d in (10.0**-k for k in range(1, 16)):
         beside, on = (d, 1.0, 0.0), (d, 1.0, d)
@@ -170,10 +171,9 @@ TWOS = (-996, -500, -100, 100, 498, 996)
 
 
 def _scales() -> Iterator[Circumstance]:
-    """Yield scenes that are the same motion in different units of time.
+    """Yield scenes of one motion with rescaled time: omega times a factor, time divided by it.
 
-    The ratios of the units are from 1e-300 to 1e300. Therefore omega is from about 1e-300 to
-    1e300 rad/s.
+    The factors are from 1e-300 to 1e300. Therefore omega is from about 1e-300 to 1e300 rad/s.
     """
     scene = in_steps(ORDINARY, ORDINARY_TIME)
     named = [(f"1e{power}", float(f"1e{power}")) for power in _TENS]

@@ -49,7 +49,7 @@ def _near_separatrix(source: Random) -> Scene:
 
 
 def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
-    """Return a rotation about axis 2 plus a random perturbation, as three components of omega.
+    """Return the omega (rad/s) of a rotation about axis 2 plus a random perturbation.
 
     `spin` is the angular velocity about axis 2 (rad/s). Each component of the perturbation is at
     most `faint` (rad/s). `source` is the random generator.
@@ -96,7 +96,7 @@ def _slow_waves(source: Random) -> Scene:
 
 
 def _many_speeds(source: Random) -> Scene:
-    """Return a random scene with sine and cosine torques of frequencies from 1e-6 to 600 rad/s.
+    """Return a random scene with sine and cosine torques of frequencies from 1e-6 to 630 rad/s.
 
     There are two to six such terms. In a fifth of the scenes the cosines have the amplitudes and
     frequencies of the sines instead of their own. `source` is the random generator.
@@ -163,9 +163,9 @@ def _long(source: Random) -> Scene:
 
 
 def _no_body(source: Random) -> Scene:
-    """Return a random scene with coefficients A, B, C of any sign, which no body can have.
+    """Return a random scene with random coefficients A, B, C of Euler's equations, of any sign.
 
-    They are the coefficients of Euler's equations. `source` is the random generator.
+    The coefficients belong to no possible body. `source` is the random generator.
     """
     return _scene(source, _vector(source, 2.0), None, _vector(source, 1.5))
 

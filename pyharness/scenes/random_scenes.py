@@ -17,10 +17,10 @@ _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 
 @dataclass(frozen=True)
 class Draw:
-    """The random inputs of one random check: a scene, a listing, and parameters for both.
+    """The random inputs of one check: a scene, a program, and parameters of their runs.
 
-    The scene is for methods and programs. The listing is a program of the thesis with a random
-    choice of its defects. A seed and the number of the draw determine all inputs.
+    The scene is solved by methods and by the program. `listing` is a program of the thesis with a
+    random choice of its defects. A seed and the number of the check determine all inputs.
     """
 
     scene: Scene  # in odd draws a difficult scene, named by its kind in `NASTY`
@@ -40,10 +40,11 @@ class Draw:
         return self.scene.step_size * self.scene.steps * (-1.0 if self.backward else 1.0)
 
     def tolerance(self, finest: float) -> float:
-        """Return the relative tolerance of this draw for a method.
+        """Return the random relative tolerance with which a method is checked.
 
-        `finest` is the smallest tolerance that the method accepts. The result is between 1e-3 and
-        `finest`; the random number `digits` determines where.
+        `finest` is the smallest tolerance that the method accepts. The attribute `digits`, a random
+        number from 0 to 1, determines the result: 1e-3 for 0, `finest` for 1, and a value between
+        them, in logarithmic scale, otherwise.
         """
         return float(max(finest, COARSEST * (finest / COARSEST) ** self.digits))
 
@@ -58,9 +59,9 @@ def weekly_seed(day: datetime.date | None = None) -> str:
 
 
 def draw(seed: str, number: int) -> Draw:
-    """Return the random inputs of check `number`, which `seed` and `number` determine.
+    """Return the random inputs of check `number`: a scene, a program with defects, and parameters.
 
-    The result is the same in every version of Python.
+    `seed` and `number` determine the result, which is the same in every version of Python.
     """
     # Each draw has its own random generator, so that it can be repeated without the other draws.
     source = Random(f"{seed}/{number}")

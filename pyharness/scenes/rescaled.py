@@ -59,11 +59,12 @@ def is_ordinary(scene: Scene) -> bool:
 
 
 def rescaling_factor(scene: Scene, time: float) -> float:
-    """Return the power of 2 with which `scaled` brings the omega of a scene near 1 rad/s.
+    """Return the power of 2 by which omega is multiplied so that it is near 1 rad/s.
 
-    Omega is the larger of the initial omega and the omega that the torque may cause until `time`
-    (s), the end of the integration. The result is 1 if the scene needs no rescaling, or if the
-    rescaled scene would overflow or underflow.
+    The function `scaled` uses this factor to rescale the time of the scene. Omega is the larger of
+    the initial omega and the omega that the torque may cause until `time` (s), the end of the
+    integration. The result is 1 if the scene needs no rescaling, or if the rescaled scene would
+    overflow or underflow.
     """
     if is_ordinary(scene):
         return 1.0
@@ -104,10 +105,11 @@ def omega_by_torque(scene: Scene, time: float) -> float:
 
 
 def _fits(scene: Scene, time: float, factor: float) -> bool:
-    """Return whether times and torques do not overflow if the scene is rescaled by `factor`.
+    """Return whether times and torques do not overflow if omega is multiplied by `factor`.
 
-    `time` is the end of the integration of the given scene (s). The result is also False if a
-    rescaled time is so short that it is subnormal in binary64, and thus has fewer digits.
+    Time is divided by `factor`, and torques are rescaled to match. `time` is the end of the
+    integration of the given scene (s). The result is also False if a rescaled time is so short that
+    it is subnormal in binary64, and thus has fewer digits.
     """
     law = scene.torque
     waves = law.sines + law.cosines
@@ -121,11 +123,11 @@ def _fits(scene: Scene, time: float, factor: float) -> bool:
 
 
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
-    """Convert the trajectory of a rescaled scene to seconds, the unit of the original scene.
+    """Return the trajectory of a rescaled scene in rad/s and s, the units of the original scene.
 
-    `times` are the requested times of the original scene (s), and `factor` is the factor with which
-    `scaled` rescaled the scene. If omega overflows in the original unit, the returned trajectory
-    ends before the first row with an overflow.
+    `times` are the requested times of the original scene (s), and `factor` is the factor by which
+    the function `scaled` multiplied omega and divided time. If omega overflows in the original
+    unit, the returned trajectory ends before the first row with an overflow.
     """
     with np.errstate(over="ignore"):
         omega = trajectory.omega / factor

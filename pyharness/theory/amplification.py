@@ -64,9 +64,9 @@ class Amplification:
     def moving(self) -> "Amplification":
         """Return the matrix without the row and column of the step's result, if that is possible.
 
-        It is possible if no other vector depends on the result. The result then only accumulates
-        the other vectors, and belongs to an eigenvalue that does not depend on z. If another vector
-        depends on the result, return the whole matrix.
+        The rows and columns belong to the vectors that a step propagates. The result can be left
+        out if no other vector depends on it, and it only accumulates the other vectors. Its
+        eigenvalue then does not depend on z. If it can't be left out, return the whole matrix.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -74,7 +74,7 @@ class Amplification:
         return self
 
     def of(self, matrix: Exact) -> Fractions:
-        """Return the exact matrix of a step for a linear system x' = J x of n equations.
+        """Return the exact matrix by which a step advances a linear system x' = J x of n equations.
 
         `matrix` is hJ, the step size times J, with n rows and columns. It is inserted for z in the
         polynomials. The result has m n rows and columns, because each of the m vectors that a step
@@ -97,12 +97,13 @@ class Amplification:
 
 
 def amplification(listing: Listing, step: int = 1) -> Amplification:
-    """Return the amplification matrix of a program's step number `step`, counted from 1.
+    """Return the matrix by which step number `step` of a program multiplies a perturbation.
 
-    `listing` is the program with its active defects. The number of the step has an effect only with
-    the defect `dt-accumulates`, which moves the collocation points from step to step. In
-    collocation the first estimate takes the right-hand side z x as constant, so that the estimate
-    is a straight line. The one correction evaluates the right-hand side along that line.
+    `listing` is the program with its active defects. `step` counts from 1, and has an effect only
+    with the defect `dt-accumulates`, which moves the collocation points from step to step. The
+    elements are polynomials in z, the step size times an eigenvalue of the Jacobian. In collocation
+    the first estimate takes the right-hand side as constant, so that the estimate is a straight
+    line. The one correction evaluates the right-hand side along that line.
     """
     if listing.program == "runge-kutta":
         return _runge_kutta(listing)
@@ -116,10 +117,11 @@ def weight_of_squares(listing: Listing, step: int) -> Fraction:
     """Return the integral of s**2 over a step as a collocation program computes it, over h**3.
 
     Here h is the step size, s is the time since the beginning of the step, and `step` is the number
-    of the step, from 1. Along the first estimate the right-hand side is F + s J F + s**2 Q(F). F
-    and J are the right-hand side and its Jacobian at the beginning of the step, and Q is the
-    quadratic part of the right-hand side. Therefore the integral of s**2 is the weight of Q(F) in
-    the result of the step. The exact value of this integral over h**3 is 1/3.
+    of the step, from 1. `listing` is the program with its active defects. Along the first estimate
+    the right-hand side is F + s J F + s**2 Q(F). F and J are the right-hand side and its Jacobian
+    at the beginning of the step, and Q is the quadratic part of the right-hand side. Therefore the
+    integral of s**2 is the weight of Q(F) in the result of the step. The exact value of this
+    integral over h**3 is 1/3.
     """
     points, weights = _quadrature(listing, step)
     found: Fraction = weights @ points**2
@@ -139,10 +141,11 @@ def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
 
 
 def _runge_kutta(listing: Listing) -> Amplification:
-    """Return the amplification matrix of the Runge-Kutta program's four stages (cards 770-1200).
+    """Return the matrix by which a step of the Runge-Kutta program multiplies a perturbation.
 
-    The stages depend on two vectors: U(1), at which the first stage is evaluated, and the base of
-    the step, which is the result of the previous step.
+    `listing` is the program with its active defects; its four stages are on cards 770-1200. They
+    depend on two vectors: U(1), at which the first stage is evaluated, and the base of the step,
+    which is the result of the previous step.
     """
     first, base = _one(2, 0), _one(2, 1)
     half = Fraction(1, 2)
@@ -168,10 +171,11 @@ def _runge_kutta(listing: Listing) -> Amplification:
 
 
 def _one(size: int, place: int) -> Fractions:
-    """Return vector number `place`, from 0, as a linear combination of all `size` vectors.
+    """Return one of the vectors that a step propagates, as a linear combination of all of them.
 
-    The factors of the combination are polynomials in z: here 1 for the vector itself and 0 for the
-    others. The result contains their coefficients, in the shape (size, number of powers of z).
+    `place` is the number of the vector, from 0, and `size` the number of vectors. The factors of
+    the combination are polynomials in z: here 1 for the vector itself and 0 for the others. The
+    result contains their coefficients, in the shape (size, number of powers of z).
     """
     result = np.full((size, _HIGHEST), Fraction(0), dtype=object)
     result[place, 0] = Fraction(1)
@@ -196,10 +200,10 @@ def _polynomial_text(coefficients: Fractions) -> str:
 def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
     """Return the distance of the stability boundary from z = 0 along `direction`, and a slope.
 
-    `matrix` is an amplification matrix. `direction` is -1 for the negative real axis or 1j for the
-    imaginary axis. At smaller distances from z = 0 perturbations do not grow. The slope is the
-    increase of the spectral radius per unit of distance just beyond the boundary. Return (0, 1) if
-    perturbations grow from z = 0 on.
+    z is the step size times an eigenvalue of the Jacobian. `matrix` is an amplification matrix.
+    `direction` is -1 for the negative real axis or 1j for the imaginary axis. At smaller distances
+    from z = 0 perturbations do not grow. The slope is the increase of the spectral radius per unit
+    of distance just beyond the boundary. Return (0, 1) if perturbations grow at a distance of 1/16.
     """
 
     def grows(distance: float) -> bool:

@@ -39,7 +39,7 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """One torque-free motion, with the quantities along it from which error bounds follow."""
+    """Samples of one torque-free motion, and quantities for error bounds of methods."""
 
     # samples along the motion, shapes (n, 3), (n, 3), (n, 3, 3): omega (rad/s), its time derivative
     # (rad/s2), and the Jacobian of this derivative with respect to omega (1/s)
@@ -56,9 +56,9 @@ class Orbit:
     def limits(self, noise: Noise, steps: float) -> dict[str, float]:
         """Return the bounds on the errors of energy, momentum and phase after `steps` steps.
 
-        `noise` contains the bounds for one step. The keys of the result are "energy", "momentum"
-        and "phase". The errors of energy and momentum are relative, and the error of the phase is
-        in radians.
+        `noise` contains the bounds of the errors of one step. The keys of the result are "energy",
+        "momentum" and "phase". The errors of energy and momentum are relative, and the error of the
+        phase is in radians.
         """
         walk = DEVIATIONS * noise.rounding * math.sqrt(steps)
         drift = steps * noise.truncation
@@ -80,7 +80,11 @@ class Orbit:
 
 
 def orbit(scene: Scene) -> Orbit:
-    """Return the `Orbit` of a torque-free scene with moments, sampled over two periods of omega."""
+    """Return samples of omega over two periods, with quantities from which error bounds follow.
+
+    The scene must have no torque, and must have moments. The result contains the largest factors
+    from an error of omega to errors of energy, momentum, frequency and phase.
+    """
     a = np.array(scene.euler_coefficients)
     frequency = _frequency(a, np.array(scene.omega))
     times = np.linspace(0.0, 4.0 * math.pi / frequency, _SAMPLES).tolist()
@@ -110,9 +114,9 @@ def floats(rows: Sequence[Sequence[Decimal]]) -> Array:
 def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: float) -> Noise:
     """Return bounds of the errors of a step of the Taylor method, by a running error analysis.
 
-    `body` is the orbit of the scene, `step` is the step size (s), and `order` is the degree of the
-    Taylor polynomial. `left_out` is the bound of the truncation error, relative to the largest
-    omega.
+    `body` contains samples of the scene's motion, `step` is the step size (s), and `order` is the
+    degree of the Taylor polynomial. `left_out` is the bound of the truncation error, relative to
+    the largest omega.
 
     Taylor term k is a sum of k products of lower terms. Each product has at most k + 3 roundings,
     and propagates the errors of the lower terms. Omega at the start of the step is used without the
@@ -136,10 +140,11 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
 def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     """Return bounds of the errors of a step of Gauss collocation with s = `stages` stages.
 
-    `body` is the orbit of the scene, and `step` is the step size h (s). The sum at each node has
-    s + 3 roundings of the right-hand sides and one of omega. The iteration multiplies these errors
-    by the inverse of 1 - h A J. Here A is the matrix of the Runge-Kutta tableau, and J the Jacobian
-    of the right-hand sides. Gauss collocation conserves quadratic invariants for any step size.
+    `body` contains samples of the scene's motion, and `step` is the step size h (s). The sum at
+    each node has s + 3 roundings of the right-hand sides and one of omega. The iteration multiplies
+    these errors by the inverse of 1 - h A J. Here A is the matrix of the Runge-Kutta tableau, and J
+    the Jacobian of the right-hand sides. Gauss collocation conserves quadratic invariants for any
+    step size.
 
     The truncation error is the integral of the state-transition matrix times the residual of the
     differential equation, which is zero at the nodes. Because the nodes are the zeros of an
@@ -171,10 +176,10 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
 
 
 def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
-    """Return the Taylor terms 0 to `order` of omega for a step from each state of the orbit `body`.
+    """Return the Taylor terms 0 to `order` of omega for a step from each state of a motion.
 
-    Term k is the Taylor coefficient k times the power k of the step size `step` (s). Each term has
-    the shape (n, 3), in rad/s.
+    `body` contains n samples of the motion. Term k is the Taylor coefficient k times the power k of
+    the step size `step` (s). Each term has the shape (n, 3), in rad/s.
     """
     a = np.array(scene.euler_coefficients)
     terms = [body.states]
@@ -191,10 +196,11 @@ def errors(
 ) -> dict[str, float]:
     """Return the relative errors of energy and momentum and the phase error (rad), with signs.
 
-    `omega` (rad/s) is a computed result at `time` (s), and `body` is the orbit of the scene. Energy
-    and momentum are compared with their initial values, and the phase with the exact solution. If
-    `rounded`, the exact solution is computed with A, B, C rounded to binary64, as a method uses
-    them. Otherwise it is computed with the exact coefficients.
+    `omega` (rad/s) is a computed result at `time` (s) without torque. Energy and momentum are
+    compared with their initial values. The phase error is the time by which `omega` is ahead of the
+    exact solution, times the frequency of the motion, which `body` contains. If `rounded`, the
+    exact solution is computed with A, B, C rounded to binary64, as a method uses them. Otherwise it
+    is computed with the exact coefficients.
     """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]
@@ -251,9 +257,10 @@ def _frequency(a: Array, omega: Array) -> float:
 
 
 def _steepness(a: Array, omega: Array) -> float:
-    """Return the sum of the absolute derivatives of `_frequency` by the components of omega.
+    """Return the sum of the absolute derivatives of the frequency by the components of omega.
 
-    The derivatives are central differences at `omega` (rad/s). `a` contains the Euler coefficients.
+    The frequency is 2 pi over the period of omega in torque-free motion. The derivatives are
+    central differences at `omega` (rad/s). `a` contains the Euler coefficients.
     """
     size = 1e-6 * float(np.abs(omega).max())
     return sum(

@@ -33,7 +33,7 @@ PARTS = {
 
 @dataclass(frozen=True)
 class Solved:
-    """The accuracy of LEQT1F for one collocation matrix with six right-hand sides.
+    """The accuracy of the linear solver LEQT1F for one collocation matrix and six right-hand sides.
 
     A is the matrix, and B has the right-hand sides as columns. The solution X of A X = B by LEQT1F
     is compared with the exact solution.
@@ -64,17 +64,20 @@ class Solved:
 
 
 def points(program: str, step: float) -> list[float]:
-    """Return the collocation points (s) for a step size `step` (s) as the program computes them."""
+    """Return the collocation points (s) for the step size `step` (s), as a program computes them.
+
+    `program` is "two-term" or "four-term". The points have the rounding errors of its formulas.
+    """
     if program == "two-term":
         return [step / 3.0, 2.0 * step / 3.0]
     return [step * 0.2, step * 0.4, step * 0.6, step * 0.8]
 
 
 def _right_hand_sides(count: int) -> Array:
-    """Return six right-hand sides of a linear system, shape (6, count).
+    """Return six right-hand sides of a linear system of `count` equations, shape (6, count).
 
-    Their elements are constant, linear in the index, of alternating sign and, in three of them,
-    random. `count` is the number of equations.
+    The elements are constant in the first, proportional to the index in the second, and 1 and -1 in
+    turn in the third. The other three have random elements.
     """
     rough = np.random.default_rng(count).normal(size=(3, count))
     places = range(count)
@@ -84,10 +87,11 @@ def _right_hand_sides(count: int) -> Array:
 
 
 def solved(program: str, step: float) -> Solved:
-    """Return the accuracy of LEQT1F for the collocation matrix of a program at one step size (s).
+    """Return the accuracy of the solver LEQT1F for the collocation matrix at one step size (s).
 
-    Linear systems with this matrix and six right-hand sides are solved by LEQT1F and exactly, and
-    the two solutions are compared. `program` is "two-term" or "four-term".
+    LEQT1F is the linear solver of the program, which is "two-term" or "four-term". Linear systems
+    with this matrix and six right-hand sides are solved by LEQT1F and exactly, and the two
+    solutions are compared.
     """
     from pyharness.model.extension import extension
 
@@ -133,6 +137,7 @@ def _small_step(program: str) -> tuple[Fraction, Fractions]:
     """Return a small step size (s), and the collocation matrix of a program for this step size.
 
     The largest element of each row of the matrix is 1, as it is for any smaller step size.
+    `program` is "two-term" or "four-term".
     """
     step = Fraction(1, 1000)
     return step, collocation_matrix([part * step for part in PARTS[program]])
@@ -168,11 +173,12 @@ def solver_roundings(program: str) -> tuple[float, float]:
 def singular_below(program: str, bits: int = 53) -> float:
     """Return the step size (s) at and below which LEQT1F must declare the matrix singular.
 
-    The matrix is the collocation matrix of `program`, with N rows. LEQT1F declares it singular if
-    the computed sum N + p equals N, where p is a scaled pivot. The sum equals N if p is at most
-    half a unit in the last place of N. A tie is included, because it is rounded to even N. N is a
-    power of 2, so that this unit is N 2**(1 - bits) in an arithmetic of `bits` bits that rounds to
-    nearest. The last scaled pivot is proportional to step**(N-1), and determines the step size.
+    LEQT1F is the linear solver of the collocation programs. The matrix is the collocation matrix of
+    `program`, "two-term" or "four-term", with N rows. LEQT1F declares it singular if the computed
+    sum N + p equals N, where p is a scaled pivot. The sum equals N if p is at most half a unit in
+    the last place of N. A tie is included, because it is rounded to even N. N is a power of 2, so
+    that this unit is N 2**(1 - bits) in an arithmetic of `bits` bits that rounds to nearest. The
+    last scaled pivot is proportional to step**(N-1), and determines the step size.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -185,7 +191,8 @@ def singular_below(program: str, bits: int = 53) -> float:
 def declared_singular_below(program: str) -> float:
     """Return the largest step size (s) whose matrix the compiled LEQT1F declares singular.
 
-    The matrix is the collocation matrix of `program`. The step size is found by bisection.
+    LEQT1F is the linear solver of the collocation programs. The matrix is the collocation matrix of
+    `program`, "two-term" or "four-term". The step size is found by bisection.
     """
     from pyharness.model.extension import extension
 
@@ -250,9 +257,9 @@ def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tupl
     """Return the largest relative shortfall of a pivot from the largest candidate, and its bound.
 
     The candidates in a column are the scaled elements of the rows that are not pivot rows yet. The
-    pivots are those of an exact elimination of `matrix` with the pivot rows in `order`. The bound
-    is the shortfall that rounding may cause. It follows from `sizes`, which is abs(L) abs(U) for
-    the LU factors.
+    pivots are those of an exact elimination of `matrix` with the pivot rows in `order`, as the
+    solver chose them. The bound is the shortfall that rounding may cause. It follows from `sizes`,
+    which is abs(L) abs(U) for the LU factors.
     """
     shortfall, allowed = Fraction(0), Fraction(0)
     scale = 1 / abs(matrix).max(axis=1)
@@ -273,7 +280,7 @@ def _columns(
     For each column, yield the index of the pivot row, the pivot candidates by row index, and all
     rows before this column is eliminated. A candidate is the magnitude of an element over the
     largest magnitude in its row of `matrix`. The pivot rows are taken in `order`. Without `order`
-    the row with the largest candidate is taken, as in LEQT1F.
+    the row with the largest candidate is taken, as in the programs' linear solver LEQT1F.
     """
     rows = matrix.copy()
     scale = 1 / abs(matrix).max(axis=1)

@@ -48,11 +48,12 @@ class Conditioning:
     def limit(self, made: float, steps: float = 0.0) -> float:
         """Return the largest error of omega that a method may have at the end, over `largest`.
 
-        `made` is the sum of the errors of the method's steps, over `largest`, according to its
-        tolerance or its order. This sum is multiplied by the error amplification. `steps` is the
-        number of steps after which the method rounds omega, or 0 if the method retains its rounding
-        errors by compensated summation. The limit is at most 2. This is no restriction, because
-        components of magnitude up to `largest` differ by at most 2 times `largest`.
+        `largest` is the largest magnitude of any component of omega until the end. `made` is the
+        sum of the errors of the method's steps, over `largest`, according to its tolerance or its
+        order. This sum is multiplied by the error amplification. `steps` is the number of steps
+        after which the method rounds omega, or 0 if the method retains its rounding errors by
+        compensated summation. The limit is at most 2. This is no restriction, because components of
+        magnitude up to `largest` differ by at most 2 times `largest`.
         """
         allowed = made * self.amplification + self.rounding + steps * self.storing
         # If the limit is NaN, no error is allowed.
@@ -70,11 +71,11 @@ class Conditioning:
 
 
 def conditioning(scene: Scene, time: float) -> Conditioning:
-    """Return the `Conditioning` of a scene from its linearised flow between 0 and `time` (s).
+    """Return the sensitivity of a scene's omega at `time` (s) to earlier errors of omega.
 
-    Raise InputError if the solution grows without bound before `time`, or if `time` is so long that
-    the solution would be needed at too many times. Raise it also if the amplification is beyond the
-    range of binary64.
+    The sensitivity follows from the equations linearised along the solution. Raise InputError if
+    the solution grows without bound before `time`, or if `time` is so long that the solution would
+    be needed at too many times. Raise it also if the amplification is beyond the range of binary64.
     """
     times = _nodes(scene, time)
     omega, complete = _path(scene, times)
@@ -84,7 +85,7 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 
 
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
-    """Return the `Conditioning` of a scene along a known solution.
+    """Return the sensitivity of a scene's final omega to errors of omega along a known solution.
 
     The solution is `omega` (rad/s, shape (n, 3)) at `times` (s), which begin at 0. It must change
     little from each time to the next. Raise InputError if the amplification is beyond the range of
@@ -98,7 +99,7 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 
 
 def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
-    """Return omega at each of `times` (rad/s, shape (n, 3)), and whether it reaches the last one.
+    """Return omega at `times` (rad/s, shape (n, 3)), and whether it is known at the last time.
 
     The solution ends before the last time if omega grows without bound.
     """
@@ -114,7 +115,7 @@ def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
 def _nodes(scene: Scene, time: float) -> Array:
     """Return equally spaced times from 0 to `time` (s), so close that omega changes little between.
 
-    Raise InputError if more than `_MOST_NODES` times would be needed.
+    Raise InputError if more than 400 000 intervals (`_MOST_NODES`) would be needed.
     """
     if time == 0.0:
         return np.zeros(2)

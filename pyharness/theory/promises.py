@@ -17,7 +17,7 @@ from pyharness.methods.registry import FIXED_STEP, REGISTRY, SCIPY_METHODS
 
 
 def steps_of(name: str, run_steps: int, evaluations: int) -> float:
-    """Return the number of steps of a run after which the method rounds omega to binary64.
+    """Return how often a run of a method rounds omega to binary64 at the end of a step.
 
     `name` is the method, `run_steps` is the number of steps of the run, and `evaluations` is the
     number of right-hand sides that it evaluated. The result is 0 for a method that retains the
@@ -47,8 +47,8 @@ def fixed_step_sum(name: str, angle: float, steps: int) -> float:
 def _series(name: str) -> tuple[float, ...]:
     """Return the coefficients of the powers of the step size in a method's result after one step.
 
-    The coefficients begin with power 0. The step starts from y(0) = 1 and integrates y' = y**2. The
-    step size is the `angle` of `fixed_step_sum`. `name` is the method.
+    The step starts from y(0) = 1 and integrates y' = y**2. Its result is a polynomial in the step
+    size, whose coefficients are returned from power 0 on. `name` is the method.
     """
     if name == "taylor-3":
         return 1.0, 1.0, 1.0

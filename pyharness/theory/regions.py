@@ -54,8 +54,9 @@ class Regions:
 def matrices() -> dict[str, Amplification]:
     """Return the distinct amplification matrices of the programs and of the method `rk4`, by name.
 
-    Two further matrices belong to the Runge-Kutta program with a single defect. Each name lists the
-    programs and methods that have the matrix.
+    An amplification matrix is the matrix by which one step multiplies a perturbation. Two further
+    matrices belong to the Runge-Kutta program with a single defect. Each name lists the programs
+    and methods that have the matrix.
     """
     return {
         "two-term and four-term, original and corrected": amplification(
@@ -73,8 +74,9 @@ def matrices() -> dict[str, Amplification]:
 def regions() -> Regions:
     """Return the stability regions of all programs of the thesis, original and corrected.
 
-    The Runge-Kutta program is included also with each of two defects alone. Gauss collocation is
-    left out, because its stability region is known: the left half-plane.
+    The Runge-Kutta program is included also with the defect `stage-base` alone, and with the defect
+    `base-not-restored` alone. Gauss collocation is left out, because its stability region is known:
+    the left half-plane.
     """
     real, imaginary = np.linspace(*_REAL), np.linspace(*_IMAGINARY)
     low, high, count = _DISTANCES

@@ -83,10 +83,11 @@ class SteadyRotations:
 
 
 def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
-    """Return the steady rotations of a scene, each perturbed by `disturbance` times its magnitude.
+    """Return the steady rotations of a scene, and how a small perturbation of each develops.
 
-    Raise InputError if the torque varies with time, or if a rotation or its rates are beyond the
-    range of binary64.
+    `disturbance` is the magnitude of the perturbation over the magnitude of the rotation. Raise
+    InputError if the torque varies with time, or if a rotation or its rates are beyond the range of
+    binary64.
     """
     if scene.body_torque.varies:
         raise InputError(
@@ -211,7 +212,8 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | 
     magnitude of the perturbation over that of the rotation. A perturbation that tilts the rotation
     by d (rad) towards another axis changes the frequency by a fraction. This fraction is d**2 / 4
     times the first coefficient over the coefficient of the other axis. The time is infinite if the
-    first coefficient is 0. It is None if the frequency is 0, because then only the spin drifts.
+    first coefficient is 0. The result is None if the frequency is 0, because then only the spin
+    drifts.
     """
     spun, *others = map(abs, coefficients)
     if spun == 0.0:
@@ -231,7 +233,7 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
     (2 / lambda) ln(4 / k') if the perturbation is small. K is the complete elliptic integral with
     the complementary modulus k', and lambda is near the growth rate of the perturbation. The time
     is shortest if the perturbation is along that other axis whose coefficient has the smaller
-    magnitude. It is None if the coefficients have signs that are impossible for a middle axis.
+    magnitude. The result is None if the signs of the coefficients are impossible for a middle axis.
     """
     first, second, third = coefficients
     if first * second >= 0.0 or first * third >= 0.0:
@@ -248,7 +250,8 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
 def _places(scene: Scene) -> tuple[str, Places]:
     """Return a text about the steady rotations of a scene, and the list of rotations to be shown.
 
-    If the rotations form a continuous family, only some members are shown.
+    Each rotation is a pair of a description and omega (rad/s). If the rotations form a continuous
+    family, only some members are shown.
     """
     coefficients, torque = scene.euler_coefficients, scene.normalized_torque(0.0)
     held = [axis for axis in range(3) if torque[axis] != 0.0]
@@ -289,12 +292,13 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 
 
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
-    """Return a text and the rotations to be shown for a torque about one axis.
+    """Return a text and the steady rotations to be shown for a torque about one axis.
 
-    `held` is the number of this axis, from 0. The steady rotations form a hyperbola, because the
-    product of the two other components of omega is constant and equal to `product` (rad2/s2).
-    Rotations of one branch are shown. The other branch consists of the opposite rotations.
-    `coefficients` are A, B, C of Euler's equations.
+    Each rotation is a pair of a description and omega (rad/s). `held` is the number of this axis,
+    from 0. The steady rotations form a hyperbola, because the product of the two other components
+    of omega is constant and equal to `product` (rad2/s2). Rotations of one branch are shown. The
+    other branch consists of the opposite rotations. `coefficients` are A, B, C of Euler's
+    equations.
     """
     one, other = (held + 1) % 3, (held + 2) % 3
     told = (
@@ -319,11 +323,12 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
 
 
 def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
-    """Return a text and the rotations to be shown for a torque across the axis of symmetry.
+    """Return a text and the steady rotations to be shown for a torque across the axis of symmetry.
 
-    The torque is perpendicular to the axis of symmetry, whose number is `axis`, from 0. `products`
-    are the products w2 w3, w3 w1 and w1 w2 of components of omega that balance the torque
-    (rad2/s2). The steady rotations form a hyperbola. Points of one branch are shown.
+    Each rotation is a pair of a description and omega (rad/s). The torque is perpendicular to the
+    axis of symmetry, whose number is `axis`, from 0. `products` are the products w2 w3, w3 w1 and
+    w1 w2 of components of omega that balance the torque (rad2/s2). The steady rotations form a
+    hyperbola. Points of one branch are shown.
     """
     one, other = (axis + 1) % 3, (axis + 2) % 3
     # The products w_one w_axis and w_other w_axis.

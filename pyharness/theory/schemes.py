@@ -23,9 +23,10 @@ TERMS = 24
 
 
 class Numbers:
-    """The arithmetic of a scheme that computes with numbers.
+    """The equations of a scene for a scheme that computes with numbers.
 
-    Omega (rad/s) is an array of shape (..., 3).
+    A scheme is a function that computes one step of a method. Omega (rad/s) is an array of shape
+    (..., 3).
     """
 
     def __init__(self, scene: Scene, step: float, sizes: bool = False) -> None:
@@ -50,9 +51,11 @@ class Numbers:
 
 
 class Series:
-    """The arithmetic of a scheme that computes with power series in the step size.
+    """The equations of a scene for a scheme that computes with power series in the step size.
 
-    Omega is an array of shape (TERMS, ..., 3). Its element k contains the coefficients of power k.
+    A scheme is a function that computes one step of a method. Omega is an array of shape
+    (TERMS, ..., 3), where TERMS is the number of terms. Its element k contains the coefficients of
+    power k.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -76,12 +79,12 @@ class Series:
     def times_step(self, x: Array) -> Array:
         """Return the power series `x` times the step size.
 
-        The last term of `x` is dropped, because its power would exceed the last one of a series.
+        The last term of `x` is dropped, because every series has the same number of terms.
         """
         return np.concatenate([np.zeros_like(x[:1]), x[:-1]])
 
     def solution(self, omega: Array) -> Array:
-        """Return the power series of the exact solution after one step, in the step size.
+        """Return the exact solution after one step, as a power series in the step size.
 
         The step starts at `omega` (rad/s, shape (..., 3)).
         """
@@ -97,7 +100,10 @@ Scheme = Callable[[Arithmetic, Array], Array]
 
 @dataclass(frozen=True)
 class FixedStep:
-    """A program or method with a fixed step, described by its scheme, order and rounding error."""
+    """A program or method with a fixed step: its order, rounding error and scheme.
+
+    The scheme is a function that computes one step.
+    """
 
     name: str  # of the program or method
     order: int  # of the global error of the program or method
@@ -106,7 +112,7 @@ class FixedStep:
 
 
 def constant(omega: Array) -> Array:
-    """Return the power series of a constant: its term of power 0 is `omega`, the others are 0.
+    """Return a constant as a power series: the term of power 0 is `omega`, the others are 0.
 
     `omega` has the shape (..., 3).
     """
@@ -116,9 +122,9 @@ def constant(omega: Array) -> Array:
 
 
 def collocation(program: str) -> Scheme:
-    """Return the scheme of a collocation program: a first estimate and one correction.
+    """Return the function that computes a step of a collocation program, its scheme.
 
-    `program` is "two-term" or "four-term".
+    A step consists of a first estimate and one correction. `program` is "two-term" or "four-term".
     """
     parts = PARTS[program]
     weights = inverse(collocation_matrix(parts)).sum(axis=0).astype(float)
@@ -134,7 +140,7 @@ def collocation(program: str) -> Scheme:
 
 
 def collocation_singular(program: str) -> Scheme:
-    """Return the scheme of a collocation program whose matrix LEQT1F declares singular.
+    """Return the function for a step of a collocation program with a matrix declared singular.
 
     `program` is "two-term" or "four-term". If the matrix is singular, the linear solver LEQT1F
     returns the right-hand sides of the linear system unchanged. The program then uses these
@@ -164,7 +170,8 @@ def collocation_singular(program: str) -> Scheme:
 def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
     """Return omega after a step of the classical Runge-Kutta method of order 4 (eq. 31).
 
-    `on` is the arithmetic, with the equations of the scene and the step size. `omega` is the start.
+    `on` evaluates the equations of a scene, and multiplies by the step size. `omega` is the value
+    at the start of the step.
     """
     first = on.times_step(on.rate(omega))
     second = on.times_step(on.rate(omega + 0.5 * first))
@@ -177,8 +184,8 @@ def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
     """Return omega after the first step of the original Runge-Kutta program, as it was punched.
 
     Its third stage starts from the point of the second stage, and its fourth stage from the point
-    of the third stage. In the classical method both start from `omega`. `on` is the arithmetic,
-    with the equations of the scene and the step size.
+    of the third stage. In the classical method both start from `omega`, the value at the start of
+    the step. `on` evaluates the equations of a scene, and multiplies by the step size.
     """
     first = on.times_step(on.rate(omega))
     at = omega + 0.5 * first
@@ -192,7 +199,8 @@ def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
 def improved_euler(on: Arithmetic, omega: Array) -> Array:
     """Return omega after a step of the improved Euler method (eq. 29).
 
-    `on` is the arithmetic, with the equations of the scene and the step size. `omega` is the start.
+    `on` evaluates the equations of a scene, and multiplies by the step size. `omega` is the value
+    at the start of the step.
     """
     first = on.times_step(on.rate(omega))
     return np.asarray(omega + 0.5 * (first + on.times_step(on.rate(omega + first))))
@@ -202,8 +210,8 @@ def taylor_3(on: Arithmetic, omega: Array) -> Array:
     """Return omega after a step of the Taylor method with three terms (eq. 30).
 
     The second derivative of omega is the derivative of the right-hand side F in the direction F. It
-    equals half of F(omega + F) - F(omega - F), because F is quadratic. `on` is the arithmetic, with
-    the equations of the scene and the step size.
+    equals half of F(omega + F) - F(omega - F), because F is quadratic. `on` evaluates F for a
+    scene, and multiplies by the step size. `omega` is the value at the start of the step.
     """
     rate = on.rate(omega)
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))
@@ -211,9 +219,9 @@ def taylor_3(on: Arithmetic, omega: Array) -> Array:
 
 
 def gauss(stages: int) -> Scheme:
-    """Return the scheme of Gauss collocation with `stages` stages, iterated until it converges.
+    """Return the function for a step of Gauss collocation with `stages` stages, its scheme.
 
-    The order of the scheme is twice the number of stages.
+    The step consists of 24 fixed-point iterations. The order is twice the number of stages.
     """
     nodes, weights = legendre.leggauss(stages)
     nodes, weights = 0.5 * (nodes + 1.0), 0.5 * weights
@@ -250,7 +258,8 @@ SCHEMES = {each.name: each for each in _ALL}
 def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
     """Return the truncation error of a step from each omega, as a power series in the step size.
 
-    `omega` (rad/s) has the shape (n, 3). The series has the shape (TERMS, n, 3). Its element k
+    `scheme` is the function that computes a step of a method. `omega` (rad/s) has the shape (n, 3).
+    The series has the shape (TERMS, n, 3), where TERMS is the number of terms. Its element k
     contains the coefficients of power k.
     """
     on = Series(scene)

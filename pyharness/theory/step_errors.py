@@ -61,9 +61,10 @@ class Forecast:
 
 
 def path(scene: Scene, time: float) -> Path:
-    """Return the solution from 0 to `time` (s) with the state-transition matrices to its end.
+    """Return the solution from 0 to `time` (s), with its state-transition matrices.
 
-    Raise InputError if the solution grows without bound before `time`.
+    There is a matrix from each time of the solution to the end. Raise InputError if the solution
+    grows without bound before `time`.
     """
     from pyharness.methods.solve import solve
 
@@ -87,9 +88,10 @@ class Forecaster:
     """The error predictions for one method along one solution, for any number of steps."""
 
     def __init__(self, along: Path, method: str) -> None:
-        """Store the solution `along` and the method, a name in `pyharness.theory.schemes.SCHEMES`.
+        """Store a solution, `along`, and a method by its name.
 
-        The mean rounding error of one step, which does not depend on the step size, is computed.
+        The names are the keys of `pyharness.theory.schemes.SCHEMES`. The mean rounding error of one
+        step, which does not depend on the step size, is computed.
         """
         self._path = along
         self.method = SCHEMES[method]
@@ -97,7 +99,7 @@ class Forecaster:
         self._wandering = self._of_one_step()
 
     def at(self, steps: int) -> Forecast:
-        """Return the predicted errors at the end of the solution if it has `steps` equal steps."""
+        """Return the predicted errors at the end if the method takes `steps` equal steps."""
         here = self._path
         h = float(here.times[-1]) / steps
         largest = here.flow.largest

@@ -21,9 +21,10 @@ from pyharness.model.trajectory import Array
 
 @dataclass(frozen=True, eq=False)
 class Tableau:
-    """One correction of the first estimate of a step, in the form of a Runge-Kutta tableau.
+    """One correction of a step by a weighted residual method, as a Runge-Kutta tableau.
 
-    The tableau is for a step that is scaled to the unit interval. The right-hand side is f.
+    A correction evaluates the right-hand side f along the first estimate of the step, or along the
+    previous correction. The tableau is for a step that is scaled to the unit interval.
     """
 
     # shape (m,); the points at which f is evaluated, in units of the step size h: the collocation
@@ -38,8 +39,8 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
     """Return the tableau of one weighted residual method from its conditions on the unit interval.
 
     `weighting` is "collocation", "subdomain", "galerkin" or "least-squares". `terms` is n, the
-    number of powers of t in the trial function. `points` selects the collocation points, as in
-    `grid`, and has an effect only for collocation.
+    number of powers of t in the trial function. `points` selects the collocation points: "gauss",
+    "thesis" or a tuple, as in the function `grid`. It has an effect only for collocation.
 
     The quadrature of the weighted residual is exact for constant torques, for the following reason.
     Along a trial function the products of two omegas in equations 13-15 have degree 2n. The weight
@@ -138,8 +139,9 @@ def basis(s: Array, n: int) -> Array:
 
 
 def _integrals(s: Array, n: int) -> Array:
-    """Return the integrals of the n polynomials of `basis` from 0 to m points, shape (m, n).
+    """Return the integrals of n shifted Legendre polynomials from 0 to m points, shape (m, n).
 
+    The polynomials are those of the function `basis`, of degree 0 to n - 1 on the unit interval.
     `s` contains the points, from 0 to 1. The integral from 0 to 1 is 1 for the first polynomial and
     0 for each of the others.
     """

@@ -20,8 +20,8 @@ DIGITS = 50
 def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
     """Return omega (rad/s) at `times` (s) of a body with I1 = I2 and its torque along axis 3.
 
-    There is a row of three decimal numbers for each time. Raise InputError if the scene has other
-    moments or another torque.
+    The result has a row of three decimal numbers for each time. Raise InputError if the scene has
+    other moments or another torque.
     """
     law, moments = scene.body_torque, scene.moments
     vectors = [law.constant, law.rate, *(a for a, _ in law.sines + law.cosines)]

@@ -29,7 +29,7 @@ def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
 def _alternating(term: Decimal, square: Decimal, n: int) -> Decimal:
     """Return the sum of x**k / k! with alternating signs over k = n, n + 2, n + 4, ...
 
-    `term` is the first term of the sum, and `square` is x**2.
+    `term` is the first term of the sum, x**n / n!, and `square` is x**2.
     """
     total = term
     while abs(term) > Decimal(1).scaleb(-decimal.getcontext().prec):

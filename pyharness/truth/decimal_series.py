@@ -83,10 +83,11 @@ class _Limit:
         self._before: tuple[int, Decimal] = (0, Decimal(0))
 
     def check(self, step: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
-        """Raise InputError before a step if the steps so far or the forecast exceed the limit.
+        """Raise InputError if the number of steps so far, or its forecast, exceeds the work limit.
 
-        `step` is the number of steps taken, `begin` the time reached (s), `length` the length of
-        the next step (s), and `rest` the time left until the end (s).
+        This method is called before each step of an integration by Taylor series. `step` is the
+        number of steps taken, `begin` the time reached (s), `length` the length of the next step
+        (s), and `rest` the time left until the end (s).
         """
         if step == 0:
             # The first step alone justifies a refusal only if the limit would be exceeded tenfold.
@@ -111,8 +112,8 @@ class _Limit:
 
         `step` is the number of steps that were taken until the time `begin` (s), and `rest` is the
         time left until the end (s). The forecast assumes the same mean length of the steps. If the
-        number of steps so far grew like a higher power of time than the first, the forecast assumes
-        that power, but at most 3.
+        number of steps so far grew like a power of time above 1.3, the forecast assumes that power,
+        but at most 3.
         """
         step_before, begin_before = self._before
         power = Decimal(1)
@@ -162,7 +163,7 @@ def _size(coefficients: list[Row], k: int, unknowns: int | None = None) -> Decim
     """Return the largest absolute value of Taylor coefficient number k of several unknowns.
 
     `coefficients` contains the Taylor coefficients of each unknown. The first `unknowns` unknowns
-    are compared, or all of them if that is None.
+    are compared, or all of them if `unknowns` is None.
     """
     return max(abs(series[k]) for series in coefficients[:unknowns])
 
@@ -224,7 +225,7 @@ class _Equations:
         return series
 
     def _torque_series(self, time: Decimal, order: int) -> list[Row]:
-        """Return the Taylor coefficients of the torque over moment around `time` (s).
+        """Return Taylor coefficients of the torque over the moment of inertia around `time` (s).
 
         For each axis there are `order` coefficients, numbers 0 to `order` - 1.
         """

@@ -145,7 +145,7 @@ def _integrate(scene: Scene, times: Sequence[float], power: int) -> Path:
 def _at(terms: Series, part: Fraction) -> Fraction:
     """Return the value of a Taylor series at the fraction `part` of its step.
 
-    `terms` are its Taylor terms at the end of the step, as integers over 2**BITS.
+    `terms` are its Taylor terms at the end of the step, as integers in units of 2**-160.
     """
     fixed = _fixed(part)
     total = 0
@@ -160,10 +160,10 @@ def _fixed(value: Fraction) -> int:
 
 @dataclass(frozen=True)
 class _Wave:
-    """The waves of one frequency in the torque, as two unknowns of the series: a sine and a cosine.
+    """All torque terms of one frequency, as two unknowns of the series: a sine and a cosine.
 
-    If the angle of the wave at the last time is below 1 rad, the first unknown is the sine divided
-    by this angle. A sine of large amplitude then has its full number of digits.
+    If the angle, frequency times the last requested time, is below 1 rad, the first unknown is the
+    sine divided by this angle. A sine of large amplitude then has its full number of digits.
     """
 
     to_sine: int  # the derivative of the unknown sine is `to_sine` times the cosine

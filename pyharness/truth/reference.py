@@ -202,7 +202,7 @@ def exact_coefficients(scene: Scene) -> Row:
 
 
 def _is_number(x: Decimal) -> bool:
-    """Return whether a number is finite in binary64."""
+    """Return whether a decimal number is finite after it is rounded to binary64."""
     return math.isfinite(float(x))
 
 

@@ -9,7 +9,8 @@ from pyharness.model.report import Report, Table
 def write(report: Report) -> str:
     """Return the table of data of a report as CSV text.
 
-    Numbers have all digits, so that they can be read back exactly.
+    A report has the results of a command. Numbers have all digits, so that they can be read back
+    exactly.
     """
     assert report.data is not None
     return csv_text(report.data)

@@ -7,7 +7,7 @@ from pyharness.model.report import Field, Line, Report, Section, Table
 
 
 def write(report: Report) -> str:
-    """Return the text of a report as an HTML fragment, without a page around it."""
+    """Return the text of a command's report as an HTML fragment, without a page around it."""
     return sections(report.text)
 
 

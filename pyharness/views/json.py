@@ -10,7 +10,7 @@ SCHEMA = 1
 
 
 def write(report: Report) -> str:
-    """Return the data of a report as JSON in one line, with the number of the JSON schema."""
+    """Return the data of a command's report as JSON in one line, with the JSON schema's number."""
     return json_text({"schema": SCHEMA, **report.record()})
 
 

@@ -8,7 +8,7 @@ from pyharness.model.report import Report
 def write(report: Report) -> str:
     """Return the checks of a report as a JUnit test suite in XML, with a test case for each check.
 
-    A failed check has the reason and the command that repeats it.
+    A failed check has the reason of the failure, and the command that repeats the check.
     """
     suite = xml.Element(
         "testsuite",

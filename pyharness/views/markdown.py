@@ -5,7 +5,7 @@ from pyharness.views.table import paragraph
 
 
 def write(report: Report) -> str:
-    """Return the page of a report as Markdown, or its table of data if it has no page.
+    """Return a command's report as Markdown: its page, or its table of data if it has no page.
 
     The page consists of text and formatted tables. In the table of data, numbers have all digits.
     """

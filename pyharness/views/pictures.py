@@ -53,9 +53,9 @@ def numbers_beside(path: str) -> str:
 def saved(picture: Picture, *paths: str) -> dict[str, bytes]:
     """Return the contents of the files of a picture, as a dict from path to bytes.
 
-    For each of `paths` there is the picture in the format of the path's suffix. One more entry is a
-    CSV file of the picture's numbers, with the name of the first path and the suffix .csv. No file
-    is written.
+    `paths` are the paths of one or more image files, whose suffixes determine their formats. One
+    more entry is a CSV file of the picture's numbers, with the name of the first path and the
+    suffix .csv. No file is written.
     """
     _set_title(picture)
     content = {path: _image(picture.figure, _form(path)) for path in paths}

@@ -9,7 +9,7 @@ from pyharness.model.report import Report
 
 
 def render(report: Report, form: str) -> str:
-    """Return a report as text in the format `form`.
+    """Return a report, which has the results of a command, as text in the format `form`.
 
     `form` is ``table`` (plain text), ``csv``, ``markdown``, ``json``, ``junit`` or ``html``.
     """

@@ -11,7 +11,7 @@ _END_ROWS = 10
 
 
 def write(report: Report) -> str:
-    """Return the text of a report as plain text, with a blank line between its sections."""
+    """Return a command's report as plain text, with a blank line between its sections."""
     sections = ["\n".join(_lines(section)) for section in report.text if section]
     return "\n\n".join(sections) + "\n"
 

@@ -20,10 +20,10 @@ _COUNT = itertools.count()
 
 @dataclass(frozen=True)
 class PlantedTwin(Program):
-    """A program of the thesis whose Python twin has a fault.
+    """A program of the thesis whose Python version (its twin) has a planted fault.
 
     The faulty twin is `module`, a changed copy of the twin. If `both`, it also runs in place of the
-    compiled program.
+    compiled Fortran program.
     """
 
     module: ModuleType
@@ -32,7 +32,11 @@ class PlantedTwin(Program):
     def _computed(
         self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
-        """Run the faulty twin on a scene; without `both`, the Fortran program runs unchanged."""
+        """Run the faulty Python version of the program on a scene, and return the trajectory.
+
+        If `both` is not set and the Fortran version is requested, the compiled program runs
+        unchanged.
+        """
         if self.both or implementation == "python":
             lipschitz, may_stop, _ = options
             found: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)
@@ -43,10 +47,11 @@ class PlantedTwin(Program):
 def plant_in_twin(
     program: str, file: str, old: str, new: str, folder: Path, both: bool = True
 ) -> PlantedTwin:
-    """Return the program named `program`, with one fault in its Python twin.
+    """Return the program named `program`, with one fault in its Python version (its twin).
 
-    The twins are copied into `folder`, the text `old` is replaced by `new` in the copy of `file`,
-    and the copy is imported. If `both`, the faulty twin also runs in place of the compiled program.
+    The source of the twins is copied into `folder`, the text `old` is replaced by `new` in the copy
+    of `file`, and the copy is imported. If `both`, the faulty twin also runs in place of the
+    compiled program.
     """
     package = f"planted_{next(_COUNT)}"
     target = folder / package

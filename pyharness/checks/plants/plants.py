@@ -36,10 +36,11 @@ _BOTH = "pyharness.original.programs.Program.run"  # in either language
 
 @dataclass(frozen=True)
 class Plant:
-    """A fault with its name, its description, and the context manager that plants it.
+    """A fault that is planted to test the checks: its name, its description, and how to plant it.
 
-    `kinds` are the kinds of checks, besides the golden record, that can detect the fault. The
-    self-test runs these kinds.
+    `planted` returns a context manager within which the fault is present. `kinds` are the kinds of
+    checks that can detect the fault, besides the comparison with stored results. The self-test runs
+    these kinds.
     """
 
     name: str
@@ -74,7 +75,7 @@ def _twin(program: str, file: str, old: str, new: str, both: bool) -> Iterator[N
 
 
 def _method(name: str, faulty: Callable[..., Trajectory]) -> AbstractContextManager[Any]:
-    """Return a context manager that replaces the function `solve` of the method `name`.
+    """Return a context manager that replaces the function `solve` of the method named `name`.
 
     A call then becomes ``faulty(right, scene, times, ...)``, where `right` is the original
     function.
@@ -112,9 +113,10 @@ def _half_step_label(run: Trajectory) -> Trajectory:
 
 
 def _stale() -> Callable[[Trajectory], Trajectory]:
-    """Return a fault by which a run gives the result of the run before it with as many rows.
+    """Return a function that replaces a run's trajectory by that of an earlier run.
 
-    The fault is a function of a trajectory. The first trajectory of each number of rows is returned
+    This is a planted fault. The function takes a trajectory, and returns the trajectory of the last
+    run before it with as many rows. The first trajectory of each number of rows is returned
     unchanged.
     """
     before: dict[int, Trajectory] = {}
@@ -133,7 +135,7 @@ _Answer = tuple[Array, int, int, Array]
 
 
 def _prepared(change: Callable[[Array, _Answer], _Answer]) -> AbstractContextManager[Any]:
-    """Return a context manager that changes the results of the kernel of prepared solvers.
+    """Return a context manager that changes the results of the compiled kernel of prepared solvers.
 
     Each result becomes ``change(packed, result)``, where `packed` is the input of the kernel.
     """
@@ -147,7 +149,8 @@ def _prepared(change: Callable[[Array, _Answer], _Answer]) -> AbstractContextMan
 def _stale_solver() -> AbstractContextManager[Any]:
     """Return a context manager by which prepared solvers give a stale result in every second call.
 
-    The stale result is the result of the call before.
+    The stale result is the result of the call before. This is a planted fault, which checks must
+    detect.
     """
     calls = itertools.count()
     before: list[_Answer] = []
@@ -184,9 +187,10 @@ def _half_step(scene: Scene) -> Scene:
 
 
 def _half_step_compiled(run: Callable[..., Trajectory], scene: Scene, *rest: Any) -> Trajectory:
-    """Call `run`, a compiled program, with half the step size; return the times of whole steps.
+    """Call `run`, a compiled program, with half the step size, but return the times of whole steps.
 
-    The rows of the result then have the omegas after half steps and the times of whole steps.
+    This is a planted fault. The rows of the result have the omegas after half steps and the times
+    of whole steps.
     """
     found, labels = run(_half_step(scene), *rest), run(scene, *rest)
     if found.steps != labels.steps:
@@ -213,7 +217,8 @@ def _shifted(
 ) -> Trajectory:
     """Call `solve` for times that are half a step late, and label the results with `times` (s).
 
-    The results still conserve energy and momentum.
+    This is a planted fault. The results still conserve energy and momentum, so that only a
+    comparison with the true solution detects it.
     """
     half = 0.5 * scene.step_size if times[-1] >= 0.0 else -0.5 * scene.step_size
     found = solve(scene, [t + half for t in times], *rest)
@@ -224,7 +229,8 @@ def _shifted(
 def _wrong_card() -> AbstractContextManager[Any]:
     """Return a context manager that exchanges the flags of two defects in the compiled programs.
 
-    The programs then correct other cards than those that the listing names.
+    If only one of the two defects is to be corrected, the programs then correct the card of the
+    other.
     """
     known = [entry["flag"] for entry in flagged() if entry["kind"] != "reading"]
     flags = Listing.flags.fget  # type: ignore[attr-defined]
@@ -239,7 +245,10 @@ def _wrong_card() -> AbstractContextManager[Any]:
 
 
 def _digit_altered(known: Problem) -> Problem:
-    """Return a published problem with the last but one digit of its first number changed."""
+    """Return a published problem with the last but one digit of its first number changed.
+
+    This is a planted fault, which the checks against published results must detect.
+    """
     value = known.values[0]
     figure = next(each for each in value.omega if each is not None)
     wrong = replace(figure, value=figure.value + Decimal(20.0 * figure.accuracy))

@@ -27,9 +27,10 @@ class Caught:
     plant : Plant or None
         The planted fault; None for the control.
     failed : mapping of str to int
-        Number of failed checks by kind.
+        Number of failed checks by kind of check.
     example : str
-        The id of one failed check; of the golden record only if no other check failed.
+        The id of one failed check. It is a comparison with stored results (the golden record) only
+        if no other check failed.
     """
 
     plant: Plant | None
@@ -38,24 +39,25 @@ class Caught:
 
     @property
     def passed(self) -> bool:
-        """Return whether a check besides the golden record detected the fault.
+        """Return whether a check besides the golden record detected the planted fault.
 
-        For the control, return whether no check failed.
+        The golden record has stored results of programs and methods. For the control, which has no
+        fault, return whether no check failed.
         """
         return bool(self.failed.keys() - {_NOT_ENOUGH}) if self.plant else not self.failed
 
     @property
     def counts(self) -> str:
-        """Return the number of failed checks of each kind, as text for the report."""
+        """Return a text for the report with the number of failed checks of each kind."""
         return ", ".join(f"{kind} {count}" for kind, count in self.failed.items())
 
 
 def self_test(seed: str, record: Path) -> Iterator[Caught]:
     """Yield the failed checks, first without any fault, and then with each planted fault.
 
-    Without a fault, a few checks of every kind are made. With a fault, only the kinds that can
-    detect it are made. `seed` determines the random scenes, and `record` is the folder of the
-    golden record.
+    Without a fault, a few checks of every kind are made. With a fault, only the kinds of checks
+    that can detect it are made. `seed` determines the random scenes. `record` is the folder of the
+    golden record, which has stored results.
     """
     chosen = Selection(seed=seed, draws=_DRAWS, record=record, thin=True)
     yield _caught(None, chosen)
@@ -78,7 +80,8 @@ def _caught(plant: Plant | None, chosen: Selection) -> Caught:
 def as_check(caught: Caught) -> Check:
     """Return the result for a planted fault as a check, which passes if the fault was detected.
 
-    Its value is the number of failed checks besides the golden record.
+    Its value is the number of failed checks, without comparisons with stored results (the golden
+    record).
     """
     name = Name("self-test", caught.plant.name if caught.plant else "none")
     value = float(caught.failed.total() - caught.failed[_NOT_ENOUGH])
@@ -88,9 +91,10 @@ def as_check(caught: Caught) -> Check:
 
 
 def self_test_report(title: Sequence[str], found: Sequence[Caught], seed: str) -> Report:
-    """Return the report of each planted fault, with the number of checks that detected it, by kind.
+    """Return the report of each planted fault: how many checks of which kinds detected it.
 
-    `title` has the lines above the report, and `seed` determined the random scenes.
+    `title` has the lines above the report. `found` has the failed checks for each fault, and `seed`
+    determined the random scenes.
     """
     told = []
     for caught in found:

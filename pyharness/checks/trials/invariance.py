@@ -51,11 +51,12 @@ SCENES = {
 
 @dataclass(frozen=True)
 class Symmetry:
-    """A transformation of a problem, with its inverse for the result.
+    """A transformation of a problem (a rotation or rescaling), with its inverse for the result.
 
-    `turn` transforms the scene. A motion that took a time t then takes the time t/`faster`. `back`
-    transforms the resulting omega back. `bitwise` names the methods and programs whose operations
-    are transformed in the same way, so that their results must be bit-for-bit identical.
+    The function `turn` transforms the scene. A motion that took a time t then takes the time
+    t/`faster`. The function `back` transforms the resulting omega back. `bitwise` names the methods
+    and programs whose operations are transformed in the same way, so that their results must be
+    bit-for-bit identical.
     """
 
     turn: Callable[[Scene], Scene]
@@ -148,9 +149,10 @@ def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
 def _turned(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Check:
     """Check that the result of the transformed problem, transformed back, is the original result.
 
-    For a method in `symmetry.bitwise` the bits must agree. Otherwise, each of the two results may
-    have the error that the method is allowed. For any other method with a fixed step, the
-    difference is reported without a limit.
+    `symmetry` is the transformation, and `name` names the scene and the method. For a method in
+    `symmetry.bitwise` the bits must agree. Otherwise, each of the two results may have the error
+    that the method is allowed. For any other method with a fixed step, the difference is reported
+    without a limit.
     """
     scene, method = scene_of(name), name.subject
     try:

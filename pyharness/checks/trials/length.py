@@ -67,7 +67,7 @@ class LongRun:
         until each time.
     noise : callable
         ``noise(orbit, scene, step)`` returns bounds on the errors that a step of the size `step`
-        (s) may add.
+        (s) may add. `orbit` is the `Orbit` of the scene, which has factors for these errors.
     revolutions, others : float
         Number of revolutions in the longest run: from the first initial condition, and from each of
         the other initial conditions.
@@ -107,7 +107,8 @@ def _gauss(stages: int) -> Runner:
 def _rate(scene: Scene) -> float:
     """Return an estimate of the fastest rate of the linearised equations of a scene (1/s).
 
-    It is the largest of |A|, |B|, |C| times the largest component of the initial omega.
+    It is the largest magnitude of the coefficients A, B, C of Euler's equations, times the largest
+    component of the initial omega.
     """
     return speed(scene, max(map(abs, scene.omega)))
 
@@ -152,9 +153,11 @@ def _attempts() -> Iterator[Attempt]:
 def hold(long_run: LongRun, name: Name) -> Iterator[Check]:
     """Yield the checks of the growth of a method's errors, against Brouwer's law.
 
-    After each number of revolutions, the errors of energy, momentum and phase are compared with
-    their bounds. These errors grow like a power of the number of steps. The fitted power is
-    compared with the expected power.
+    By this law, rounding errors of energy and momentum grow like the power 1/2 of the number of
+    steps. Rounding errors of the phase grow like the power 3/2. If the errors of a step are biased,
+    the powers are 1 and 2. The power that is fitted to the errors is compared with the expected
+    power. The errors after each number of revolutions are also compared with their bounds.
+    `long_run` is the method, and `name` names the motion.
     """
     motion = name.circumstance
     for what, found, steps, limits in measured(long_run, MOTIONS[motion], orbit_of(motion)):
@@ -173,9 +176,9 @@ def hold(long_run: LongRun, name: Name) -> Iterator[Check]:
 class Drift:
     """The errors of one quantity of a motion by one method, as a function of the number of steps.
 
-    The quantity `what` is energy, momentum or phase. The arrays have an element for each number of
-    revolutions. `steps` is the number of steps. `error` is the root mean square of the errors over
-    the initial conditions, and `limits` is the bound on the errors. `starts` is the number of
+    The quantity `what` is energy, momentum or phase. The arrays have an element for each length of
+    the integration. `steps` is the number of steps. `error` is the root mean square of the errors
+    over the initial conditions, and `limits` is the bound on the errors. `starts` is the number of
     initial conditions.
     """
 
@@ -189,7 +192,11 @@ class Drift:
 
 
 def curves() -> Iterator[Drift]:
-    """Yield the errors of every quantity by every method on every motion of the trial."""
+    """Yield the errors of energy, momentum and phase by every method on every motion of the trial.
+
+    The trial of length integrates torque-free motions for up to a million revolutions. Each `Drift`
+    has the errors of one quantity as a function of the number of steps.
+    """
     for motion, scene in MOTIONS.items():
         for method, long_run in LONG_RUNS.items():
             for what, found, steps, limits in measured(long_run, scene, orbit_of(motion)):
@@ -201,12 +208,13 @@ def curves() -> Iterator[Drift]:
 def measured(
     long_run: LongRun, scene: Scene, body: Orbit
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
-    """Yield a quantity, its errors, the steps to each horizon, and the bounds at each horizon.
+    """Yield the name, errors, numbers of steps and error bounds of energy, momentum and phase.
 
-    `long_run` is the method, and `body` is the orbit of the scene. The quantities are energy,
-    momentum and phase. A horizon is a number of revolutions. The errors have a row for each initial
-    condition of `starts` and a column for each horizon. They are NaN for a horizon after the end of
-    the run.
+    `long_run` is the method, and `body` has the factors of the scene for the errors. The method
+    runs from several initial conditions to several horizons, which are numbers of revolutions. The
+    errors have a row for each initial condition of `starts` and a column for each horizon. They are
+    NaN for a horizon after the end of the run. The numbers of steps and the bounds have an element
+    for each horizon.
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * long_run.revolutions]
@@ -230,7 +238,8 @@ def measured(
 def orbit_of(motion: str) -> Orbit:
     """Return the `Orbit` of a motion of `MOTIONS`, from which the error bounds follow.
 
-    It has the factors from errors of omega to errors of energy, momentum and phase.
+    An `Orbit` has the factors from errors of omega to errors of energy, momentum and phase.
+    `motion` is the name of the motion.
     """
     return brouwer.orbit(MOTIONS[motion])
 
@@ -239,7 +248,7 @@ def starts(scene: Scene, body: Orbit) -> list[Scene]:
     """Return copies of the scene with different initial omegas along one and the same motion.
 
     The errors are averaged over these scenes, since they depend on the initial phase of the motion.
-    `body` is the orbit of the motion.
+    `body` is the `Orbit` of the motion, which has its frequency.
     """
     times = [0.37 * k / body.frequency for k in range(STARTS)]
     rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times]).tolist()
@@ -247,9 +256,10 @@ def starts(scene: Scene, body: Orbit) -> list[Scene]:
 
 
 def _prepared(name: Name) -> Check:
-    """Check that a prepared solver gives the same bits as the run that the trial judges.
+    """Check that a prepared solver gives the same bits as the run whose errors the trial checks.
 
-    Both use the same method and the same steps, for 1e4 revolutions.
+    Both use the same method and the same steps, for 1e4 revolutions. `name` names the method and
+    the motion.
     """
     method, scene = name.subject, MOTIONS[name.circumstance]
     time = 1e4 * 2.0 * math.pi / orbit_of(name.circumstance).largest
@@ -278,7 +288,10 @@ def _scipy(name: Name) -> Iterator[Check]:
 
 
 def _program(listing: Listing, name: Name) -> Iterator[Check]:
-    """Report, without a limit, the errors of a program of the thesis after 10 and 1e4 turns."""
+    """Report the errors of a program of the thesis after 10 and 1e4 revolutions, without a limit.
+
+    `listing` is the program with its active defects, and `name` names the scene.
+    """
     scene = scene_of(name)
     found = unstopped(listing).rows(scene)
     for count in (1_000, 1_000_000):

@@ -62,10 +62,10 @@ def _condition_note(found: Solved) -> str:
 
 
 def _threshold(name: Name) -> Check:
-    """Compare the step up to which LEQT1F declares the matrix singular with the derived step.
+    """Compare the step size up to which LEQT1F finds the matrix singular with the derived one.
 
-    LEQT1F reports a singular matrix by IER = 129. The derived step follows from the exact last
-    pivot.
+    The linear solver LEQT1F reports by IER = 129 that the collocation matrix of a program is
+    singular. The derived step size follows from the exact last pivot. `name` names the program.
     """
     program = name.subject
     wanted = singular_below(program)
@@ -80,8 +80,9 @@ def _threshold(name: Name) -> Check:
 def _counted(listing: Listing, name: Name) -> Check:
     """Check the number of steps of a run in which the program prints IER = 129 (singular matrix).
 
-    In the original programs the defect `dt-accumulates` moves the collocation points in later
-    steps, so that the matrix ceases to be singular.
+    `listing` is the program with its active defects, and `name` names the scene. In the original
+    programs the defect `dt-accumulates` moves the collocation points in later steps, so that the
+    matrix ceases to be singular.
     """
     scene = scene_of(name)
     ier = compiled.run(scene, listing, velocity=False).ier

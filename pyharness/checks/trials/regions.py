@@ -48,7 +48,8 @@ _DIRECTIONS = {"real": -1.0 + 0.0j, "imaginary": 1.0j}
 def _attempts() -> Iterator[Attempt]:
     """Yield deferred checks that compare the steps of every program with its amplification matrix.
 
-    The Runge-Kutta program is also tried with only one of its defects, for each of two defects.
+    Every program is tried in its original and its corrected version. The Runge-Kutta program is
+    also tried with a single defect, `stage-base` or `base-not-restored`.
     """
     halves = [subset("runge-kutta", keep=[name]) for name in ("stage-base", "base-not-restored")]
     for listing in (*LISTINGS, *halves):
@@ -116,10 +117,11 @@ def _polynomial(listing: Listing, name: Name) -> Check:
 
 
 def _spin(listing: Listing, name: Name) -> Check:
-    """Report, without a limit, by how much a wobble about axis 3 grows per step in a case.
+    """Report, without a limit, by how much a wobble about axis 3 grows in a step of a program.
 
-    The growth is the spectral radius of the amplification matrix less 1. The case of Table 1 is the
-    scene in `name`, and its spin about axis 3 is the steady rotation.
+    The growth is the spectral radius of the program's amplification matrix less 1. `listing` is the
+    program with its active defects. `name` has the scene, a case of Table 1, whose spin about axis
+    3 is the steady rotation.
     """
     scene = scene_of(name)
     z = eigenvalues(replace(scene, omega=(0.0, 0.0, scene.omega[2])))

@@ -31,8 +31,8 @@ def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) ->
     """Yield deferred checks that scaling a motion by a power of two changes no digit of its result.
 
     The motion is computed by `method`, one of our own. `powers` has the exponents of the powers of
-    two by which omega is multiplied and the time divided. `kind` is the first part of the
-    circumstance's name.
+    two by which omega is multiplied and the time divided. `kind` begins the last part of the
+    checks' ids, as in ``same-2^100``.
     """
     time = scene.step_size * scene.steps
     plain = cache(lambda: _tried(method, scene, time))
@@ -53,7 +53,10 @@ def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) ->
 
 
 def _beyond(name: Name) -> Check:
-    """Check that a method reports a failure if omega leaves the range of binary64."""
+    """Check that a method reports a failure if omega leaves the range of binary64.
+
+    `name` names the method and the scene.
+    """
     run = _tried(name.subject, scene_of(name), 1e300)
     silent = run.has_result
     note = "a silent wrong number" if silent else run.ended
@@ -73,10 +76,11 @@ def _flow() -> Conditioning:
 
 
 def _truth(scene: Scene, time: float) -> Truth:
-    """Return the true omega of a scaled motion at `time` (s), with a known conditioning.
+    """Return the true omega of a scaled motion at `time` (s), with its error amplification.
 
-    A scaled motion has the same error amplification as the unscaled motion. The conditioning is
-    therefore computed only once, for the unscaled motion.
+    The scaled motion differs from the unscaled motion by a factor on omega, and by its inverse on
+    the time. It has the same error amplification, which is therefore computed only once, for the
+    unscaled motion.
     """
     size = max(map(abs, scene.omega)) / max(map(abs, ORDINARY.omega))
     return truth_of(scene, time, replace(_flow(), largest=_flow().largest * size))

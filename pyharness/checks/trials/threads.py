@@ -50,7 +50,8 @@ SCENES = (
 class Job:
     """A call of a method or program that must always give bit-for-bit identical results.
 
-    `subject` is the name of the method or program, and `call` returns the bits of the results.
+    `subject` is the name of the method or program, and the function `call` returns the bits of its
+    results.
     """
 
     subject: str
@@ -61,8 +62,9 @@ class Job:
 def _run(only: Sequence[str]) -> Iterator[Check]:
     """Yield, for each method, the check that its calls give the same bits in many threads as alone.
 
-    Each call is made alone first, and then `_REPEATS` times by `THREADS` threads in mixed order.
-    The value of a check is the number of calls in threads whose bits differ, and the limit is 0.
+    `only` has the leading parts of the ids of the requested checks. Each call is made alone first,
+    and then `_REPEATS` times by `THREADS` threads in mixed order. The value of a check is the
+    number of calls in threads whose bits differ, and the limit is 0.
     """
     asked = [job for job in jobs() if may_hold(f"threads/{job.subject}", only)]
     differing = different(asked)
@@ -75,10 +77,10 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
 
 
 def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEATS) -> list[Job]:
-    """Return the jobs that give other bits when called from many threads than when called alone.
+    """Return the calls `jobs` that give other bits in many threads than when they are made alone.
 
-    Each job is called `repeats` times from a pool of `threads` threads. It is returned once for
-    each call with other bits.
+    Each call of a method or program (`Job`) is made `repeats` times from a pool of `threads`
+    threads. It is returned once for each time that its results have other bits.
     """
     alone = [bits(job) for job in jobs]
     order = [index for index in range(len(jobs)) for _ in range(repeats)]
@@ -94,9 +96,9 @@ def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEA
 
 
 def bits(job: Job) -> bytes:
-    """Make the call of a job and return the bits of its results.
+    """Make the call of a job (a method or program with a scene) and return its results' bits.
 
-    If the call is refused by an InputError, return the message of the refusal.
+    If the call raises InputError, return the bytes of the error message.
     """
     try:
         return job.call()
@@ -105,9 +107,10 @@ def bits(job: Job) -> bytes:
 
 
 def jobs() -> list[Job]:
-    """Return the calls of every method, prepared solver, compiled program and twin in all scenes.
+    """Return calls of every method, prepared solver and program of the thesis in all scenes.
 
-    Calls that are refused, and calls of the linear solver LEQT1F, are among them.
+    The programs run in Fortran and in Python. Calls that raise InputError, and calls of the linear
+    solver LEQT1F, are among the calls.
     """
     found = []
     for scene in SCENES:
@@ -143,7 +146,7 @@ def _prepared(scene: Scene, name: str) -> bytes:
 
 @cache
 def _shared(scene: Scene, name: str) -> Solver:
-    """Return the prepared solver named `name` for a scene, which all threads share."""
+    """Return the prepared solver for a scene and the method `name`, which all threads share."""
     return prepare(scene, name, 1e-7)
 
 

@@ -44,10 +44,10 @@ _START = (0.3, 1.0, 2.0)
 
 @dataclass(frozen=True, eq=False)
 class Circumstance:
-    """A scene that is tried until `time` (s), with the methods that can solve it.
+    """A scene that is solved until `time` (s), with the methods that are checked in it.
 
-    `truth` computes the true solution. If `programs` is set, the programs of the thesis are also
-    run over the scene's steps.
+    The function `truth` computes the true solution. If `programs` is set, the programs of the
+    thesis are also run over the scene's steps.
     """
 
     scene: Scene
@@ -60,10 +60,10 @@ class Circumstance:
 def axial(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a symmetric body whose torque acts along its axis.
 
-    The phase of a wave of the torque, frequency times t, has a rounding error that is random from
-    one evaluation to the next. `conditioning` adds up n such errors in full, where n is the number
-    of evaluations, at least one per period. Here only 4 sqrt(n) of the errors are counted
-    (Hoeffding 1963).
+    The torque has waves (sines and cosines), whose phase, frequency times t, has a random rounding
+    error in every evaluation. The function `conditioning` adds up n such errors in full, where n is
+    the number of evaluations, at least one per period. Here only 4 sqrt(n) of the errors are
+    counted (Hoeffding 1963).
     """
     flow = conditioning(scene, time)
     waves = scene.torque.sines + scene.torque.cosines
@@ -75,10 +75,10 @@ def axial(scene: Scene, time: float) -> Truth:
 
 
 def averaged(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) of a scene whose torque has very fast waves.
+    """Return the true omega at `time` (s) of a scene whose torque has very fast sine waves.
 
     The waves are left out of the solution, because they change omega little. A bound on this change
-    is added to the error of the solution.
+    is added to the error bound of the solution.
     """
     moments = np.array(scene.moments)
     waves = scene.torque.sines + scene.torque.cosines
@@ -88,10 +88,10 @@ def averaged(scene: Scene, time: float) -> Truth:
 
 
 def summed(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) of a sphere, with a conditioning of few rounding errors.
+    """Return the true omega at `time` (s) of a sphere, with a bound of few rounding errors.
 
-    The closed form computes the phase of a wave in double-double, so that the phase has no rounding
-    error. Only the rounding errors of the terms of one sum remain.
+    The closed form computes the phase of a sine wave of the torque in double-double, so that the
+    phase has no rounding error. Only the rounding errors of the terms of one sum remain.
     """
     known = reference(scene, [time])
     largest = float(np.abs([known.omega[-1], scene.omega]).max())
@@ -101,9 +101,10 @@ def summed(scene: Scene, time: float) -> Truth:
 
 
 def _wave(frequency: float) -> Circumstance:
-    """Return a scene with torques about all axes that change omega by about 1 rad/s per period.
+    """Return a test scene with fast torque waves about all axes, to be solved for 500 rad of phase.
 
-    `frequency` is the angular frequency of the torques (rad/s).
+    The waves change omega by about 1 rad/s per period. `frequency` is their angular frequency
+    (rad/s).
     """
     size = 10.0 * frequency
     law = TorqueLaw(
@@ -123,7 +124,7 @@ def _spun(frequency: float, time: float, programs: bool) -> Circumstance:
 
 
 def _huge(size: float, start: Triple = _START) -> Circumstance:
-    """Return a scene with a constant torque that turns the body by some fifty radians in all.
+    """Return a test scene with a constant torque that turns the body by some fifty radians in all.
 
     `size` is the largest component of the torque (N m), and `start` is the initial omega (rad/s).
     """
@@ -139,9 +140,10 @@ def _tiny(size: float) -> Circumstance:
 
 
 def _resonant(moments: Triple) -> Circumstance:
-    """Return a scene whose transverse torque rotates at the precession rate of Case 2, 5 rad/s.
+    """Return a test scene whose transverse torque rotates at the precession rate of a top, 5 rad/s.
 
-    `moments` are the moments of inertia of the body.
+    The top is the body of Case 2 of Table 1. `moments` are the moments of inertia of the scene's
+    body.
     """
     law = TorqueLaw(sines=(((0.0, -40.0, 0.0), 5.0),), cosines=(((40.0, 0.0, 0.0), 5.0),))
     scene = Scene("resonance", (0.0, 1.0, 10.0), moments=moments, torque=law, steps=2000)
@@ -195,7 +197,8 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
 def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check]:
     """Yield the check of the error of one method at the last time of the true solution.
 
-    The limit is the sum of tolerance and rounding, both amplified by the flow.
+    `name` names the method and the scene. The limit is the sum of tolerance and rounding errors,
+    both times the error amplification.
     """
     assert tolerance is not None
     method = name.subject
@@ -209,7 +212,8 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
 def _describe_axial(name: Name) -> Iterator[Attempt]:
     """Yield deferred checks that report, without a limit, the errors of runs with too large steps.
 
-    In one step of the scene, the phase of the torque's wave changes by a hundred radians or more.
+    `name` names the scene, whose torque has a wave (sine or cosine). In one step the phase of the
+    wave changes by a hundred radians or more.
     """
     scene = scene_of(name)
     truth = cache(lambda: brouwer.floats(axial_top(scene, scene.times())))

@@ -50,7 +50,10 @@ EXAMPLE = "bench --case 5 --peers none"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure run times and errors, print the results, and return exit status 0."""
+    """Measure run times and errors of our and of third-party solvers, and print the results.
+
+    Return exit status 0.
+    """
     if options.ensemble:
         return _ensemble(options)
     if options.bodies is not None:
@@ -99,7 +102,7 @@ def _present(
 ) -> tuple[list[_Named], list[_Named]]:
     """Return the solvers to measure, and the third-party solvers that are not installed.
 
-    `methods` are our solvers, and `others` the third-party solvers. `named` tells whether the user
+    `methods` are our solvers, and `others` the third-party solvers. `named` is true if the user
     listed the third-party solvers in --peers. Raise InputError if no solver can be measured, or if
     a third-party solver that the user listed is not installed.
     """
@@ -148,10 +151,10 @@ def chosen(
     """Return the solvers for single scenes that the option `where` selects from `contenders`.
 
     `text` is the value of the option, which lists solvers by name or by package, and `what` the
-    noun for a solver in a message. Raise InputError if a listed solver can't compute the attitude
-    although `attitude` requests it, or can't compute omega alone although `attitude` is false. If
-    `text` is None, return all of `contenders` with `attitude`; without it, return those that can
-    compute omega alone.
+    noun for a solver in a message. If `text` is None, all solvers are listed, but those that
+    compute omega only together with the attitude are omitted unless `attitude` is true. Raise
+    InputError if a listed solver can't compute the attitude although `attitude` is true, or can't
+    compute omega alone although `attitude` is false.
     """
     if text is None:
         return [each for each in contenders if attitude or each.velocity]
@@ -167,7 +170,7 @@ def chosen(
 
 
 def _again(options: argparse.Namespace) -> str:
-    """Return the command that repeats this measurement and prints its report as Markdown."""
+    """Return the `pyharness bench` command that repeats this measurement and prints Markdown."""
     command = "pyharness bench" + (" --ensemble" if options.ensemble else "")
     for name in ("case", "horizon", "random", "bodies", "seed", "methods", "peers"):
         value = getattr(options, name)
@@ -226,9 +229,9 @@ def _ensemble(options: argparse.Namespace) -> int:
 def named(contenders: Sequence[_Named], text: str | None, what: str, where: str) -> list[_Named]:
     """Return the solvers among `contenders` that the option `where` lists, by name or package.
 
-    `text` is the value of the option, and `what` the noun for a solver in a message. If `text` is
-    None, return all of `contenders`; if it is "none", return an empty list. Raise InputError for an
-    unknown name.
+    `text` is the value of the option, and `what` the noun for a solver in an error message. If
+    `text` is None, return all of `contenders`; if it is "none", return an empty list. Raise
+    InputError for an unknown name.
     """
     names: list[str] = shared.names(text)
     if names == ["none"]:

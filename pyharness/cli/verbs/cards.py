@@ -33,11 +33,11 @@ EXAMPLE = "cards runge-kutta:860"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the requested cards, or one of the comparisons that an option requests.
+    """Print the requested cards, or the result of the option that requests something else.
 
     With --scan, our text of the cards is compared with a scan; with --collate, the three decks are
     compared with each other. Return exit status 1 if one of these comparisons finds a difference
-    that the apparatus does not explain, otherwise 0.
+    that the apparatus, our list of recorded deviations, does not explain. Otherwise return 0.
     """
     if options.format == "tei":
         from pyharness.history.tei import tei_document

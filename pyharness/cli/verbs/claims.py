@@ -27,7 +27,11 @@ EXAMPLE = "claims --explain abstract-superior"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Judge the claims of the thesis, print the verdicts, and return exit status 0."""
+    """Judge whether our programs reproduce the claims of the thesis, and print the verdicts.
+
+    With --assignments, --evidence or --atlas, print for which assumptions the claims hold instead.
+    Return exit status 0.
+    """
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain", "evidence", "word"))
         shared.check_known("format", options.format, ("table", "json"))

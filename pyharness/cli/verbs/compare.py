@@ -32,10 +32,11 @@ EXAMPLE = "compare --case 3 --listing original --plot case-3.png"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compare the programs on a scene, and print the comparison.
+    """Compare original and corrected programs with the reference solution of a scene.
 
-    Return exit status 1 if a result is unexpected. With --strict, also return it if the scene is
-    sensitive, that is, if amplified rounding errors exceed the tolerance. Otherwise return 0.
+    Print the comparison. Return exit status 1 if a result is unexpected. With --strict, also return
+    it if the scene is sensitive, that is, if amplified rounding errors exceed the tolerance.
+    Otherwise return 0. With --ablate, run every subset of the programs' defects instead.
     """
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)

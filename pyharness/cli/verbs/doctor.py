@@ -13,7 +13,10 @@ EXAMPLE = "doctor"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the report on the build; return exit status 3 if the extension is not built, else 0."""
+    """Print how this installation was built, and which packages it lacks.
+
+    Return exit status 3 if the extension, which is the compiled Fortran code, is not built, else 0.
+    """
     shared.check_outputs(options)
     found = build()
     shared.show(doctor_report(found), options)

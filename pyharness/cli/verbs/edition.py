@@ -17,7 +17,7 @@ EXAMPLE = "edition --out pages"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Make all pages of the web site, write them to a folder, and print a list of the files.
+    """Make all pages of the project's web site, write them to a folder, and print a list of files.
 
     Return exit status 0.
     """

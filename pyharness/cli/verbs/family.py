@@ -31,9 +31,10 @@ EXAMPLE = "family --case 5 --weighting galerkin --terms 3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure the methods' orders of convergence on a scene, and print them beside the theory.
+    """Measure the orders of convergence of weighted residual methods on a scene, and print them.
 
-    Return exit status 1 if a measured order is below the theoretically derived order, otherwise 0.
+    The orders are printed beside the theory. Return exit status 1 if a measured order is below the
+    theoretically derived order, otherwise 0.
     """
     if options.lost:
         return _lost(options)

@@ -21,8 +21,9 @@ EXAMPLE = "limits --case 5 --program runge-kutta"
 def run(options: argparse.Namespace) -> int:
     """Compare the original programs with their limits and with the true solution.
 
-    A limit is the solution to which a program tends as its step size goes to zero. Print the
-    distances from both for each step size, and return exit status 0.
+    A limit is the function to which the result of a program tends as the step size goes to zero.
+    For each step size, print the distance of the program from its limit and its distance from the
+    true solution. Return exit status 0.
     """
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)

@@ -50,7 +50,7 @@ EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute one trajectory by a program or a method, and print it.
+    """Compute one trajectory by a program of the thesis or a method, and print it.
 
     Return exit status 1 if --strict is given and amplified rounding errors exceed the tolerance.
     Otherwise return 0.
@@ -93,8 +93,8 @@ def run(options: argparse.Namespace) -> int:
 def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) -> None:
     """Raise InputError if the result can't be written in `form`, which is "printer" or "tape5".
 
-    Only a program has a printer page and a TAPE5. TAPE5 is binary, and is not written to a
-    terminal.
+    Only a program of the thesis has these formats: the page of the line printer, and the output
+    file TAPE5. TAPE5 is binary, and is not written to a terminal.
     """
     if options.program is None:
         raise InputError(

@@ -23,7 +23,7 @@ EXAMPLE = "stress --only separatrix --plot separatrix.png"
 def run(options: argparse.Namespace) -> int:
     """Run the requested trials, which are groups of checks, and print their results.
 
-    Return exit status 1 if the error of a check exceeds its bound, otherwise 0.
+    Return exit status 1 if a check fails, as when an error exceeds its bound, otherwise 0.
     """
     only = shared.chosen_names(options.only, "trial", tuple(TRIALS))
     if options.plot is not None and len(_chosen(only)) != 1:

@@ -41,9 +41,9 @@ EXAMPLE = "sweep docs/tumbling.toml --out store"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute the chunks that the store of the sweep lacks, and print a report of its contents.
+    """Compute the missing chunks of a sweep, and print a report of the folder with its results.
 
-    Return exit status 0.
+    A sweep solves a grid of scenes, and a chunk is a block of the grid. Return exit status 0.
     """
     if options.file is None:
         raise InputError("sweep: give a sweep file, as in 'sweep FILE.toml --out STORE'")

@@ -49,7 +49,11 @@ EXAMPLE = "verify --only cells,methods"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the checks and print the results; return exit status 1 if a check fails."""
+    """Run the checks of programs and methods, and print the results.
+
+    The options --listing-output, --port, --self-test and --update request other computations
+    instead. Return exit status 1 if a check fails, otherwise 0.
+    """
     if options.listing_output is not None:
         return _listing_output(options)
     if options.port is not None:
@@ -177,9 +181,11 @@ def _title(chosen: Selection) -> list[str]:
 
 
 def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
-    """Return a line that reports decks or published numbers that could not be checked, if any.
+    """Return a list with a line about decks or published numbers that could not be checked.
 
-    A check that can't be made is omitted or counts as passed, so that only this line reports it.
+    A deck is a program of the thesis in fixed-form FORTRAN. A check that can't be made is omitted
+    or counts as passed, so that only this line reports it. `chosen` is the selection of checks. The
+    list is empty if the checks could be made.
     """
     if chosen.may_ask("decks") and compiler() is None:
         return ["decks: not run, as there is no gfortran on the PATH"]

@@ -33,8 +33,9 @@ EXAMPLE = "words --case 2 --program runge-kutta"
 def run(options: argparse.Namespace) -> int:
     """Run the programs in several floating-point formats, and print their errors.
 
-    With --vectors, instead check our emulation of the CDC's arithmetic by test vectors. Return exit
-    status 1 if one of our results differs from the result in its test vector, otherwise 0.
+    With --vectors, instead check our emulation of the CDC computer's arithmetic by test vectors.
+    Return exit status 1 if one of our results differs from the result in its test vector, otherwise
+    0.
     """
     if options.vectors is not None:
         shared.refuse(options, "--vectors", ("case", "program", "all", "plot"))

@@ -41,9 +41,11 @@ Codes = NDArray[np.int8]
 class Atlas:
     """The verdict codes of each claim over a grid of readings, numbers of steps and starts.
 
-    A start is an initial omega. `codes` has an array for each claim. Its axes are reading, number
-    of steps, magnitude of omega(0) (rad/s), height (omega3 divided by the magnitude) and longitude
-    (rad). The other fields have the values along these axes, in the same order.
+    A start is an initial omega; a reading is an interpretation of doubtful cards. `codes` has for
+    each claim of the thesis an array of codes: 0 (fails), 1 (reproduced) or 3 (in part). Its axes
+    are reading, number of steps, magnitude of omega(0) (rad/s), height (omega3 divided by the
+    magnitude) and longitude (rad). The other fields have the values along these axes, in the same
+    order.
     """
 
     codes: Mapping[str, Codes]
@@ -55,33 +57,43 @@ class Atlas:
 
     @property
     def n_starts(self) -> int:
-        """Return the number of starts (initial omegas) for each choice of reading and steps."""
+        """Return the number of starts (initial omegas) of the atlas.
+
+        The number is the same for each choice of reading (of doubtful cards) and number of steps.
+        """
         return len(self.magnitudes) * len(self.heights) * len(self.longitudes)
 
     def choices(self) -> list[tuple[str, int]]:
-        """Return all pairs of a reading and a number of steps, in the order of the arrays."""
+        """Return all pairs of a reading (of doubtful cards) and a number of steps of the atlas.
+
+        The pairs are in the order of the arrays of verdict codes.
+        """
         return list(product(self.readings, self.steps))
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
         """Return for each start (initial omega) the sum of the points of all claims.
 
         A claim has 1 point if it is reproduced, and 1/2 if in part. `reading` and `steps` are
-        indices into `readings` and `self.steps`. The shape of the result is (magnitudes, heights,
-        longitudes).
+        indices into `self.readings` and `self.steps`. The shape of the result is (number of
+        magnitudes, of heights, of longitudes), the coordinates of a start.
         """
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
         """Return for each start whether every claim is reproduced, at least in part.
 
-        A start is an initial omega. `reading` and `steps` are indices into `readings` and
-        `self.steps`. The shape of the result is (magnitudes, heights, longitudes).
+        A start is an initial omega. `reading` and `steps` are indices into `self.readings` and
+        `self.steps`. The shape of the result is (number of magnitudes, of heights, of longitudes),
+        the coordinates of a start.
         """
         held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
         return np.asarray(np.all(held, axis=0))
 
     def start(self, at: Sequence[int] | NDArray[Any]) -> Triple:
-        """Return omega(0) (rad/s) at the three indices `at` of magnitude, height and longitude."""
+        """Return omega(0) (rad/s) at the three indices `at` of magnitude, height and longitude.
+
+        The height is omega3 divided by the magnitude.
+        """
         size, height = self.magnitudes[at[0]], self.heights[at[1]]
         across, longitude = np.sqrt(1.0 - height * height), self.longitudes[at[2]]
         found = size * np.array([across * np.cos(longitude), across * np.sin(longitude), height])
@@ -89,11 +101,12 @@ class Atlas:
 
 
 def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
-    """Return the atlas that a sweep over starts, readings and numbers of steps has computed.
+    """Return the atlas, the verdicts on claims from many starts, that a sweep has computed.
 
-    `codes` are the verdict codes by claim, negative where the sweep is incomplete. `axes` are the
-    dimensions of these arrays with their values, in order. Raise InputError if they are not the
-    axes of an atlas, or if the sweep is incomplete.
+    A start is an initial omega. `codes` has the array of verdict codes of each claim, negative
+    where the sweep is incomplete. `axes` maps the dimensions of these arrays to their values, in
+    order: reading of the cards, number of steps, and three coordinates of the start. Raise
+    InputError if the axes are others, or if the sweep is incomplete.
     """
     if tuple(axes) != (*CHOSEN, *WHERE) or not codes:
         allowed = ", ".join((*CHOSEN, *WHERE))
@@ -113,10 +126,11 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
-    """Return the sum of the points of several claims' verdicts.
+    """Return the sum of the points of several claims' verdicts, for each initial omega.
 
     `codes` has one array of verdict codes for each claim, all of the same shape, which is also the
-    shape of the result. A claim has 1 point if it is reproduced, and 1/2 if in part.
+    shape of the result. A claim has 1 point if it is reproduced, and 1/2 if it is reproduced in
+    part.
     """
     values = np.zeros(len(_CODES) + 1)
     for code, points in _POINTS.items():
@@ -127,14 +141,15 @@ def sum_of_points(codes: Sequence[Codes]) -> Array:
 def shares(codes: Codes) -> tuple[float, float, float]:
     """Return the fractions of starts from which a claim is reproduced, in part, and not at all.
 
-    A start is an initial omega. `codes` are the verdict codes of the claim, one for each start.
+    A start is an initial omega of the programs' runs. `codes` are the verdict codes of the claim of
+    the thesis, one for each start.
     """
     whole, part, not_at_all = (float((codes == each).mean()) for each in (HOLDS, IN_PART, FAILS))
     return whole, part, not_at_all
 
 
 def bits(codes: Codes) -> float:
-    """Return the entropy of a claim's verdict over the starts, in bits.
+    """Return the entropy of the verdict on a claim of the thesis over the starts, in bits.
 
     A start is an initial omega. `codes` are the verdict codes of the claim, one for each start. The
     entropy is 0 if the verdict is the same from every start, and 1 if each of two verdicts is given
@@ -146,10 +161,10 @@ def bits(codes: Codes) -> float:
 
 
 def about(names: Sequence[str]) -> dict[int, list[str]]:
-    """Return, by case, those of the claims `names` that are about this case alone.
+    """Return, by number of the case, those of the claims `names` that are about this case alone.
 
-    `names` are identifiers of claims, and so are the results. A claim about several cases is left
-    out.
+    `names` are identifiers of claims of the thesis, and so are the results. A claim about several
+    cases is left out.
     """
     found: dict[int, list[str]] = {}
     for name in names:
@@ -160,10 +175,11 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return the verdict codes of the claims `names` from a few starts, by start and claim.
+    """Return the verdict codes of the claims `names` from a few initial omegas.
 
-    The starts are the initial omegas that the thesis shows, and one of our own
-    (`laboratory.starts`). The verdicts are for the original programs.
+    The initial omegas (starts) are those that the thesis shows, and one of our own
+    (`laboratory.starts`). The result maps each start to a code for each claim: 0 (fails), 1
+    (reproduced) or 3 (in part). The verdicts are for the original programs.
     """
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))

@@ -30,10 +30,11 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 
 
 def atlas_report(atlas: Atlas) -> Report:
-    """Return the report of `claims --atlas`: how the verdicts depend on the initial omega.
+    """Return the report of the command `pyharness claims --atlas`.
 
-    The tables are for the first reading and the first number of steps of the atlas, except the
-    tables that compare readings and numbers of steps.
+    The report shows how the verdicts on the claims of the thesis depend on the initial omega. The
+    tables are for the first interpretation of the doubtful cards and the first number of steps.
+    Some tables compare interpretations and numbers of steps.
     """
     claims = _claims(atlas)
     score = atlas.score()
@@ -160,8 +161,8 @@ def _by_choice(atlas: Atlas) -> Table:
 def _turned(atlas: Atlas) -> Table:
     """Return a table, by claim, of the fraction of starts whose verdict another choice changes.
 
-    A start is an initial omega. The other choice is a reading or a number of steps other than the
-    first; only one of the two is changed at a time.
+    A start is an initial omega. The other choice is a reading (interpretation of doubtful cards) or
+    a number of steps other than the first. Only one of the two is changed at a time.
     """
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]
@@ -177,8 +178,9 @@ def _turned(atlas: Atlas) -> Table:
 def atlas_picture(atlas: Atlas) -> Picture:
     """Draw maps of the sum of the claims' points over the sphere of directions of omega(0).
 
-    A claim has 1 point if it is reproduced, and 1/2 if in part. Each map is for one magnitude of
-    omega(0). Beside the maps, a diagram shows the mean points of each claim at every magnitude.
+    A claim of the thesis has 1 point if it is reproduced, and 1/2 if in part. Each map is for one
+    magnitude of omega(0). Beside the maps, a diagram shows the mean points of each claim at every
+    magnitude.
     """
     from matplotlib.figure import Figure
 
@@ -272,7 +274,10 @@ def _draw_claims(figure: "Figure", atlas: Atlas, names: Sequence[str], means: An
 
 
 def _edges(values: Array) -> Array:
-    """Return the edges of a picture's cells, whose centres on a logarithmic axis are `values`."""
+    """Return the edges of a picture's cells, whose centres on a logarithmic axis are `values`.
+
+    An inner edge is the geometric mean of two neighbouring centres.
+    """
     if len(values) < 2:
         return np.array([values[0] / 2.0, values[0] * 2.0])
     middles = np.sqrt(values[1:] * values[:-1])

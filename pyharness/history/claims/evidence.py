@@ -28,8 +28,8 @@ KINDS = ("result", "design")
 class Combination:
     """One combination of the choices that the thesis leaves open, with the verdicts under it.
 
-    `verdicts` has the verdicts for the original programs on all testable claims about programs, by
-    the claim's identifier.
+    `verdicts` maps the identifier of each testable claim of the thesis about the programs to the
+    verdict on it, for the original programs.
     """
 
     assumptions: Assumptions
@@ -37,18 +37,22 @@ class Combination:
 
     @property
     def score(self) -> float:
-        """Return the sum of the claims' points: 1 if reproduced, 1/2 if in part, 0 otherwise."""
+        """Return the sum of the points of all claims under this combination of choices.
+
+        A claim has 1 point if it is reproduced, 1/2 if it is reproduced in part, and otherwise 0.
+        """
         return sum(POINTS.get(each, 0.0) for each in self.verdicts.values())
 
     @property
     def holding(self) -> int:
-        """Return how many claims are reproduced, at least in part, under this combination."""
+        """Return how many claims of the thesis are reproduced, at least in part."""
         return sum(each in POINTS for each in self.verdicts.values())
 
     def choices(self) -> dict[str, str]:
         """Return, by name of the choice, the value that this combination takes, as text.
 
-        The choices are omega(0), each reading, each conjecture, and the number of steps.
+        The choices are omega(0), each reading (interpretation of doubtful cards), each conjecture
+        (assumption where no card exists), and the number of steps.
         """
         given = self.assumptions
         start = given.start or ()
@@ -64,9 +68,11 @@ class Combination:
 
 
 def evidence() -> Iterator[Combination]:
-    """Compute and yield every combination of the open choices with its verdicts, one by one.
+    """Yield every combination of the open choices, with its verdicts on the thesis's claims.
 
-    The open choices are omega(0), the readings, the conjectures and the number of steps.
+    The open choices are omega(0), the readings (interpretations of doubtful cards), the conjectures
+    (assumptions where no card exists) and the number of steps. Each combination is computed when it
+    is yielded.
     """
     for assumptions in combinations():
         verdicts = {}
@@ -80,7 +86,10 @@ def evidence() -> Iterator[Combination]:
 
 
 def evidence_rule() -> str:
-    """Return the text that describes, in the report, how a combination of choices is scored."""
+    """Return the text that explains how a combination of choices is scored, for the report.
+
+    The choices are those that the thesis leaves open, for example omega(0).
+    """
     return (
         "Every combination of starts (one for all cases in which none is given, or those adopted), "
         "readings, conjectures and steps, scored by the claims about results and design of the "
@@ -90,9 +99,11 @@ def evidence_rule() -> str:
 
 
 def combinations() -> list[Assumptions]:
-    """Return every combination of starts, readings, conjectures and numbers of steps.
+    """Return every combination of the choices that the thesis leaves open.
 
-    A start is an initial omega; None takes the adopted value of each case.
+    The choices are the start (omega(0)), the readings (interpretations of doubtful cards), the
+    conjectures (assumptions where no card exists) and the number of steps. The start None takes the
+    adopted omega(0) of each case.
     """
     return [
         Assumptions(start, frozenset(readings), steps, frozenset(conjectures))
@@ -105,7 +116,7 @@ def combinations() -> list[Assumptions]:
 def discriminating(found: list[Combination]) -> list[str]:
     """Return the identifiers of the claims whose verdict differs between combinations.
 
-    `found` has the combinations of the open choices.
+    `found` has combinations of the choices that the thesis leaves open, each with its verdicts.
     """
     every = dict.fromkeys(name for each in found for name in each.verdicts)
     return [
@@ -116,7 +127,9 @@ def discriminating(found: list[Combination]) -> list[str]:
 def undecided(found: list[Combination]) -> dict[str, list[str]]:
     """Return the values of each choice that occur among the combinations with the highest score.
 
-    The choices are omega(0), each reading, each conjecture, and the number of steps.
+    `found` has combinations of the choices that the thesis leaves open. The choices are omega(0),
+    each reading (interpretation of doubtful cards), each conjecture (assumption where no card
+    exists), and the number of steps. The score is the sum of the claims' points.
     """
     best = max(each.score for each in found)
     choices = [each.choices() for each in found if each.score == best]
@@ -126,8 +139,8 @@ def undecided(found: list[Combination]) -> dict[str, list[str]]:
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
     """Return the chosen assumptions on which a claim depends, with adopted values for all others.
 
-    `entry` is the claim, as in `data/claims.toml`. The adopted values avoid that equal tests are
-    run more than once.
+    `entry` is the claim, as in `data/claims.toml`. With the adopted values, combinations that
+    differ only in other assumptions lead to the same test, which runs once.
     """
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)

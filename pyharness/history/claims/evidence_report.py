@@ -34,11 +34,12 @@ _SHORT = {
 
 
 def evidence_report(found: Sequence[Combination]) -> Report:
-    """Return the report of the evidence on the choices that the thesis leaves open.
+    """Return the report on how well the claims agree with each combination of open choices.
 
-    It shows three results: the combinations of choices with the highest and lowest scores, the
-    claims whose verdict differs between combinations, and the choices that remain open with the
-    highest score.
+    The open choices are values that the thesis does not state, such as omega(0). A combination's
+    score is the sum of the claims' points. The report shows the combinations with the highest and
+    lowest scores, and the claims whose verdict differs between combinations. It also shows the
+    values of each choice that occur with the highest score.
     """
     ordered = sorted(found, key=lambda each: -each.score)
     axes = list(ordered[0].choices())

@@ -25,10 +25,11 @@ class Assumptions:
     """One value for each choice that the thesis leaves open.
 
     `start` is omega(0) (rad/s) of the cases in which the thesis gives none; None takes the values
-    in `cases.toml`. `readings` are the names of interpretations of doubtful cards that the edition
+    in `cases.toml`. `readings` are the names of interpretations of doubtful cards that this edition
     does not adopt, but that are used here. `steps` is the number of steps of every run.
     `conjectures` are the names of assumptions about statements for which no card exists; None takes
-    those of the original listing. `word` is the name of the arithmetic of the programs.
+    those of the original listing. `word` is the name of the floating-point arithmetic of the
+    programs.
     """
 
     start: Triple | None = None
@@ -42,7 +43,8 @@ class Assumptions:
 class Laboratory:
     """The three programs, original or corrected, which run the cases under given assumptions.
 
-    The original programs have all their defects except those named in `fixed`.
+    A laboratory serves to test claims of the thesis. The original programs have all their defects
+    except those named in `fixed`.
     """
 
     is_original: bool
@@ -50,10 +52,11 @@ class Laboratory:
     fixed: frozenset[str] = frozenset()
 
     def listing(self, program: str) -> Listing:
-        """Return the listing of a program, original or corrected.
+        """Return the listing of a program: the program with a choice of its defects.
 
-        The original listing has the assumed readings and conjectures. The corrected listing depends
-        on no assumption.
+        The original listing has the assumed readings (interpretations of doubtful cards) and
+        conjectures (assumptions where no card exists). The corrected listing depends on no
+        assumption.
         """
         if not self.is_original:
             return Listing.corrected(program)
@@ -65,13 +68,14 @@ class Laboratory:
     def scene(self, case: int, parts: int = 1) -> Scene:
         """Return the scene of a case under the assumptions, its step size divided by `parts`.
 
-        The end time of the scene does not depend on `parts`.
+        A scene is a body with its initial omega, torque, step size and number of steps. The number
+        of steps is multiplied by `parts`, so that the end time does not depend on `parts`.
         """
         scene = _scene(case, self.assumptions.start, self.assumptions.steps)
         return replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
 
     def run(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Trajectory:
-        """Run a program on a case, with its step size divided by `parts`.
+        """Run a program on a case of the thesis, with the case's step size divided by `parts`.
 
         Without `may_stop` the stop test of the Runge-Kutta program is skipped.
         """
@@ -80,20 +84,26 @@ class Laboratory:
     def run_on(
         self, scene: Scene, listing: Listing, may_stop: bool = True, lipschitz: float = 500.0
     ) -> Trajectory:
-        """Run a listing on any scene, in the assumed arithmetic.
+        """Run a listing (a program with a choice of its defects) on a scene.
 
-        `lipschitz` is the constant of the stop test (1/s); without `may_stop` the test is skipped.
+        The floating-point arithmetic is the assumed one. `lipschitz` is the limit (1/s) of the stop
+        test of the Runge-Kutta program; without `may_stop` the test is skipped.
         """
         return _run(listing, scene, may_stop, lipschitz, self.assumptions.word)
 
     def truth(self, case: int) -> Reference:
-        """Return the reference solution of a case, under the assumptions, at the case's steps."""
+        """Return the reference solution of a case at the end of each of its steps.
+
+        The assumptions of the laboratory determine the number of steps and, if the thesis gives
+        none, the initial omega.
+        """
         return _truth(self.scene(case))
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program as the method `run` does, and return the arrays that `rules` needs.
+        """Run a program as the method `run` does, and return the arrays that tests of claims need.
 
-        Omega has the rows at the steps of the case only, and is NaN after the end of the run.
+        Omega has the rows at the steps of the case only, even if `parts` divides the step size.
+        Omega is NaN after the end of the run.
         """
         run = self.run(program, case, may_stop, parts)
         reached = run.omega[parts - 1 :: parts]
@@ -103,23 +113,27 @@ class Laboratory:
         return Runs(omega, np.asarray(len(reached)), complete, overflow)
 
     def solution(self, case: int) -> Array:
-        """Return the reference omega (rad/s) of a case at its steps, shape (steps, 3)."""
+        """Return the reference omega (rad/s) of a case at its steps, shape (steps, 3).
+
+        The row of a step is omega at the end of the step.
+        """
         return self.truth(case).omega
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> float:
-        """Return the largest error of any omega component (rad/s) at the steps of the case.
+        """Return the largest error of any omega component (rad/s) when a program runs a case.
 
-        The error is against the reference solution, and infinite after an overflow. The arguments
-        are as in `run`.
+        The errors are against the reference solution, at the steps of the case that the program
+        ran. The result is infinite after an overflow. `parts` divides the step size. Without
+        `may_stop` the stop test of the Runge-Kutta program is skipped.
         """
         return float(largest_error(self, program, case, may_stop, parts))
 
     def models(self, case: int, terms: int) -> Array:
         """Return omega (rad/s) of the collocation model with n = `terms` terms, shape (steps, 3).
 
-        Its collocation points are at k/(n+1) of the interval length DT, k = 1 ... n. In the
+        The model's collocation points are at k/(n+1) of the interval length DT, k = 1 ... n. In the
         corrected programs DT is the step size. In the original programs DT grows by the step size
-        in every step, so that the points move out of the step; the torque must then be constant.
+        in every step, so that the points move out of the step. The torque must then be constant.
         """
         accumulates = self.is_original and "dt-accumulates" not in self.fixed
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
@@ -127,8 +141,9 @@ class Laboratory:
     def required_constant(self, case: int) -> float:
         """Return the least Lipschitz constant (1/s) with which every step passes the stop test.
 
-        The stop test is that of the Runge-Kutta program, run on the case `case`. The result is
-        infinite if no constant is large enough.
+        The stop test of the Runge-Kutta program ends a run if a Lipschitz quotient exceeds the
+        constant. The program runs the case `case`. The result is infinite if no constant is large
+        enough.
         """
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
@@ -145,7 +160,7 @@ class Laboratory:
 def starts() -> list[Triple]:
     """Return the initial omegas (rad/s) that the thesis shows anywhere, and one of our own.
 
-    They are used in the cases for which the thesis gives no initial omega.
+    They are tried in the cases for which the thesis gives no initial omega.
     """
     return [
         (float(a), float(b), float(c)) for a, b, c in (s["omega"] for s in facts("claims")["start"])
@@ -155,7 +170,7 @@ def starts() -> list[Triple]:
 def distance(first: Array, second: Array) -> float:
     """Return the largest difference of any omega component over the common rows (rad/s).
 
-    The arrays have the shape (rows, 3); rows that only the longer one has do not count.
+    The arrays have the shape (rows, 3). If one of them is longer, its additional rows do not count.
     """
     n = min(len(first), len(second))
     with np.errstate(all="ignore"):
@@ -163,7 +178,10 @@ def distance(first: Array, second: Array) -> float:
 
 
 def ranges(truth: Reference) -> Array:
-    """Return the range of each omega component of a reference solution (rad/s), shape (3,)."""
+    """Return the range of each omega component of a reference solution (rad/s), shape (3,).
+
+    A range is the largest minus the smallest value.
+    """
     return spread_of(truth.omega)
 
 
@@ -229,10 +247,10 @@ def by_literals(
     """Run an original collocation deck with some of its step literals divided by `parts`.
 
     A step literal is a place on the cards where the step size is a literal number. `changed` has
-    the names, from `LITERALS`, of those that are divided. `terms` is 2 for the two-term deck and 4
-    for the four-term deck. All scenes run at once and must have constant torque. Return omega
+    the names, from `LITERALS`, of the literals that are divided. `terms` is 2 for the two-term deck
+    and 4 for the four-term deck. All scenes run at once and must have constant torque. Return omega
     (rad/s) of every scene at the steps of the unchanged deck, shape (scenes, steps, 3); NaN from an
-    overflow on. It agrees with the decks but for rounding error.
+    overflow on. The result equals that of the decks but for rounding error.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
@@ -248,13 +266,13 @@ def integrate_models(
     omega: Array, coefficients: Array, torque: Array, terms: int,
     dt: float, end: float, growth: float, steps: int,
 ) -> Array:  # fmt: skip
-    """Integrate collocation models of constant torque from n initial omegas at once.
+    """Integrate the collocation model of bodies with constant torque from n initial omegas at once.
 
     `omega`, shape (n, 3), has the initial omegas (rad/s). `coefficients` has A, B and C of Euler's
     equations in its last axis, and `torque` is the constant torque divided by the moments (rad/s2).
     `terms` is the number of terms of the trial functions. The collocation points divide the
     interval (0, dt) evenly, where dt (s) grows by `growth` (s) with every step. Each of the `steps`
-    steps is `end` (s) long. Return omega (rad/s), shape (n, steps, 3), which agrees with the
+    steps is `end` (s) long. Return omega (rad/s), shape (n, steps, 3), which equals that of the
     programs but for rounding error; NaN from an overflow on.
     """
     a, b, c = coefficients.T

@@ -19,11 +19,11 @@ _ROOMS = (verdicts, methods, theory)
 
 @dataclass(frozen=True)
 class Survival:
-    """The verdicts on one claim, original and corrected, with one assumption changed.
+    """The verdicts on one claim of the thesis, with one assumption changed.
 
-    `assumption` describes the change. `original` and `corrected` are the verdicts for the original
-    and for the corrected programs. `survives` is true if both are the same as with the adopted
-    assumptions.
+    `assumption` describes the change, for example another initial omega. `original` and `corrected`
+    are the verdicts for the original and for the corrected programs. `survives` is true if both
+    verdicts are the same as with the adopted assumptions.
     """
 
     assumption: str
@@ -34,9 +34,10 @@ class Survival:
 
 @dataclass(frozen=True)
 class Judgement:
-    """A claim of `data/claims.toml` with its verdicts for the original and corrected programs.
+    """A claim of the thesis with its verdicts for the original and corrected programs.
 
-    `survivals` has the verdicts with each assumption changed, one at a time.
+    `claim` is an entry of `data/claims.toml`. `survivals` has the verdicts with each assumption
+    changed, one at a time.
     """
 
     claim: dict[str, Any]
@@ -49,9 +50,9 @@ class Judgement:
 class Assignment:
     """An initial omega for a case in which the thesis gives none, and the verdicts on its claims.
 
-    `start` is the initial omega (rad/s). `verdicts` has, by claim, the verdict for the original
-    programs. `holds` is true if all claims about the case are reproduced, at least in part. Claims
-    that fail with every start do not count.
+    `start` is the initial omega (rad/s). `verdicts` maps each claim about the case to the verdict
+    for the original programs. `holds` is true if all claims about the case are reproduced, at least
+    in part. Claims that fail with every start do not count.
     """
 
     case: int
@@ -61,13 +62,16 @@ class Assignment:
 
 
 def claims() -> list[dict[str, Any]]:
-    """Return all claims, the entries of `data/claims.toml`."""
+    """Return all claims of the thesis on which we give a verdict, as in `data/claims.toml`."""
     entries: list[dict[str, Any]] = facts("claims")["claim"]
     return entries
 
 
 def claim(identity: str) -> dict[str, Any]:
-    """Return the claim with an identifier; raise InputError if no claim has this identifier."""
+    """Return the claim of the thesis with the identifier `identity`, as in `data/claims.toml`.
+
+    Raise InputError if no claim has this identifier.
+    """
     by_name = {each["id"]: each for each in claims()}
     if identity not in by_name:
         raise unknown("claim", identity, list(by_name))
@@ -77,8 +81,9 @@ def claim(identity: str) -> dict[str, Any]:
 def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
     """Test one claim under the adopted assumptions, and again with each assumption changed.
 
-    Return all verdicts, for the original and the corrected programs. `entry` is the claim, as in
-    `data/claims.toml`, and `word` the name of the arithmetic in which the programs run.
+    The result has the verdicts for the original and the corrected programs. `entry` is the claim,
+    as in `data/claims.toml`. `word` is the name of the floating-point arithmetic in which the
+    programs run.
     """
 
     def verdicts(assumptions: Assumptions) -> tuple[Judged, Judged]:
@@ -97,18 +102,19 @@ def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
 
 @cache
 def judgement(identity: str, word: str = BINARY64) -> Judgement:
-    """Return the verdicts of `judge` on the claim with the identifier `identity`.
+    """Return the verdicts on the claim with the identifier `identity`, as `judge` gives them.
 
-    The result is cached. `word` is the name of the arithmetic in which the programs run.
+    The verdicts are for the original and the corrected programs, under several assumptions. The
+    result is cached. `word` is the name of the floating-point arithmetic in which the programs run.
     """
     return judge(claim(identity), word)
 
 
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
-    """Return the verdict on one claim, with the programs that the laboratory runs.
+    """Return the verdict on one claim, for the programs that the laboratory runs.
 
-    `entry` is the claim, as in `data/claims.toml`; it names the test function that gives the
-    verdict.
+    `laboratory` runs the original or the corrected programs under given assumptions. `entry` is the
+    claim, as in `data/claims.toml`; it names the test function that gives the verdict.
     """
     (test,) = (vars(room)[entry["test"]] for room in _ROOMS if entry["test"] in vars(room))
     judged: Judged = test(laboratory, **entry.get("parameters", {}))
@@ -138,9 +144,10 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 def assignments() -> list[Assignment]:
     """Return one assignment for each start and each case in which the thesis gives no omega(0).
 
-    The starts are the initial omegas from the function `starts`. The claims about a case do not
-    depend on the start of another case. All claims therefore hold at once if every case has a start
-    with which its own claims hold. Claims that fail with every start do not count.
+    An assignment has the verdicts on the claims about the case. The starts are the initial omegas
+    from the function `starts`. The claims about a case do not depend on the start of another case.
+    All claims therefore hold at once if every case has a start with which its own claims hold.
+    Claims that fail with every start do not count.
     """
     found = []
     for case in facts("claims")["assumed"]["cases"]:

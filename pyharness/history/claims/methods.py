@@ -46,10 +46,10 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
     """Judge the claim that collocation is superior to Runge-Kutta.
 
     `lab` runs the programs; only the steps that all three programs ran are compared. A case counts
-    if both collocation errors are below the Runge-Kutta error. The verdict is "reproduced" if all
-    `cases` count, "reproduced in part" if some do, otherwise "false". The error ratios of the cases
-    in `shown` are reported too, but do not affect the verdict. An error is the largest error of any
-    omega component against the reference solution.
+    if the errors of both collocation programs are below the error of the Runge-Kutta program. The
+    verdict is "reproduced" if all `cases` count, "reproduced in part" if some do, otherwise
+    "false". The error ratios of the cases in `shown` are reported too, but do not affect the
+    verdict. An error is the largest error of any omega component against the reference solution.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):
@@ -69,9 +69,9 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
 
     The stop test of the Runge-Kutta program, which `lab` runs, forms a quotient: the change of the
     slopes over the change of omega. By eq. 19 the quotient is at most the norm of the Jacobian. In
-    each case the largest quotient is divided by the largest norm along the solution and the run.
-    The verdict is "reproduced" if no ratio exceeds 1.05, "reproduced in part" if none exceeds 2,
-    otherwise "false".
+    each of the `cases` the largest quotient is divided by the largest norm along the reference
+    solution and the run. The verdict is "reproduced" if no ratio exceeds 1.05, "reproduced in part"
+    if none exceeds 2, otherwise "false".
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -96,10 +96,10 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
 def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
     """Judge the claim that collocation models of more than four terms improve little on four.
 
-    `lab` computes the models, and `terms` are their numbers of terms above four. The error of the
-    model of four terms is divided by the error of each model of more terms. The verdict is
-    "reproduced" if no ratio exceeds 2, and "reproduced in part" if none exceeds 10. An error is the
-    largest error of any omega component against the reference solution.
+    `lab` computes the models in each of the `cases`, and `terms` are their numbers of terms above
+    four. The error of the model of four terms is divided by the error of each model of more terms.
+    The verdict is "reproduced" if no ratio exceeds 2, and "reproduced in part" if none exceeds 10.
+    An error is the largest error of any omega component against the reference solution.
     """
     numbers = {}
     for case in cases:
@@ -114,11 +114,11 @@ def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
 
 
 def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Judge the claim that some case needs a Lipschitz constant above that of the deck.
+    """Judge the claim that some case needs a Lipschitz constant above the one on the cards.
 
-    The numbers are, for each of the `cases` in `lab`, the smallest constant (1/s) with which every
-    step of the Runge-Kutta program passes the stop test. The verdict is "reproduced" if one of them
-    exceeds the constant on the program's cards.
+    The stop test of the Runge-Kutta program ends a run if a quotient exceeds this constant. `lab`
+    computes, for each of the `cases`, the smallest constant (1/s) with which every step passes the
+    test. The verdict is "reproduced" if one of them exceeds the constant on the program's cards.
     """
     numbers = {f"case {n}: constant needed (1/s)": lab.required_constant(n) for n in cases}
     return graded(numbers, max(numbers.values()) > facts("cases")["deck"]["lipschitz"])
@@ -131,7 +131,7 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
     unbounded if omega overflows, or exceeds `bounded` times the largest omega of the reference
     solution. The verdict is "reproduced" if the test ends all unbounded runs and no bounded run. It
     is "reproduced in part" if the test ends some unbounded run, otherwise "false". It is "not
-    testable" if no run is unbounded, and no bounded run is ended.
+    testable" if no run is unbounded, and the test ends no bounded run.
     """
     alarms = unbounded = caught = 0
     for case in cases:
@@ -161,10 +161,10 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge the claim that collocation improves with a tenth of the step, by `rules.small_step`.
 
-    `lab` runs the programs. The exception is the two-term program in the case `exception`. The step
-    size is on the original cards as several literals. For the original programs, the numbers also
-    show the effect of changing only some of these literals. They count the cases of constant torque
-    in which the error falls to half.
+    `lab` runs both collocation programs in all `cases`. The claim excepts the two-term program in
+    the case `exception`. The step size is on the original cards as several literals. For the
+    original programs, the numbers also show the effect of changing only some of these literals.
+    They count the cases of constant torque in which the error falls to half.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
@@ -178,7 +178,7 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
 
     The cards have the step size as several literals, `LITERALS`. Return, by description, the counts
     for each original collocation program and each subset of the literals. The error is the largest
-    one of any omega component; a run that no longer overflows also counts.
+    error of any omega component. A case in which the run no longer overflows also counts.
     """
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
@@ -196,9 +196,10 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
 
 
 def small_step_runge_kutta(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Judge the claim that Runge-Kutta does not improve with a tenth of the step.
+    """Judge the claim that the Runge-Kutta program does not improve with a tenth of the step.
 
-    The rule is `rules.small_step_runge_kutta`. `lab` runs the program without the stop test.
+    The verdict is that of the rule `rules.small_step_runge_kutta`, which compares the errors with
+    both step sizes in all `cases`. `lab` runs the program without the stop test.
     """
     return judged(rules.small_step_runge_kutta(lab, cases))
 
@@ -208,9 +209,9 @@ def suffices(
 ) -> Judged:
     """Judge the claim that a three- or four-term model suffices for most problems.
 
-    A case counts if two errors are at most the fraction `share` of the largest omega: the error of
-    the four-term program in `lab`, and the error of the collocation model with `terms[0]` terms.
-    The model is left out for the original programs if the torque varies. The verdict is
+    A case counts if two errors are at most the fraction `share` of the largest omega. They are the
+    error of the four-term program in `lab`, and the error of the collocation model with `terms[0]`
+    terms. The model is left out for the original programs if the torque varies. The verdict is
     "reproduced" if at least `enough` cases count, and "reproduced in part" if at least three do. An
     error is the largest error of any omega component against the reference solution.
     """
@@ -230,11 +231,12 @@ def suffices(
 def execution_time(lab: Laboratory, low: float, high: float) -> Judged:
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
-    The time is measured by the floating-point operations of one step, on the cards of the programs
-    in `lab` and in our own LEQT1F. One count takes the operations as written, and the other takes
-    each common term once. The operations of a collocation program are divided by those of
-    Runge-Kutta, which gives four ratios for two programs and two counts. The verdict is
-    "reproduced" if all ratios are from `low` to `high`, and "reproduced in part" if some are.
+    The time is measured by the floating-point operations of one step. They are counted on the cards
+    of the programs in `lab` and in our version of the linear solver LEQT1F. One count takes the
+    operations as written, and the other takes each common term once. The operations of a
+    collocation program are divided by those of Runge-Kutta, which gives four ratios for two
+    programs and two counts. The verdict is "reproduced" if all ratios are from `low` to `high`, and
+    "reproduced in part" if some are.
     """
     counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
     numbers, inside = {}, []
@@ -252,8 +254,8 @@ def execution_time(lab: Laboratory, low: float, high: float) -> Judged:
 def seconds(lab: Laboratory) -> Judged:
     """Count the floating-point operations of 100 steps of each program in `lab`.
 
-    The claim is about seconds, and run times today say nothing about the original machine. The
-    verdict is therefore always "not testable".
+    The claim of the thesis is about run times in seconds, and run times today say nothing about the
+    original machine. The verdict on the claim is therefore always "not testable".
     """
     counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
     numbers = {
@@ -266,11 +268,11 @@ def seconds(lab: Laboratory) -> Judged:
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Judge the claim that the programs are about equally long, by the number of their cards.
 
-    The number of cards of each collocation deck is divided by that of the Runge-Kutta deck, without
-    and with our own version of LEQT1F. The decks are those of the programs in `lab`. `factors` are
-    two thresholds. The verdict is "reproduced" if every ratio is at most the lower threshold. It is
-    "not reproduced" if every ratio exceeds the lower threshold, and the largest ratio exceeds the
-    higher one. Otherwise it is "undecided".
+    The number of cards of each collocation deck is divided by that of the Runge-Kutta deck. This is
+    done twice: without and with the cards of our version of the linear solver LEQT1F. The decks are
+    those of the programs in `lab`. `factors` are two thresholds. The verdict is "reproduced" if
+    every ratio is at most the lower threshold. It is "not reproduced" if every ratio exceeds the
+    lower threshold, and the largest ratio exceeds the higher one. Otherwise it is "undecided".
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -291,11 +293,12 @@ def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
 def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
     """Judge the claim that the weightings other than collocation failed, in `cases`.
 
-    The solution is known in these cases. `terms` are the numbers of terms that are tried. The
-    verdict is "reproduced" if some error exceeds the largest omega, and "reproduced in part" if
-    some error exceeds ten times the error of collocation. An error is the largest error of any
-    omega component against the reference solution. For the original programs, which lack these
-    methods, the verdict is "not testable".
+    The other weightings are subdomain, Galerkin and least squares; the exact solution of these
+    cases is known. `terms` are the numbers of terms that are tried. The verdict is "reproduced" if
+    some error exceeds the largest omega, and "reproduced in part" if some error exceeds ten times
+    the error of collocation. An error is the largest error of any omega component against the
+    reference solution of `lab`. For the original programs, which lack these methods, the verdict is
+    "not testable".
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -320,10 +323,10 @@ def computer_error(
 
     Two sets of differences of omega (rad/s) are computed. The first set has the errors in Case 1,
     which every method solves exactly but for rounding, at ever smaller steps. The second set has
-    the differences between binary64 and the arithmetics named in `words`, for the methods as IV.2
-    describes them, in `cases`. The verdict is "reproduced" if the largest number of both sets
-    reaches `limit` (rad/s), otherwise "false". For the original programs, which lack these methods,
-    the verdict is "not testable".
+    the differences between runs in binary64 and in the arithmetics named in `words`, in `cases`.
+    These runs use the methods as section IV.2 of the thesis describes them. The verdict is
+    "reproduced" if the largest number of both sets reaches `limit` (rad/s), otherwise "false". For
+    the original programs, which lack these methods, the verdict is "not testable".
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -349,10 +352,11 @@ def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]
     """Judge the claim that of the four weightings only collocation succeeds.
 
     The error of each other weighting is divided by the error of collocation with the same number of
-    terms. The largest ratio over all `cases` and all numbers in `terms` counts. The verdict is
-    "reproduced" if this ratio exceeds 10 for every weighting, "reproduced in part" if for some,
-    otherwise "false". An error is the largest error of any omega component against the reference
-    solution. For the original programs, which lack these methods, the verdict is "not testable".
+    terms. For each weighting the largest ratio over all `cases` and all numbers in `terms` counts.
+    The verdict is "reproduced" if this ratio exceeds 10 for every weighting, "reproduced in part"
+    if for some, otherwise "false". An error is the largest error of any omega component against the
+    reference solution of `lab`. For the original programs, which lack the other weightings, the
+    verdict is "not testable".
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -372,11 +376,12 @@ def all_succeed(
 ) -> Judged:
     """Judge the claim that the weighted residual methods integrate the rigid body problem.
 
-    A weighting succeeds if its error is at most the fraction `share` of the largest omega, in all
-    `cases` and with all numbers of terms in `terms`. The verdict is "reproduced" if every weighting
-    succeeds, "reproduced in part" if some weighting does, otherwise "false". An error is the
-    largest error of any omega component against the reference solution. For the original programs,
-    which lack these methods, the verdict is "not testable".
+    A weighting, for example collocation or Galerkin, succeeds if its error is at most the fraction
+    `share` of the largest omega. This must be so in all `cases` and with all numbers of terms in
+    `terms`. The verdict is "reproduced" if every weighting succeeds, "reproduced in part" if some
+    do, otherwise "false". An error is the largest error of any omega component against the
+    reference solution of `lab`. For the original programs, which lack the other weightings, the
+    verdict is "not testable".
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -395,9 +400,10 @@ def all_succeed(
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Compare the corrected programs with collocation by a first estimate and one correction.
 
-    The numbers are the largest differences of their omegas (rad/s) in `cases`, under the
+    The numbers are the largest differences (rad/s) between the omegas of both in `cases`, under the
     assumptions of `lab`. They are also the errors of four-term collocation with zero to three
-    corrections. The claim is a recommendation, so the verdict is always "not testable".
+    corrections. The claim of the thesis is a recommendation, so the verdict is always "not
+    testable".
     """
     best = Laboratory(False, lab.assumptions)
     numbers = {}

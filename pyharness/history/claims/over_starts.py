@@ -35,15 +35,19 @@ _EFFORT = 1e9  # in effect no work limit, because a sweep reports its expected t
 
 
 class Starts:
-    """A bench (see `rules`) with n starts for the cases in which the thesis gives no omega(0).
+    """The runs of the programs from n starts, for the cases in which the thesis gives no omega(0).
 
-    A start is an initial omega. Programs, cases and assumptions are those of the laboratory `one`.
+    A start is an initial omega. The class is a `rules.Bench`, from which the tests of claims obtain
+    runs and reference solutions. Programs, cases and assumptions are those of the laboratory `one`.
     The reference solution is integrated by Taylor series from each step of the case to the next, to
     a relative tolerance of 1e-12.
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
-        """Store the laboratory and the starts `omega0`, shape (n, 3), rad/s; nothing runs yet."""
+        """Store the laboratory `one`, which runs the programs, and the starts `omega0`.
+
+        The starts are initial omegas (rad/s), shape (n, 3). No program runs yet.
+        """
         self._one, self._omega0 = one, omega0
         self._solution = cache(self._integrated)
         self._error = cache(partial(rules.largest_error, self))
@@ -53,40 +57,44 @@ class Starts:
     def scene(self, case: int, parts: int = 1) -> Scene:
         """Return the scene of a case, its step size divided by `parts`.
 
-        If the thesis gives no omega(0) for the case, the omega(0) of the scene is not one of the n
-        starts.
+        A scene is a body with its initial omega, torque, step size and number of steps. If the
+        thesis gives no omega(0) for the case, the omega(0) of the scene is not one of the n starts.
         """
         return self._one.scene(case, parts)
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program on a case from every start, with arguments as in `rules.Bench`.
+        """Run a program on a case from every start (initial omega), its step divided by `parts`.
 
-        A start is an initial omega. The shape of the resulting omega is (n, steps, 3), or (steps,
-        3) if the thesis gives the case's omega(0).
+        Without `may_stop` the stop test of the Runge-Kutta program is skipped. The resulting omega
+        is at the steps of the case. Its shape is (n, steps, 3), or (steps, 3) if the thesis gives
+        the case's omega(0).
         """
         # Only runs with the full step size are cached. Others are requested once, for their error,
         # which is itself cached.
         return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
 
     def solution(self, case: int) -> Array:
-        """Return the reference omega (rad/s) of a case at its steps.
+        """Return the reference omega (rad/s) of a case at its steps, for each start.
 
-        The shape is (n, steps, 3) for n starts, or (steps, 3) if the thesis gives the case's
-        omega(0).
+        A start is an initial omega. The shape is (n, steps, 3) for n starts, or (steps, 3) if the
+        thesis gives the case's omega(0).
         """
         return self._solution(case)
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Any:
-        """Return the largest errors of omega (rad/s) at the steps of the case, for each start.
+        """Return the largest error of any omega component (rad/s) in a case, for each start.
 
-        An error is infinite after an overflow. The arguments are as in `rules.Bench`.
+        A start is an initial omega. Only the steps of the case count; the error is infinite after
+        an overflow. `parts` divides the step size. Without `may_stop` the stop test of the
+        Runge-Kutta program is skipped.
         """
         return self._error(program, case, may_stop, parts)
 
     def models(self, case: int, terms: int) -> Array:
         """Return omega (rad/s) of the collocation models whose trial functions have `terms` terms.
 
-        There is a model for each start, with shapes as in `runs`. It equals the result of
+        There is a model for each start (initial omega). The shape is (n, steps, 3) for n starts, or
+        (steps, 3) if the thesis gives the case's omega(0). Each model equals the result of
         `Laboratory.models` from the same start but for rounding error.
         """
         return self._models(case, terms)
@@ -149,10 +157,11 @@ def __getattr__(name: str) -> Callable[[Batch], NDArray[np.int8]]:
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
     """Return the verdict code of a claim about the programs for each start in a batch of a sweep.
 
-    `identity` is the claim's identifier. The code is FAILS, HOLDS, IN_PART or SILENT, shape (n,).
-    It is SILENT if the sweep's scene is no case of Table 1, or if the sweep varies more than
-    starts, readings and steps. The claim itself determines which cases are run, whatever the case
-    of the sweep.
+    A batch is a set of scenes that are solved in one call; a start is the initial omega of one of
+    them. `identity` is the claim's identifier. The code is FAILS, HOLDS, IN_PART or SILENT, shape
+    (n,). It is SILENT if the sweep's scene is no case of Table 1, or if the sweep varies more than
+    starts, readings (of doubtful cards) and steps. The claim itself determines which cases are run,
+    whatever the case of the sweep.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
@@ -165,10 +174,10 @@ def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
 
 
 def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
-    """Return the verdict codes of a claim from the n starts of a bench, shape (n,).
+    """Return the verdict codes of a claim of the thesis from n starts (initial omegas), shape (n,).
 
-    A start is an initial omega. `entry` is the claim, as in `data/claims.toml`. A code is FAILS,
-    HOLDS or IN_PART.
+    `bench` runs the programs from these starts. `entry` is the claim, as in `data/claims.toml`. A
+    code is FAILS, HOLDS or IN_PART.
     """
     grade = vars(rules)[entry["test"]](bench, **entry["parameters"])
     found = np.where(grade.whole, HOLDS, np.where(grade.part, IN_PART, FAILS))
@@ -185,9 +194,10 @@ def _bench(one: Laboratory, batch: Batch) -> Starts:
 def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
     """Return the laboratory that runs the programs of a sweep under the assumptions, or None.
 
-    None means that the claims do not apply to the sweep, for one of four reasons. Its program is
-    neither the original nor the corrected one. Its scene is no case of Table 1. It varies body or
-    torque. Its stop test is not that of the program's cards.
+    `batch` has the scenes and the program of the sweep. None means that the claims of the thesis do
+    not apply to the sweep, for one of four reasons. Its program is neither the original nor the
+    corrected one. Its scene is no case of Table 1. It varies body or torque. Its stop test is not
+    that of the program's cards.
     """
     if batch.listing is None or batch.arrays.keys() & _OF_CASES:
         return None

@@ -40,9 +40,9 @@ KINDS = {
 
 
 def claims_report(judgements: Sequence[Judgement]) -> Report:
-    """Return the report of all claims with their verdicts, one line for each claim.
+    """Return the report of the claims of the thesis and our verdicts, one line for each claim.
 
-    `judgements` has the claims with their verdicts.
+    `judgements` has the claims, each with its verdicts for the original and corrected programs.
     """
     rows = [
         [
@@ -71,8 +71,9 @@ def claims_report(judgements: Sequence[Judgement]) -> Report:
 def kinds_table(judgements: Sequence[Judgement]) -> Table:
     """Return a table of the number of claims with each verdict, one row for each kind of claim.
 
-    There is a column for each verdict. Its entry has two numbers: for the original programs and,
-    after a slash, for the corrected programs.
+    `judgements` has the claims of the thesis, each with its verdicts. There is a column for each
+    verdict. An element of it has two numbers: for the original programs and, after a slash, for the
+    corrected programs.
     """
     columns = [*words("kind"), Column("claims"), *map(Column, _VERDICTS)]
     rows = []
@@ -89,7 +90,11 @@ def kinds_table(judgements: Sequence[Judgement]) -> Table:
 
 
 def explanation(judgement: Judgement) -> Report:
-    """Return the report of one claim: its quotation, its rule, its verdicts and their numbers."""
+    """Return the report of one claim of the thesis, with the numbers behind its verdicts.
+
+    The report has the quotation, the rule by which the claim is tested, and the verdicts.
+    `judgement` is the claim with its verdicts.
+    """
     entry = judgement.claim
     text: list[Section] = [
         [f'{entry["id"]} ({entry["where"]}): "{entry["quote"]}"'],
@@ -118,7 +123,7 @@ def assignments_report(assignments: Sequence[Assignment]) -> Report:
     """Return the report on the initial omegas with which the claims about each case hold.
 
     An assignment is one initial omega for one case in which the thesis gives none. The verdicts on
-    the claims are for the original programs.
+    the claims of the thesis are for the original programs.
     """
     text: list[Section] = [
         [
@@ -162,7 +167,10 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def _hangs_on(judgement: Judgement) -> list[str]:
-    """Return, each once, the assumptions whose change alters a verdict on the judged claim."""
+    """Return the names of the assumptions whose change alters a verdict on a claim of the thesis.
+
+    `judgement` is the claim with its verdicts. Each name occurs only once.
+    """
     turning = (
         each.assumption.replace("conjecture ", "").replace("reading ", "")
         for each in judgement.survivals
@@ -172,7 +180,7 @@ def _hangs_on(judgement: Judgement) -> list[str]:
 
 
 def written(x: float) -> str:
-    """Return a number that supports a verdict as text.
+    """Return a number that supports a verdict on a claim as text.
 
     A whole number below a million has all its digits, any other number three significant digits.
     """

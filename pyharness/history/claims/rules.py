@@ -22,11 +22,11 @@ Flags = NDArray[np.bool_]
 
 
 class Runs(NamedTuple):
-    """The runs of a program on one case, from one start or many.
+    """The runs of a program on one case, from one start (initial omega) or many.
 
-    A start is an initial omega; ... is the shape of the starts, () or (n,). `omega` (rad/s), shape
-    (..., steps, 3), is NaN where a run has no row. `steps` is the number of rows of each run.
-    `complete` and `overflow` say of each run whether it ended in this way.
+    In shapes, ... is the shape of the starts, () or (n,). `omega` (rad/s), shape (..., steps, 3),
+    is NaN where a run has no row. `steps` is the number of rows of each run. `complete` and
+    `overflow` state for each run whether it was completed, and whether it overflowed.
     """
 
     omega: Array
@@ -36,10 +36,10 @@ class Runs(NamedTuple):
 
 
 class Grade(NamedTuple):
-    """The result of a rule for one claim, from one start (an initial omega) or many.
+    """The result of a test of one claim of the thesis, from one start (initial omega) or many.
 
-    `numbers` has the computed numbers by description. The flags `whole` and `part` say from which
-    starts the claim is reproduced as a whole, and from which in part.
+    `numbers` has the computed numbers by description. The flags `whole` and `part` state for each
+    start whether the claim is reproduced as a whole, and whether it is reproduced in part.
     """
 
     numbers: Mapping[str, Any]
@@ -48,67 +48,72 @@ class Grade(NamedTuple):
 
 
 class Bench(Protocol):
-    """The interface through which a rule obtains the runs and reference solutions of its starts.
+    """The interface through which a test of a claim obtains runs and reference solutions.
 
-    A start is an initial omega. The step size of a run is divided by the factor `parts`; the rows
-    of omega are still at the steps of the case. Without `may_stop` the stop test of the Runge-Kutta
-    program is skipped.
+    The runs are from one start (initial omega) or many. The step size of a run is divided by the
+    factor `parts`; the rows of omega are still at the steps of the case. Without `may_stop` the
+    stop test of the Runge-Kutta program is skipped.
     """
 
     def scene(self, case: int, parts: int = 1) -> Scene:
         """Return the scene of a case, with its step size divided by `parts`.
 
-        The omega(0) of the scene need not be a start of the bench, which is an initial omega of its
-        runs.
+        A scene is a body with its initial omega, torque, step size and number of steps. The runs of
+        the bench may have other initial omegas than this scene.
         """
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program on a case from every start, which is an initial omega.
+        """Run a program on a case of the thesis from every start, which is an initial omega.
 
-        The step size is divided by `parts`; without `may_stop` the stop test is skipped.
+        The step size is divided by `parts`. Without `may_stop` the stop test of the Runge-Kutta
+        program is skipped.
         """
 
     def solution(self, case: int) -> Array:
         """Return the reference omega (rad/s) of a case at its steps, shape (..., steps, 3).
 
-        Here ... is the shape of the starts.
+        Here ... is the shape of the starts (initial omegas): () for one start, or (n,).
         """
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Any:
-        """Return the largest error of omega (rad/s) for each start, as `largest_error` does."""
+        """Return the largest error of any omega component (rad/s) in a case, for each start.
+
+        A start is an initial omega. The errors are those of `largest_error`. `parts` divides the
+        step size. Without `may_stop` the stop test of the Runge-Kutta program is skipped.
+        """
 
     def models(self, case: int, terms: int) -> Array:
         """Return omega (rad/s) of the collocation model whose trial functions have `terms` terms.
 
-        The shape is (..., steps, 3), where ... is the shape of the starts; omega is NaN from an
-        overflow on.
+        The shape is (..., steps, 3), where ... is the shape of the starts (initial omegas): () for
+        one start, or (n,). Omega is NaN from an overflow on.
         """
 
 
 def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
-    """Grade the claim that omega3 varies.
+    """Grade the claim of the thesis that omega3 varies in a case.
 
-    It is reproduced if the range of omega3 over the run exceeds `limit` (rad/s). The range is of
-    the reference solution, which `bench` supplies.
+    The claim is reproduced if the range of omega3 over the run exceeds `limit` (rad/s). The range
+    is of the reference solution, which `bench` supplies.
     """
     moved = spread_of(bench.solution(case))[..., 2]
     return Grade({"range of omega3 (rad/s)": moved}, moved > limit)
 
 
 def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
-    """Grade the claim that all three programs coincide with the known solution.
+    """Grade the claim that all three programs coincide with the known solution of a case.
 
-    It is reproduced if the largest error of omega of every program is below `limit` (rad/s), half a
-    unit of the last printed digit. `bench` supplies the runs and the reference solutions.
+    The claim is reproduced if the largest error of omega of every program is below `limit` (rad/s),
+    half a unit of the last printed digit. `bench` supplies the runs and the reference solutions.
     """
     numbers = {f"{name}: largest error (rad/s)": bench.error(name, case) for name in PROGRAMS}
     return Grade(numbers, _most(numbers) < limit)
 
 
 def concur(bench: Bench, case: int, share: float) -> Grade:
-    """Grade the claim that the two-term and the four-term program agree.
+    """Grade the claim that the two-term and the four-term program agree in a case.
 
-    It is reproduced in part if both runs are complete and their omegas differ by at most the
+    The claim is reproduced in part if both runs are complete and their omegas differ by at most the
     fraction `share` of the largest reference omega. It is reproduced as a whole if they also differ
     in each component by at most a tenth of the component's range. `bench` supplies the runs and the
     reference solutions.
@@ -131,11 +136,11 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 
 
 def fails(bench: Bench, case: int, share: float) -> Grade:
-    """Grade the claim that the Runge-Kutta program fails.
+    """Grade the claim that the Runge-Kutta program fails in a case.
 
-    It is reproduced if the run ended early and the error of an omega component exceeds the fraction
-    `share` of the component's range. It is reproduced in part if only one of the two is true.
-    `bench` supplies the runs and the reference solutions.
+    Two conditions are tested: the run ended early, and the error of an omega component exceeds the
+    fraction `share` of the component's range. The claim is reproduced if both are true, and
+    reproduced in part if only one is true. `bench` supplies the runs and the reference solutions.
     """
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
@@ -145,10 +150,10 @@ def fails(bench: Bench, case: int, share: float) -> Grade:
 
 
 def diverged(bench: Bench, case: int) -> Grade:
-    """Grade the claim that the two-term run diverged.
+    """Grade the claim that the run of the two-term collocation program diverged in a case.
 
-    It is reproduced if the run overflowed, or if its largest error of omega exceeds the largest
-    omega of the reference solution. `bench` supplies the runs and the reference solutions.
+    The claim is reproduced if the run overflowed, or if its largest error of omega exceeds the
+    largest omega of the reference solution. `bench` supplies the runs and the reference solutions.
     """
     runs, error = bench.runs("two-term", case), bench.error("two-term", case)
     numbers = {"steps": runs.steps, "largest error (rad/s)": error}
@@ -156,7 +161,7 @@ def diverged(bench: Bench, case: int) -> Grade:
 
 
 def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -> Grade:
-    """Grade the claim that collocation models with different numbers of terms agree.
+    """Grade the claim that collocation models with different numbers of terms agree in a case.
 
     `terms` has the numbers of terms, of the first model and of the others. The claim is reproduced
     if all other models differ from the first one by at most the fraction `share` of the largest
@@ -177,8 +182,9 @@ def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -
 def dynamic(bench: Bench, case: int, factor: float) -> Grade:
     """Grade the claim that the motion of a case is the liveliest of all seven cases.
 
-    It is reproduced if the largest angular acceleration of the case's four-term run is at least
-    `factor` times the largest angular acceleration in every other case. `bench` supplies the runs.
+    The liveliest motion has the largest angular acceleration. The claim is reproduced if the
+    largest angular acceleration of the case's four-term run is at least `factor` times the largest
+    one in every other case. `bench` supplies the runs.
     """
     rates = {}
     for each in range(1, 8):
@@ -199,7 +205,7 @@ def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
     error of omega falls at least to half, or from an overflow to a finite error. The claim is
     reproduced if at least four fifths of the other pairs of program and case improve, and the
     exception does not. It is reproduced in part if at least half of the other pairs improve.
-    `bench` supplies the runs and the reference solutions.
+    `bench` supplies the runs and the reference solutions of all `cases`.
     """
     numbers, improved, excepted = {}, [], np.asarray(False)
     for program in COLLOCATION:
@@ -221,8 +227,8 @@ def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
     """Grade the claim that the Runge-Kutta program does not improve with a tenth of the step size.
 
     A run improves if its largest error of omega falls at least to half. The claim is reproduced if
-    no case improves, in part if at most a third of the cases do. The runs are without the stop
-    test. `bench` supplies the runs and the reference solutions.
+    none of the `cases` improves, and in part if at most a third of them do. The runs are without
+    the stop test. `bench` supplies the runs and the reference solutions.
     """
     numbers = {}
     for case in cases:
@@ -241,7 +247,8 @@ def largest_error(
     """Return the largest error of any omega component (rad/s), one number for each start.
 
     A start is an initial omega of the runs that `bench` supplies. Only rows at the steps of the
-    case count; the error is infinite after an overflow. `may_stop` and `parts` are as in `Bench`.
+    case count; the error is infinite after an overflow. `parts` divides the step size. Without
+    `may_stop` the stop test of the Runge-Kutta program is skipped.
     """
     runs = bench.runs(program, case, may_stop, parts)
     error = _farthest(runs.omega, bench.solution(case)).max(axis=-1)
@@ -252,7 +259,7 @@ def share_of_range(omega: Array, truth: Array) -> Array:
     """Return the largest error of any varying component, divided by the range of the component.
 
     `omega` is the result of a run, and `truth` the reference omega of its case, both of the shape
-    (..., steps, 3). The result has one number for each start, shape (...).
+    (..., steps, 3). The result has the shape (...), with one number for each start (initial omega).
     """
     spread = spread_of(truth)
     moving = spread > 1e-12 * largest_of(truth)[..., None]
@@ -262,12 +269,18 @@ def share_of_range(omega: Array, truth: Array) -> Array:
 
 
 def spread_of(omega: Array) -> Array:
-    """Return the range of each omega component over the steps (rad/s), shape (..., 3)."""
+    """Return the range of each omega component over the steps (rad/s), shape (..., 3).
+
+    The range is the largest minus the smallest value. `omega` has the shape (..., steps, 3).
+    """
     return np.moveaxis(np.ptp(_by_component(omega), axis=-1), 0, -1)
 
 
 def largest_of(omega: Array) -> Array:
-    """Return the largest magnitude of any omega component over the steps (rad/s), shape (...)."""
+    """Return the largest magnitude of any omega component over the steps (rad/s), shape (...).
+
+    `omega` has the shape (..., steps, 3).
+    """
     return np.asarray(np.abs(omega).max(axis=(-1, -2)))
 
 

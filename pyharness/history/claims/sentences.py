@@ -22,11 +22,11 @@ class Sentence(NamedTuple):
     why : str
         For a sentence without claims, its function in the text of the thesis.
     laboratory : str
-        The run that shows best what the sentence says, as options of the verb `run`:
+        The run that shows best what the sentence says, as options of the command `pyharness run`:
         ``case=2&program=two-term``.
     command : str
-        A command, without ``pyharness``, that shows more about the sentence's claims than
-        `claims --explain` does.
+        A command, without ``pyharness``, that shows more about the sentence's claims than the
+        command `pyharness claims --explain` does.
     """
 
     where: str
@@ -38,7 +38,7 @@ class Sentence(NamedTuple):
 
 
 def sentences() -> tuple[Sentence, ...]:
-    """Return the sentences in the order of the thesis."""
+    """Return the sentences of sections V and VI of the thesis, in order, with their claims."""
     return tuple(
         Sentence(**{**row, "claims": tuple(row.get("claims", ()))})
         for row in facts("sentences")["sentence"]

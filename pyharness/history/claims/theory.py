@@ -31,8 +31,8 @@ def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Jud
     """Judge the claim that the solutions of some cases are not known.
 
     The verdict is "false" if Jacobi's elliptic functions solve all `cases` with an error of at most
-    `limit`. The error is the largest one against the reference solution of `lab`, relative to the
-    largest omega.
+    `limit`, otherwise "reproduced". The error is the largest one of any omega component against the
+    reference solution of `lab`, relative to the largest omega.
     """
     numbers = {}
     for case in cases:
@@ -45,7 +45,7 @@ def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Jud
 
 
 def by_sources(lab: Laboratory, holds: bool) -> Judged:
-    """Return the verdict of the sources on a statement of history, which no run can test.
+    """Return the verdict on a statement of history, which only historical sources can test.
 
     The verdict is "reproduced" if the statement `holds` according to the sources, otherwise
     "false". `lab` is not used.
@@ -58,7 +58,8 @@ def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
     `cases` has one case. The verdict is "false" if six ordinary differential equations, in Euler
     angles and their momenta, solve this case with an error of at most `limit`. The error is the
-    largest one against the reference solution of `lab`, relative to the largest omega.
+    largest one of any omega component against the reference solution of `lab`, relative to the
+    largest omega.
     """
     from scipy.integrate import solve_ivp
 
@@ -106,7 +107,7 @@ def _omega(moments: Triple, state: Array) -> Array:
 
 
 def _hamilton(moments: Triple, state: Array) -> Array:
-    """Return dH/dp and -dH/dq, the rates of `state`.
+    """Return dH/dp and -dH/dq, the time derivatives of `state`, as one array.
 
     `state` has the three 3-1-3 angles q (rad) and their conjugate momenta p. The Hamiltonian is H =
     sum I omega**2 / 2, with the principal `moments` I (kg m2).
@@ -153,9 +154,10 @@ def local_error(
 ) -> Judged:
     """Judge the claim that the error of one step of a method falls with a power of the step size.
 
-    `method` is the name of the method. The power p, with which the error of one step of size h is
-    O(h**p), is measured in each of the `cases` in `lab`. The verdict is "reproduced" if every p
-    differs from `power` by at most `within`, and "reproduced in part" if some p does.
+    `method` is the name of the method, and `power` the power that the thesis states. The power p,
+    with which the error of one step of size h is O(h**p), is measured in each of the `cases` in
+    `lab`. The verdict is "reproduced" if every p differs from `power` by at most `within`, and
+    "reproduced in part" if some p does.
     """
     numbers = {}
     for case in cases:
@@ -190,9 +192,9 @@ def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
 
 
 def _stepped(scene: Scene, method: str) -> Array:
-    """Return omega (rad/s) at the end of a scene, by a fixed-step method without a tolerance.
+    """Return omega (rad/s) at the end of a scene, computed by a fixed-step method.
 
-    `method` is the name of the method.
+    `method` is the name of the method, which has no tolerance. The scene has the step size.
     """
     omega: Array = solve(scene, scene.times(), method).omega[-1]
     return omega
@@ -205,8 +207,9 @@ def _power(
 ) -> float:
     """Return p, the power with which a method's error in one step of size h falls as O(h**p).
 
-    The power is measured by halving the step size. `method` and `truth` return omega at the end of
-    a scene of one step; the default of `truth` is the reference solution.
+    The power is measured by halving the step size of `scene`. `method` and `truth` are functions
+    that return omega at the end of a scene of one step; the default of `truth` is the reference
+    solution.
     """
     apart = []
     for step_size in (scene.step_size, scene.step_size / 2.0):
@@ -238,10 +241,11 @@ def _taylor_step(scene: Scene, order: int) -> Array:
 def crandall_example(lab: Laboratory, best: list[str]) -> Judged:
     """Judge the claim that in Crandall's example four weightings are better than the Taylor series.
 
-    The example is dx/dt = -x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2. The
-    verdict is at least "reproduced in part" if the largest error of each weighting is below half
-    the error of the series. It is "reproduced" if also the two weightings in `best` have the
-    smallest errors. `lab` is not used.
+    The weightings are collocation, subdomain, Galerkin and least squares. The example is dx/dt =
+    -x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2. The verdict is at least
+    "reproduced in part" if the largest error of each weighting is below half the error of the
+    series. It is "reproduced" if also the two weightings in `best` have the smallest errors. `lab`
+    is not used.
     """
     t, weight = np.polynomial.legendre.leggauss(12)
     t, weight = (t + 1.0) / 2.0, weight / 2.0
@@ -289,9 +293,9 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
 
     By eq. 32 a small perturbation of a steady rotation changes as exp(Q t). Each steady rotation of
     the `cases` in `lab` is perturbed by 1e-8 of its size. If Re Q (1/s) is above 0, the
-    perturbation must grow at the rate Re Q, within the fraction `within`. Otherwise it must stay
-    within ten times its initial size for ten periods. The verdict is "reproduced" if all
-    perturbations do so, otherwise "false".
+    perturbation must grow at the rate Re Q, within the fraction `within`. If not, the perturbation
+    must stay within ten times its initial size for ten periods. The verdict is "reproduced" if all
+    perturbations meet this condition, otherwise "false".
     """
     numbers, told = {}, True
     for case in cases:
@@ -323,8 +327,8 @@ def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
     The trial solution is a steady rotation about axis 3, with the initial omega3, plus exponential
     functions of time. The verdict is "reproduced" if its error is at most `limit` in at least one
-    of the `cases`. The error is the largest one against the reference solution of `lab`, relative
-    to the largest omega.
+    of the `cases`. The error is the largest one of any omega component against the reference
+    solution of `lab`, relative to the largest omega.
     """
     numbers = {}
     for case in cases:
@@ -342,9 +346,9 @@ def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged
 def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that one-term collocation is enough for a linear top, as in Case 1.
 
-    The verdict is "reproduced" if the error of one-term collocation is at most `limit`, otherwise
-    "false". The error is the largest one against the reference solution of `lab`, relative to the
-    largest omega.
+    The verdict is "reproduced" if the error of one-term collocation in the case `case` is at most
+    `limit`, otherwise "false". The error is the largest one of any omega component against the
+    reference solution of `lab`, relative to the largest omega.
     """
     found = run(lab.scene(case), Member("collocation", 1))
     truth = lab.truth(case)
@@ -356,8 +360,9 @@ def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
 def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
     """Judge the claim that the products vanish from Euler's equations of a symmetric body.
 
-    The products are those of two omega components. The verdict is "reproduced" if their
-    coefficients are 0 in all `cases` of `lab`, and "reproduced in part" if they are 0 in some case.
+    The products are those of two omega components, with the coefficients A, B and C. The verdict is
+    "reproduced" if the coefficients are 0 in all `cases` of `lab`, and "reproduced in part" if they
+    are 0 in some case.
     """
     left = {
         f"case {case}: largest coefficient": max(map(abs, lab.scene(case).euler_coefficients))
@@ -368,10 +373,10 @@ def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
 
 
 def step_on_cards(lab: Laboratory, step: float) -> Judged:
-    """Judge the claim that each of the three decks sets DT to `step` (s) before its loop.
+    """Judge the claim that each of the three card decks sets the step size DT to `step` (s).
 
-    The verdict is "reproduced" if each deck does so. DT is the step size on the cards. `lab` is not
-    used.
+    The verdict is "reproduced" if each deck has a card that sets DT to this value before its loop.
+    `lab` is not used.
     """
     numbers = {
         f"{program}: DT (s)": float(card.statement.partition("=")[2])
@@ -386,9 +391,9 @@ def step_on_cards(lab: Laboratory, step: float) -> Judged:
 def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
     """Judge the claim that the collocation points are inside the interval of the step.
 
-    `cases` has one case. The fraction of steps in which all points are inside is computed for both
-    collocation programs in `lab`. The verdict is "reproduced" if it is 1 for both, "reproduced in
-    part" if it is at least 1/2 for both, otherwise "false".
+    `cases` has one case. For both collocation programs in `lab`, the fraction of steps in which all
+    points are inside is computed. The verdict is "reproduced" if the fraction is 1 for both
+    programs, "reproduced in part" if it is at least 1/2 for both, otherwise "false".
     """
     (case,) = cases
     numbers, shares = {}, []

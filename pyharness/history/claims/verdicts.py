@@ -34,7 +34,10 @@ UNDECIDED = "undecided"
 
 @dataclass(frozen=True)
 class Judged:
-    """The verdict on one claim, and the computed numbers that support it, by description."""
+    """The verdict on one claim of the thesis, and the computed numbers that support it.
+
+    `numbers` maps a description of each number to its value.
+    """
 
     verdict: str
     numbers: dict[str, float]
@@ -45,22 +48,24 @@ def graded(
 ) -> Judged:
     """Return the verdict "reproduced" if `whole`, "reproduced in part" if `part`, else `otherwise`.
 
-    `numbers` are the computed numbers that support the verdict, by description.
+    The verdict is on a claim of the thesis. `numbers` are the computed numbers that support it, by
+    description; the result has them too.
     """
     return Judged(REPRODUCED if whole else IN_PART if part else otherwise, numbers)
 
 
 def judged(grade: rules.Grade, otherwise: str = NOT_REPRODUCED) -> Judged:
-    """Return the verdict that corresponds to the grade of a rule for one initial omega.
+    """Return the verdict on a claim of the thesis, from the result `grade` of its test.
 
-    `otherwise` is the verdict if the claim is reproduced neither as a whole nor in part.
+    The test was made for one initial omega. `otherwise` is the verdict if the claim is reproduced
+    neither as a whole nor in part.
     """
     numbers = {name: float(each) for name, each in grade.numbers.items()}
     return graded(numbers, bool(grade.whole), bool(grade.part), otherwise)
 
 
 def constant_solution(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the solution of a case is constant.
+    """Judge the claim of the thesis that the solution of a case is constant.
 
     The verdict is "reproduced" if every omega component of the reference solution, which `lab`
     computes, varies by at most 1e-12 rad/s; otherwise "false".
@@ -72,9 +77,9 @@ def constant_solution(lab: Laboratory, case: int) -> Judged:
 def known_solution(lab: Laboratory, case: int) -> Judged:
     """Judge the claim that the solution of a case is (sin 5t, cos 5t, 10), as the thesis prints.
 
-    The printed solution is compared with the reference solution, which `lab` computes. The verdict
-    is "reproduced" if no component differs by more than 1e-15 (1 + 5 t) rad/s, where t (s) is the
-    end of the run; otherwise it is "false".
+    This printed omega (rad/s) is compared with the reference solution, which `lab` computes. The
+    verdict is "reproduced" if no component differs by more than 1e-15 (1 + 5 t) rad/s; otherwise it
+    is "false". Here t (s) is the end of the run.
     """
     truth = lab.truth(case)
     t = truth.time
@@ -86,7 +91,7 @@ def known_solution(lab: Laboratory, case: int) -> Judged:
 
 
 def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge the claim that omega3 varies.
+    """Judge the claim of the thesis that omega3 varies in a case.
 
     The verdict is "reproduced" if the range of omega3 over the run exceeds `limit` (rad/s),
     otherwise "false". The range is of the reference solution, which `lab` computes.
@@ -95,7 +100,7 @@ def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
 
 
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge the claim that all three programs coincide with the known solution.
+    """Judge the claim that all three programs coincide with the known solution of a case.
 
     The verdict is "reproduced" if the error of every program in `lab` is below `limit` (rad/s),
     half a unit of the last printed digit. An error is the largest error of any omega component
@@ -117,9 +122,9 @@ def _shown(start: Triple) -> str:
 def coincident(lab: Laboratory, case: int, share: float) -> Judged:
     """Judge the claim that collocation coincides with the known solution on the thesis's graph.
 
-    The error of each component of omega that varies is divided by the component's range. The
-    verdict is "reproduced" if the largest ratio is at most `share` for both collocation programs in
-    `lab`.
+    `lab` runs both collocation programs on case `case`. The error of each component of omega that
+    varies is divided by the component's range, its largest minus its smallest value. The verdict is
+    "reproduced" if no ratio exceeds `share`, else "not reproduced".
     """
     numbers = {}
     for program in COLLOCATION:
@@ -130,11 +135,12 @@ def coincident(lab: Laboratory, case: int, share: float) -> Judged:
 
 
 def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
-    """Judge the claim that the collocation errors, over the amplitude, are from `low` to `high`.
+    """Judge the claim that collocation errors, divided by the amplitude, are from `low` to `high`.
 
-    The verdict is "reproduced" if this is so for both collocation programs in `lab`. An error is
-    the largest error of any omega component against the reference solution. The amplitude is half
-    the largest range of a component of the reference omega.
+    `lab` runs both collocation programs on case `case`. The verdict is "reproduced" if this is true
+    for both, else "not reproduced". An error is the largest error of any omega component against
+    the reference solution. The amplitude is half the largest range (largest minus smallest value)
+    of a component of the reference omega.
     """
     amplitude = float(ranges(lab.truth(case)).max()) / 2.0
     numbers = {
@@ -145,12 +151,12 @@ def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
 
 
 def poor(lab: Laboratory, case: int, share: float) -> Judged:
-    """Judge the claim that the Runge-Kutta results are poor.
+    """Judge the claim that the results of the Runge-Kutta program are poor.
 
-    The verdict is "reproduced" if the error of the Runge-Kutta program in `lab` exceeds the
-    fraction `share` of the amplitude. An error is the largest error of any omega component against
-    the reference solution. The amplitude is half the largest range of a component of the reference
-    omega.
+    `lab` runs the program on case `case`. The verdict is "reproduced" if its error exceeds the
+    fraction `share` of the amplitude, else "not reproduced". The error is the largest error of any
+    omega component against the reference solution. The amplitude is half the largest range (largest
+    minus smallest value) of a component of the reference omega.
     """
     amplitude = float(ranges(lab.truth(case)).max()) / 2.0
     found = lab.error("runge-kutta", case) / amplitude
@@ -160,9 +166,9 @@ def poor(lab: Laboratory, case: int, share: float) -> Judged:
 def error_constant(lab: Laboratory, case: int) -> Judged:
     """Judge the claim that the error of collocation does not grow during the run.
 
-    The largest errors of omega in the last and in the first fifth of the steps are compared. The
-    verdict is "reproduced" if, for both collocation programs in `lab`, the error in the last fifth
-    is at most twice the error in the first fifth.
+    `lab` runs both collocation programs on case `case`. The largest error of omega in the last
+    fifth of the steps is compared with the largest error in the first fifth. The verdict is
+    "reproduced" if it is at most twice as large for both programs, else "not reproduced".
     """
     truth = lab.truth(case).omega
     numbers = {}
@@ -177,9 +183,10 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
     """Judge the claim that the stop test ended the Runge-Kutta run at step number `step`.
 
-    The verdict is "reproduced" if the test ended the run of `lab` at this step, and "reproduced in
-    part" if at another step. The numbers also name the subsets of the program's defects with which
-    the test ends the run at `step`.
+    The stop test, a Lipschitz test, is part of the program, which `lab` runs on case `case`. The
+    verdict is "reproduced" if it ended the run at this step, "reproduced in part" if at another
+    step, else "not reproduced". The program is also run with every subset of its defects. The
+    numbers of the verdict name the subsets with which the test ends the run at `step`.
     """
     stop = lab.run("runge-kutta", case).stop
     found = math.nan if stop is None else float(stop.step)
@@ -205,11 +212,12 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
 
 
 def growing(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that omega1 of the Runge-Kutta program grows beyond the sine.
+    """Judge the claim that omega1 of the Runge-Kutta program grows beyond the sine of the solution.
 
-    Two conditions are tested on omega1 at the end of the run of `lab`. It must exceed 1 rad/s, and
-    it must exceed omega1 of the reference solution at that time by more than a thousandth. The
-    verdict is "reproduced" if both hold.
+    `lab` runs the program on case `case`. Two conditions are tested on omega1 at the end of the
+    run. It must exceed 1 rad/s, the amplitude of the sine. It must also exceed omega1 of the
+    reference solution at that time by more than a thousandth of this value. The verdict is
+    "reproduced" if both conditions hold, else "not reproduced".
     """
     run = lab.run("runge-kutta", case)
     value, solution = float(run.omega[-1, 0]), float(lab.truth(case).omega[run.steps - 1, 0])
@@ -218,11 +226,11 @@ def growing(lab: Laboratory, case: int) -> Judged:
 
 
 def search(lab: Laboratory, case: int) -> Judged:
-    """Return the Runge-Kutta error divided by the error of the corrected Runge-Kutta program.
+    """Judge the claim that a search for an error in the Runge-Kutta program found none.
 
-    Both errors are the largest of any omega component, over the steps that the run of `lab` has.
-    The claim is about a search for a mistake, which no run can test. The verdict is therefore
-    always "not testable".
+    No run can test the outcome of a search, so that the verdict is always "not testable". Its
+    number is the error of the program, divided by the error of the corrected program. Both errors
+    are the largest of any omega component in case `case`, over the steps that the run of `lab` has.
     """
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
@@ -234,8 +242,9 @@ def search(lab: Laboratory, case: int) -> Judged:
 def concur(lab: Laboratory, case: int, share: float) -> Judged:
     """Judge the claim that the two collocation programs agree, by the rule `rules.concur`.
 
-    `lab` runs the programs. `share` is the largest difference that counts as agreement, as a
-    fraction of the largest omega.
+    `lab` runs the programs on case `case`. The verdict is "reproduced in part" if both runs are
+    complete and their omegas differ by at most the fraction `share` of the largest omega. It is
+    "reproduced" if each component also differs by at most a tenth of its range.
     """
     return judged(rules.concur(lab, case, share))
 
@@ -243,17 +252,18 @@ def concur(lab: Laboratory, case: int, share: float) -> Judged:
 def fails(lab: Laboratory, case: int, share: float) -> Judged:
     """Judge the claim that the Runge-Kutta program fails, by the rule `rules.fails`.
 
-    `lab` runs the program. `share` is the error that the program must exceed, as a fraction of a
-    component's range.
+    `lab` runs the program on case `case`. Two conditions are tested: the run ended early, and the
+    error of an omega component exceeds the fraction `share` of the component's range. The verdict
+    is "reproduced" if both are true, and "reproduced in part" if only one is true.
     """
     return judged(rules.fails(lab, case, share))
 
 
 def differ(lab: Laboratory, case: int, share: float) -> Judged:
-    """Judge the claim that the two-term and the four-term program differ.
+    """Judge the claim that the results of the two-term and the four-term program differ.
 
-    The verdict is "reproduced" if the omegas of the two runs of `lab` differ by more than the
-    fraction `share` of the largest reference omega.
+    `lab` runs both programs on case `case`. The verdict is "reproduced" if their omegas differ by
+    more than the fraction `share` of the largest reference omega, else "not reproduced".
     """
     two, four = (lab.run(program, case).omega for program in COLLOCATION)
     apart = distance(two, four) / largest(lab.truth(case))
@@ -263,27 +273,32 @@ def differ(lab: Laboratory, case: int, share: float) -> Judged:
 def more_reliable(lab: Laboratory, case: int) -> Judged:
     """Judge the claim that the four-term program is more accurate than the two-term program.
 
-    The errors are those of the runs of `lab`. The verdict is "reproduced" if the four-term error is
-    at most 0.5 of the two-term error, and "reproduced in part" if at most 0.8. An error is the
-    largest error of any omega component against the reference solution.
+    `lab` runs both programs on case `case`. The verdict is "reproduced" if the four-term error is
+    at most 0.5 times the two-term error, "reproduced in part" if at most 0.8 times, else "not
+    reproduced". An error is the largest error of any omega component against the reference
+    solution.
     """
     ratio = lab.error("four-term", case) / lab.error("two-term", case)
     return graded({"four-term error over two-term error": ratio}, ratio <= 0.5, ratio <= 0.8)
 
 
 def diverged(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the two-term run of `lab` diverged, by the rule `rules.diverged`."""
+    """Judge the claim that the run of the two-term program diverged, by the rule `rules.diverged`.
+
+    `lab` runs the program on case `case`. The verdict is "reproduced" if the run overflowed, or if
+    its largest error of omega exceeds the largest omega of the reference solution.
+    """
     return judged(rules.diverged(lab, case))
 
 
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
     """Judge the claim that the two-term error has its cause in a motion too fast for two terms.
 
-    The corrected programs run from each initial omega in `starts`, otherwise under the assumptions
-    of `lab`. The verdict is "reproduced" if the two-term error is more than `worse` times the
-    four-term error from every start. It is "reproduced in part" if the two-term error is more than
-    `same` times the four-term error from some start, otherwise "false". An error is the largest
-    error of any omega component against the reference solution.
+    The corrected programs run on case `case` from each initial omega in `starts`, otherwise under
+    the assumptions of `lab`. The verdict is "reproduced" if the two-term error is more than `worse`
+    times the four-term error from every initial omega. It is "reproduced in part" if the two-term
+    error is more than `same` times the four-term error from at least one initial omega, else
+    "false". An error is the largest error of any omega component against the reference solution.
     """
     numbers = {}
     for start in starts():
@@ -295,18 +310,20 @@ def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
 
 
 def models_concur(lab: Laboratory, case: int, share: float, terms: Sequence[int]) -> Judged:
-    """Judge the claim that collocation models agree, by the rule `rules.models_concur`.
+    """Judge the claim that collocation models with different numbers of terms agree.
 
-    `lab` computes the models. `terms` are their numbers of terms, and `share` is the largest
-    difference that counts as agreement, as a fraction of the largest omega.
+    `lab` computes the models for case `case`, and `terms` are their numbers of terms. By the rule
+    `rules.models_concur` the verdict is "reproduced" if each model differs from the first one by at
+    most the fraction `share` of the largest omega.
     """
     return judged(rules.models_concur(lab, case, share, terms))
 
 
 def dynamic(lab: Laboratory, case: int, factor: float) -> Judged:
-    """Judge the claim that the motion of a case is the liveliest, by the rule `rules.dynamic`.
+    """Judge the claim that the motion of case `case` is the liveliest of the cases of Table 1.
 
-    In the four-term runs of `lab`, its largest angular acceleration must be at least `factor` times
-    the largest angular acceleration in every other case.
+    `lab` runs the four-term program on each case. By the rule `rules.dynamic` the verdict is
+    "reproduced" if the largest angular acceleration of the case is at least `factor` times the
+    largest angular acceleration of every other case.
     """
     return judged(rules.dynamic(lab, case, factor))

@@ -35,14 +35,15 @@ _WORST_CONDITION = 1e8
 
 @dataclass(frozen=True)
 class Member:
-    """One method of the family; the constructor raises InputError if there is no such method.
+    """A weighted residual method of the thesis; the constructor raises InputError for wrong fields.
 
     `weighting` is one of `WEIGHTINGS`. `terms` is n, the number of powers of t in the trial
-    function. `corrections` counts the corrections of the first estimate. Least squares takes its
-    weights with f held constant (eq. 25, where the residual R has the derivatives dR/dc_i = i
-    t**(i-1)). `points` is for collocation only: the points where the residual vanishes, as
-    fractions of the step. They are k/(n+1) (`thesis`), the points of Gauss and Legendre (`gauss`),
-    or n different numbers from 0 to 1.
+    function. `corrections` is the number of corrections of the first estimate in each step. The
+    residual is omega' - f, where f is the right-hand side of Euler's equations. Its derivatives
+    with f held constant, i t**(i-1), are the weights of least squares (eq. 25). `points` is for
+    collocation only: the points where the residual vanishes, as fractions of the step. They are
+    k/(n+1) (`thesis`), the points of Gauss and Legendre (`gauss`), or n different numbers from 0 to
+    1.
     """
 
     weighting: str = "collocation"
@@ -51,7 +52,10 @@ class Member:
     corrections: int = 1
 
     def __post_init__(self) -> None:
-        """Raise InputError if the fields do not define a method."""
+        """Raise InputError if the fields define no weighted residual method, as with 0 terms.
+
+        Collocation without `points` gets the points of the thesis.
+        """
         if self.weighting not in WEIGHTINGS:
             raise unknown("weighting", self.weighting, WEIGHTINGS)
         if not 1 <= self.terms <= MOST_TERMS:
@@ -87,7 +91,7 @@ class Member:
 
     @property
     def points_label(self) -> str:
-        """Return the collocation points as text for a table; a dash for the other weightings."""
+        """Return the collocation points as text for a table; a dash without collocation."""
         if self.points is None:
             return "-"
         if isinstance(self.points, str):
@@ -96,9 +100,10 @@ class Member:
 
 
 def converged_order(member: Member) -> int:
-    """Return the order of a member's global error in the limit of many corrections.
+    """Return the order of a method's global error in the limit of many corrections per step.
 
-    A member is a weighted residual method. docs/explanation/family.md derives these orders.
+    `member` is a weighted residual method, which corrects its first estimate in each step. Further
+    corrections do not raise the order returned. docs/explanation/family.md derives these orders.
     """
     n = member.terms
     if member.weighting == "galerkin":
@@ -116,21 +121,22 @@ def converged_order(member: Member) -> int:
 
 
 def predicted_order(member: Member) -> int:
-    """Return the order p of a member: for general motions its global error is O(h**p).
+    """Return the order p of a weighted residual method, whose global error is O(h**p).
 
-    Here h is the step size. The first estimate has order 1. Each correction raises the order by
-    one, up to the converged order.
+    Here h is the step size, and the motion is a general one. `member` is the method. Its first
+    estimate has order 1. Each correction raises the order by one, up to `converged_order`.
     """
     return min(member.corrections + 1, converged_order(member))
 
 
 def run(scene: Scene, member: Member) -> Trajectory:
-    """Integrate a scene with one member (Jacobs 1982, III.1, eq. 20-27, and IV.2).
+    """Integrate a scene by a weighted residual method (Jacobs 1982, III.1, eq. 20-27, and IV.2).
 
-    Return the trajectory of omega, without translational velocity. The first estimate evaluates the
-    torque at the beginning of the step. The corrections evaluate it at the nodes, the times within
-    the step where they need the right-hand side. The global error is O(h**p), with the step size h
-    and p from `predicted_order`. The rounding error is about one unit in the last place per step.
+    `member` is the method. Return the trajectory of omega, without translational velocity. The
+    first estimate evaluates the torque at the beginning of the step. The corrections evaluate it at
+    the nodes, the times within the step where they need the right-hand side. The global error is
+    O(h**p), with the step size h and p from `predicted_order`. The rounding error is about one unit
+    in the last place per step.
     """
     omega = integrate(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
@@ -149,10 +155,10 @@ def run(scene: Scene, member: Member) -> Trajectory:
 
 
 def integrate(scene: Scene, members: Sequence[Member]) -> Array:
-    """Integrate a scene with several members of the family at once.
+    """Integrate a scene by several weighted residual methods at once.
 
-    Return omega (rad/s) in the order of `members`, shape (members, steps, 3). It is not finite from
-    an overflow on. The run time is hardly longer than for one member.
+    Return omega (rad/s) in the order of the methods `members`, shape (members, steps, 3). After an
+    overflow omega is NaN or infinite. The run time is hardly longer than for a single method.
     """
     # Most corrections first: members that still need a correction are then contiguous in memory.
     order = sorted(range(len(members)), key=lambda i: -members[i].corrections)
@@ -195,10 +201,11 @@ def integrate(scene: Scene, members: Sequence[Member]) -> Array:
 
 
 def _stages(matrix: Array, rates: Array) -> Array:
-    """Return the same matrix products as `_sums`, computed in a third of its time.
+    """Return the product of each method's matrix and rates, in a third of the time of `_sums`.
 
-    `matrix`, shape (i, j, members), has the matrix of a member at each index of its last axis.
-    `rates` has the shape (members, j, 3), and the result the shape (members, i, 3).
+    `matrix` has shape (i, j, members); its last axis is the index of the method. `rates` contains
+    derivatives of omega, shape (members, j, 3). The result has shape (members, i, 3). It contains
+    the same sums of products as `_sums` computes.
     """
     side_by_side = np.ascontiguousarray(rates.transpose(1, 2, 0))
     total: Array = matrix[:, 0, None] * side_by_side[0]
@@ -211,10 +218,11 @@ def _stages(matrix: Array, rates: Array) -> Array:
 
 
 def _sums(factors: Array, rates: Array) -> Array:
-    """Return for every member the matrix product of factors and rates, shape (members, i, 3).
+    """Return for every method the matrix product of factors and rates, shape (members, i, 3).
 
-    The terms are summed in order by NumPy, so that the result does not depend on a BLAS library.
-    The factors have the shape (members, i, j), and the rates (members, j, 3).
+    `factors` contains a matrix for each method, shape (members, i, j), and `rates` derivatives of
+    omega, shape (members, j, 3). The terms are summed in order by NumPy, so that the result does
+    not depend on a BLAS library.
     """
     total: Array = np.einsum("mij,mjk->mik", factors, rates)
     return total
@@ -231,7 +239,7 @@ def _torque(scene: Scene, times: Array) -> Array:
     """Return the torque divided by the moments (rad/s2) at `times` (s), an array of any shape.
 
     The shape of the result is (..., 3), where ... is the shape of `times`, or (3,) if the torque is
-    constant. The torque of a body without moments is given in rad/s2 already.
+    constant. The torque of a body given by coefficients is in rad/s2 already.
     """
     law = scene.body_torque
     torque = np.array(law.constant)

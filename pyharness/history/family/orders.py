@@ -39,13 +39,13 @@ MOST_STEPS = 2_000
 
 @dataclass(frozen=True)
 class OrderFinding:
-    """The order of one member in one scene, derived and measured, and the error of the member.
+    """The order of convergence of one method in one scene, derived and measured, and its error.
 
-    A member is a weighted residual method. docs/explanation/family.md derives the order
-    `predicted`. `measured` is None if the error is rounding error alone, or is never small enough.
-    `settled` is true if the last two measured values of the order differ by at most a tenth.
-    `error` is the largest error of any omega component over the scene's own steps (rad/s), infinite
-    after an overflow.
+    `member` is a weighted residual method. docs/explanation/family.md derives its order
+    `predicted`. `measured` is None if no order can be measured, because the errors are rounding
+    errors alone or never small enough. `settled` is true if the last two measured values of the
+    order differ by at most a tenth. `error` is the largest error of any omega component with the
+    scene's own step size (rad/s), infinite after an overflow.
     """
 
     member: Member
@@ -56,15 +56,19 @@ class OrderFinding:
 
     @property
     def deviation(self) -> float:
-        """Return the measured minus the predicted order; NaN if no order was measured."""
+        """Return the measured minus the predicted order; NaN if no order was measured.
+
+        The orders are orders of convergence of one method's global error.
+        """
         return math.nan if self.measured is None else self.measured - self.predicted
 
     @property
     def misses(self) -> bool:
         """Return whether the measured order settled below the derived order by more than `SLACK`.
 
-        A measured order above the derived order is no miss, because in special scenes the error
-        term that limits the order is small.
+        `SLACK` is 0.25. The order is settled if its last two measured values differ by at most a
+        tenth. A measured order above the derived order is no miss, because in special scenes the
+        error term that limits the order is small.
         """
         return self.settled and self.deviation < -SLACK
 
@@ -72,9 +76,10 @@ class OrderFinding:
 def family_members(
     terms: Sequence[int] = range(1, 6), corrections: Sequence[int] = range(1, 9)
 ) -> list[Member]:
-    """Return a member for every combination of scheme, number of terms and number of corrections.
+    """Return a weighted residual method for each combination of scheme, `terms` and `corrections`.
 
-    A scheme, in `SCHEMES`, is a weighting with its choice of collocation points.
+    A scheme, in `SCHEMES`, is a weighting with its choice of collocation points. `terms` and
+    `corrections` are sequences: numbers of terms, and numbers of corrections per step.
     """
     return [Member(w, n, p, k) for w, p in SCHEMES for n in terms for k in corrections]
 
@@ -84,9 +89,10 @@ def order_table(
     members: Sequence[Member] | None = None,
     progress: Progress = no_progress,
 ) -> list[OrderFinding]:
-    """Measure the orders and errors of many members at once, by default of `family_members()`.
+    """Measure the orders of convergence and the errors of many weighted residual methods at once.
 
-    Return an `OrderFinding` for each member. `progress` is called before each phase of the work.
+    `members` are the methods, by default those of `family_members()`. Return an `OrderFinding` for
+    each method. `progress` is called before each phase of the work, with the number of the phase.
     Raise InputError if the reference solution grows without bound, or if the scene has more than
     `MOST_STEPS` steps.
     """
@@ -130,10 +136,11 @@ def order_table(
 
 
 def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array) -> Array:
-    """Return the members' errors at the time `horizon` (s) for ever smaller step sizes.
+    """Return the errors of several methods at the time `horizon` (s) for ever smaller step sizes.
 
-    The shape is (step sizes, members). An error is the norm of the difference from `end`, the
-    reference omega at the horizon (rad/s), divided by the largest component of `end`.
+    The shape is (step sizes, members), where `members` are the methods. An error is the norm of the
+    difference from `end`, the reference omega at the horizon (rad/s), divided by the largest
+    component of `end`.
     """
     scale = float(np.abs(end).max()) or 1.0
     rungs = []
@@ -147,11 +154,11 @@ def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array)
 
 
 def _slopes(errors: Array) -> list[float]:
-    """Return the order that each halving of the step size shows.
+    """Return the order of convergence from each pair of errors whose step sizes have the ratio 2.
 
-    `errors` are those of one member from `_ladder`. Each error belongs to half the step size of the
-    error two places before it. An order is returned only if both errors are in the range from
-    `_SMALLEST` to `_LARGEST`.
+    `errors` are the errors of one method from `_ladder`, for decreasing step sizes. Each error
+    belongs to half the step size of the error two places before it. An order is returned only if
+    both errors are in the range from `_SMALLEST` to `_LARGEST`.
     """
     return [
         math.log2(coarse / fine)

@@ -14,8 +14,9 @@ from pyharness.model.scene_report import heading
 def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
     """Return the report of the orders and errors of weighted residual methods in a scene.
 
-    `found` has the result for each method. The tables have a row for each weighting, choice of
-    collocation points and number of terms n, and a column for each number of corrections k.
+    `found` has the measured and derived order of each method and its error. The tables have a row
+    for each weighting, choice of collocation points and number of terms n, and a column for each
+    number of corrections k.
     """
     names = ("predicted", "measured", "settled", "error")
     measures = [{name: getattr(each, name) for name in names} for each in found]
@@ -43,8 +44,8 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
 def verdict(found: Sequence[OrderFinding]) -> list[str]:
     """Return sentences that compare the methods' measured orders with the derived orders.
 
-    There is one sentence if no measured order misses the derived order, else one for each that
-    does.
+    `found` has both orders of each method. If a measured order is too far below the derived order,
+    there is a sentence for each such method. Otherwise a single sentence counts the agreements.
     """
     unexpected = _unexpected(found)
     if unexpected:

@@ -248,16 +248,16 @@ def _ascending(times: object) -> tuple[list[float], bool]:
     most = most_steps()
     values = [number("times", each) for each in itertools.islice(entries, most + 1)]
     if not values:
-        raise InputError("times is empty; give at least one time")
+        raise InputError("times: none is given; give at least one time")
     if len(values) > most:
         raise InputError(
             f"times: more than {most} times, which this machine's memory can't hold; use fewer"
         )
     if not all(map(math.isfinite, values)):
-        raise InputError("times has a number that is not finite; allowed: finite numbers")
+        raise InputError("times: a number is not finite; allowed: finite numbers")
     turned = values[0] > values[-1]
     if turned:
         values.reverse()
     if not all(t1 < t2 for t1, t2 in itertools.pairwise(values)):
-        raise InputError("times is not strictly monotonic; give increasing or decreasing times")
+        raise InputError("times: not strictly monotonic; give increasing or decreasing times")
     return values, turned

@@ -80,9 +80,7 @@ def reference(
     away = [abs(t) for t in times]
     one_side = min(times) >= 0.0 or max(times) <= 0.0
     if not (one_side and all(t1 < t2 for t1, t2 in itertools.pairwise(away))):
-        raise InputError(
-            "reference: times are not strictly monotonic on one side of 0; give such times"
-        )
+        raise InputError("reference: times do not lead away from 0 on one side; give times that do")
     with decimal.localcontext() as context:
         context.prec = DIGITS
         context.Emax, context.Emin = decimal.MAX_EMAX, decimal.MIN_EMIN

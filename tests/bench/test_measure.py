@@ -350,7 +350,7 @@ MISTAKES = [
     ("--methods none --peers none", "no method and no third-party package is chosen"),
     (
         "--case 5 --methods closed-form --peers none",
-        "nothing could be measured: closed-form: closed-form can't take this scene: it has torque",
+        "nothing could be measured: closed-form: closed-form can't take this scene: it has a",
     ),
     ("--horizon 0", "--horizon: 0; allowed: a number above 0"),
     ("--horizon nan", "not finite"),

@@ -115,7 +115,7 @@ def test_a_file_of_the_users_is_read(tmp_path: Path) -> None:
         ('time = "20"', 'time = "20"\ngood_to = inf', "good_to is inf"),
         (', "7.4141e-01"]', "]", "list of three texts"),
         ('["-0.93966", "", "7.4141e-01"]', '"-0.93966"', "list of three texts"),
-        ('["-0.93966", "", "7.4141e-01"]', '["", "", ""]', "nothing printed"),
+        ('["-0.93966", "", "7.4141e-01"]', '["", "", ""]', "no component of omega is given"),
         ('"-0.93966"', "-0.93966", "omega: a number; allowed: the digits as text"),
         ('"-0.93966"', '"minus one"', "'minus one'; allowed: a printed number"),
         ('"-0.93966"', '"nan"', "allowed: a printed number"),
@@ -141,7 +141,7 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     (tmp_path / "huge.toml").write_text("#" * 1_000_001)
     with pytest.raises(InputError, match="larger than"):
         read_problem(tmp_path / "huge.toml")
-    with pytest.raises(InputError, match="names its checks"):
+    with pytest.raises(InputError, match="the name of its checks"):
         _read(tmp_path, _GOOD, "two words.toml")
 
 

@@ -131,8 +131,8 @@ def test_table_is_narrow_and_json_tells_all(
 def test_a_failure_is_told_in_every_form(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def late(scene: Scene, times: Sequence[float], *rest: Any) -> Trajectory:
-        return solve(scene, [t * (1.0 + 1e-9) for t in times], *rest)
+    def late(scene: Scene, times: Sequence[float], *rest: Any, **more: Any) -> Trajectory:
+        return solve(scene, [t * (1.0 + 1e-9) for t in times], *rest, **more)
 
     monkeypatch.setattr("pyharness.compare.candidates.solve", late)
     only = "separatrix/closed-form/flip-1e-02"

@@ -122,7 +122,7 @@ def test_without_the_documents_it_says_where_they_are(
     """An installed package has no documents, and the files beside it belong to other packages."""
     for given, told in (
         ([], "an installed package does not contain the documents; give --docs DIR"),
-        (["--docs", str(tmp_path)], f"--docs '{tmp_path}': has no index.md"),
+        (["--docs", str(tmp_path)], f"--docs '{tmp_path}': does not contain index.md"),
     ):
         monkeypatch.setattr("pyharness.edition.documents.shipped", lambda _: tmp_path)
         assert main(["edition", "--out", str(tmp_path / "site"), *given]) == 2

@@ -139,7 +139,7 @@ def test_an_atlas_lacks_nothing() -> None:
     assert isinstance(atlas, Atlas)
     assert atlas.score().tolist() == [[[0.5]]]
     assert atlas.start((0, 0, 0)) == pytest.approx((1.6, 0.0, 1.2))
-    with pytest.raises(InputError, match="lacks chunks"):
+    with pytest.raises(InputError, match="are missing"):
         atlas_of({"v2-case-4-fails": codes - 4}, axes)
-    with pytest.raises(InputError, match="along reading, steps"):
+    with pytest.raises(InputError, match="axes must be reading, steps"):
         atlas_of({"v2-case-4-fails": codes}, dict(list(axes.items())[1:]))

@@ -186,9 +186,9 @@ def _packed_end(coefficients: Triple, omega: Triple, time: float) -> tuple[Array
 
 def test_refusals_name_the_reason() -> None:
     for scene, words in (
-        (case_scene(5), "closed-form: the scene has torque"),
+        (case_scene(5), "closed-form: the scene has a torque"),
         (Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 2.0, 3.0)), "all of one sign"),
-        (case_scene(4), "no digit left"),
+        (case_scene(4), "no correct digit"),
     ):
         with pytest.raises(InputError, match=words):
             solve(scene, [1.0, 1e30], "closed-form", 1e-9)

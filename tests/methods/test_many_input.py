@@ -83,7 +83,7 @@ def test_one_row_is_shared_and_fractions_are_numbers() -> None:
         ({"omega0": np.zeros((4, 3)), "t_end": [1.0, 2.0]}, "t_end: 2 rows"),
         ({"sines": [1.0, 2.0]}, "sines: shape (2,); allowed: (k, 4) or (n, k, 4)"),
         ({"method": "rk5"}, "unknown method 'rk5'"),
-        ({"method": "closed-form", "torque_constant": [1.0, 0, 0]}, "closed-form can't take"),
+        ({"method": "closed-form", "torque_constant": [1.0, 0, 0]}, "closed-form can't solve"),
         ({"method": "rk4", "attitude0": [1.0, 0, 0, 0]}, "method rk4 does not compute attitudes"),
         ({"tolerance": 1e-17}, "tolerance is 1e-17; allowed: 1e-15 to 1"),
         ({"method": "quick", "tolerance": 1e-14}, "tolerance is 1e-14; allowed: 1e-12 to 1"),

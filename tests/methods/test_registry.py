@@ -20,7 +20,7 @@ def test_properties_of_the_registry_are_those_of_its_methods() -> None:
         assert method.name == name
         assert method.is_fixed_step == (method.evaluations > 0) == (method.finest == 1.0)
         if method.is_fixed_step:
-            with pytest.raises(InputError, match=f"{name} takes none"):
+            with pytest.raises(InputError, match=f"{name} has a fixed step and no tolerance"):
                 solve(case_scene(3), [1.0], name, 1e-3)
     assert [name for name in REGISTRY if name not in METHODS] == ["quick"]
     with pytest.raises(InputError, match="returns the state at one time only"):
@@ -57,7 +57,7 @@ def test_solution_that_blows_up_returns_the_rows_until_then(method: str) -> None
 @pytest.mark.parametrize(
     ("times", "words"),
     [
-        ([], "times is empty"),
+        ([], "none is given"),
         ([1.0, float("nan")], "not finite"),
         ([-1.0, 1.0, 0.0], "monotonic"),
         ([1.0, 1.0], "monotonic"),

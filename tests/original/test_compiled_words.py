@@ -107,7 +107,7 @@ def test_public_call_runs_both_languages() -> None:
 
 def test_words_that_are_not_here_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, listing = case_scene(5), Listing.corrected("two-term")
-    with pytest.raises(InputError, match="run in binary64, binary32, binary128 alone"):
+    with pytest.raises(InputError, match="run in binary64, binary32, binary128 only"):
         run_program(scene, listing, word="cdc48")
     with pytest.raises(InputError, match=r"two-term \(binary32\).* would take too long"):
         run_program(replace(scene, steps=1_000_000), listing, word="binary32")

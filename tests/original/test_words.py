@@ -230,7 +230,7 @@ def test_mistakes_are_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="did you mean 'cdc48'"):
         run_program(scene, listing, "python", word="cdc47")
     with pytest.raises(
-        InputError, match="compiled programs run in binary64, binary32, binary128 alone"
+        InputError, match="compiled programs run in binary64, binary32, binary128 only"
     ):
         run_program(scene, listing, word="cdc48")
     with pytest.raises(InputError, match="allowed: binary64"):

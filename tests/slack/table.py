@@ -258,7 +258,7 @@ def graded(target: str, error: Callable[[Scene, float], float]) -> Plant:
     return lambda size: instead(target, partial(faulty, size))
 
 
-def solved(size: float, scene: Scene, times: Sequence[float], *_: Any) -> Trajectory:
+def solved(size: float, scene: Scene, times: Sequence[float], *_: Any, **__: Any) -> Trajectory:
     """Return a solution with an error of `size`, in place of any method."""
     found: Trajectory = off(solve(scene, times, "taylor", 1e-15), size)
     return found

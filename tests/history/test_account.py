@@ -224,7 +224,7 @@ def test_numbers_of_readme_home_page_and_reconstruction_are_those_of_runs_and_ca
     errors = [np.abs(r.omega - truth[: r.steps]).max(axis=0) for r in (printed, mended)]
     assert 0.5e6 < (errors[0] / errors[1]).min() < (errors[0] / errors[1]).max() < 2e6
     told = _document("README.md")
-    assert f"stops at step {printed.stop.step} because of a translational *velocity*" in told
+    assert f"stops at step {printed.stop.step} because a translational *velocity*" in told
     assert printed.stop.variable.startswith("V")
     assert "errors are a million times those of the corrected program" in told
     home = _document("pyharness/edition/templates/index.html")

@@ -21,8 +21,8 @@ FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
     "cards CARDS": "Show these cards, by program, number or range, as in two-term, 1660, "
     "1040-1090 or two-term:1660 (default: all cards of the three programs).",
-    "--classes": "Count, by kind, the entries of the apparatus (defects, readings and others), the "
-    "cards that they name, and the deviations of the scan that they explain.",
+    "--classes": "Show counts: the recorded entries of each kind (defect, doubtful reading, ...), "
+    "the cards that they name, and the differences from the scan that they explain.",
     "--collate": "Compare the card decks of the three programs, operation by operation, with each "
     "other and with sections II to V of the thesis.",
     "--scan FILE": "Compare our text of the cards, character by character, with the text of a scan "

@@ -55,7 +55,7 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
 
 
 def growth_of_bodies(first: Array, third: Array) -> Array:
-    """Return the growth rate Re Q about the middle axis, divided by the spin, for each of many bodies.
+    """Return the growth rate Re Q of each body about its middle axis, divided by the spin.
 
     A perturbation of steady rotation about the middle axis grows like exp(Q t), where Q is the
     fastest rate of equation 32. A body is described by Smelt's numbers K1 = A and K3 = -C, where A

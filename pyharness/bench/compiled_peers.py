@@ -106,10 +106,10 @@ def rates(
 ) -> list[str]:
     """Return the right-hand side of each unknown of a scene, as expressions in Python source.
 
-    `time` is the source text of the time. `state` has the names of the unknowns in the source. The
-    first three are components of omega. If there are seven names, the other four are components of
-    the attitude quaternion q, with q' = q (0, omega)/2. `coefficients` are A, B and C of Euler's
-    equations, by default those of the scene.
+    `time` is the name of the time, or an expression for it, in the source. `state` has the names of
+    the unknowns in the source. The first three are components of omega. If there are seven names,
+    the other four are components of the attitude quaternion q, with q' = q (0, omega)/2.
+    `coefficients` are A, B and C of Euler's equations, by default those of the scene.
     """
     x, y, z, *attitude = state
     moments = scene.moments or (1.0, 1.0, 1.0)

@@ -34,9 +34,9 @@ def numba_rk4(
     """Return a function that integrates all bodies of a load by RK4, compiled by numba.
 
     A load is a set of bodies with their initial omegas and torques. If `in_blocks`, each step of
-    RK4 is a loop over the bodies of a block; otherwise one body is integrated after another.
-    `setting` is the number of steps, and `threads` the number of threads. The function returns
-    omega of the bodies at the end time `HORIZON` (rad/s), shape (n, 3).
+    RK4 is a loop over the bodies of a block, a group of bodies. Otherwise one body is integrated
+    after another. `setting` is the number of steps, and `threads` the number of threads. The
+    function returns omega of the bodies at the end time `HORIZON` (rad/s), shape (n, 3).
     """
     blocks, bodies = _numba_kernels()
     kernel = blocks if in_blocks else bodies

@@ -20,7 +20,10 @@ _HARDEST = 1.0  # largest torque about an axis over the moment about this axis, 
 
 
 def coefficients() -> list[float]:
-    """Return A, B and C of Euler's equations for a body with the moments of inertia `MOMENTS`."""
+    """Return the coefficients A, B and C of Euler's equations for the benchmark's bodies.
+
+    The bodies have the moments of inertia `MOMENTS`.
+    """
     return [float(each) for each in exact_coefficients(Scene("", (0.0, 0.0, 0.0), MOMENTS))]
 
 

@@ -54,8 +54,9 @@ def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
     """Measure the run time per body of our methods in calls with 1, 10, 100, ... bodies.
 
     `most` is the largest number of bodies, and `seed` determines the random bodies. The closed form
-    is measured without torque, once by the function `solve_many`, and once as a solver that is
-    prepared before the timing. The other methods are measured with torque.
+    is measured without torque, once by the function `solve_many`, and once by a solver that
+    `prepare` sets up for the bodies' moments before the timing. The other methods are measured with
+    torque.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []
@@ -76,7 +77,8 @@ def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
 def _prepared(load: EnsembleLoad) -> Callable[[], object]:
     """Return a function that solves all bodies of a load (a set of bodies) by the closed form.
 
-    The function calls a solver that is prepared once, before the function is returned.
+    The function calls a solver that `prepare` sets up once for the moments of the bodies, before
+    the function is returned.
     """
     solver, out = prepare(load.scene, "closed-form"), np.empty_like(load.omega0)
     return lambda: solver.many(load.omega0, HORIZON, out=out)

@@ -116,8 +116,8 @@ class _Task:
     def error(self, omega: Array) -> float:
         """Return the largest relative error of `omega`, the computed result for a sample of bodies.
 
-        The error of a body is relative to its largest component of omega at the start and the end.
-        If a component of `omega` is not finite, the result is infinite.
+        The error of a body is divided by the largest magnitude of a component of its omega, at the
+        start or at the end. If a component of `omega` is not finite, the result is infinite.
         """
         n = min(len(omega), len(self.ends))
         ends, starts = self.ends[:n], self.sample.omega0[:n]

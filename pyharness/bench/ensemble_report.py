@@ -63,7 +63,8 @@ def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
 
     `rows` has the speeds of all contenders (solvers) on the same task. Both speeds are for the same
     number of threads. A contender that chooses its threads itself is compared with our speed on the
-    most threads. Return None if none of our methods was measured with that number of threads.
+    largest number of threads. Return None if none of our methods was measured with that number of
+    threads.
     """
     ours = [each for each in rows if each.method in _STYLES]
     threads = row.threads or max((each.threads for each in ours), default=0)

@@ -71,7 +71,8 @@ class Workload:
         """Return the name of the group of problems over which ratios of run times are averaged.
 
         All problems of a group have the same end time. Scenes with a torque and scenes without
-        torque are in separate groups, except without attitude at an end time other than 3 s.
+        torque are in separate groups. They share a group only if no attitude is requested and the
+        end time is not 3 s.
         """
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"
@@ -135,7 +136,8 @@ def workloads(
 ) -> list[Workload]:
     """Return the workloads of a benchmark: cases of the thesis, each with an end time T.
 
-    By default they are Cases 2 to 7 to T = 3 s, and Cases 3 and 4 to T = 100 s. With `attitude`
+    By default they are Cases 2 to 7 of Table 1 of the thesis to T = 3 s, and Cases 3 (a slightly
+    perturbed symmetric top) and 4 (an unsymmetric top without torque) to T = 100 s. With `attitude`
     they are Cases 1 to 7 to T = 3 s, and all cases except 6 to T = 100 s. The body's axes then
     initially coincide with the axes of space. `case` selects a single case, and `horizon` a single
     end time T (s).

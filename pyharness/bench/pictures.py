@@ -135,9 +135,9 @@ def draw_slopes(axes: "Axes") -> None:
 def growth_picture(found: "Mapping[int, Sequence[Growth]]") -> Picture:
     """Draw the Taylor method's error, and the effect of one rounding of the time, against time.
 
-    `found` has the measured errors by the number of the case of Table 1. Each case has a plot. The
-    effect is the change of omega if the time changes by a relative 2**-53. It does not depend on
-    the method.
+    `found` has the measured errors by the number of the case of Table 1 of the thesis. Each case
+    has a plot. The effect is the change of omega if the time changes by a relative 2**-53. It does
+    not depend on the method.
     """
     from matplotlib.figure import Figure
 

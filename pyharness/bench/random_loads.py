@@ -29,10 +29,10 @@ def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
 
     The problem is a `Workload`, a scene with an end time. Successive numbers take the kinds of
     torque in turn. `kinds` of the workload are members of `KINDS`, such as ``no torque``. Its
-    solution `truth` comes from `integer_series`, the second of our two reference solvers. A scene
-    is drawn again if its error amplification is `MOST_GROWTH` or more. It is also drawn again if
-    the body turns less than once or more than 300 times. Moments are in kg m2, omega in rad/s,
-    torque in N m, the end time in s.
+    solution `truth` comes from `integer_series`, one of our two reference solvers. A scene is drawn
+    again if its error amplification is `MOST_GROWTH` or more. It is also drawn again if the body
+    turns less than once or more than 300 times. Moments are in kg m2, omega in rad/s, torque in N
+    m, the end time in s.
 
     With `attitude`, the same scene also has an attitude, which starts from the axes of space. The
     workload then has no `truth`, because `integer_series` does not propagate the attitude.

@@ -34,10 +34,10 @@ def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Rep
     """Return the report of a benchmark: a table for each workload, then mean ratios of run times.
 
     `finding` has the results, and a workload is a scene with an end time. A ratio is the run time
-    of the baseline solver divided by the run time of another solver at the same error. For random
-    scenes, the report shows the distributions of the ratios instead of these tables. The report
-    also describes the machine. `packages` are the packages whose versions are listed. `command` is
-    the command that produces the report again.
+    of the baseline solver, with which all others are compared, divided by the run time of another
+    solver at the same error. For random scenes, the report shows the distributions of the ratios
+    instead of these tables. The report also describes the machine. `packages` are the packages
+    whose versions are listed. `command` is the command that produces the report again.
     """
     drawn, data = _random(finding), _data(finding)
     return measured_report(
@@ -71,8 +71,8 @@ def _spread_parts(finding: Finding) -> list[tuple[str, Table]]:
     """Return a title and a table for every solver and target error of a run with random scenes.
 
     A table has a row for each kind of scene. The row shows the distribution of ratios over the
-    scenes of this kind. A ratio is the run time of the baseline solver divided by the run time of
-    the table's solver.
+    scenes of this kind. A ratio is the run time of the baseline solver, with which all others are
+    compared, divided by the run time of the table's solver.
     """
     heads = ("mean", "smallest", "25 %", "median", "75 %")
     columns = [
@@ -105,7 +105,8 @@ def _data(finding: Finding) -> Table:
 def savings_report(found: Sequence[Saving]) -> Report:
     """Return the report of the time saved by leaving out parts of a computation.
 
-    `found` has, for each such part, the run times with and without it.
+    `found` has, for each part that can be left out, such as dense output, the run times with and
+    without it.
     """
     time = digits(".3g", 1e6)
     columns = (
@@ -121,7 +122,7 @@ def savings_report(found: Sequence[Saving]) -> Report:
 def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
     """Return the report of the Taylor method's error against the time up to which it integrates.
 
-    `found` has the measured errors by the number of the case of Table 1.
+    `found` has the measured errors by the number of the case of Table 1 of the thesis.
     """
     time, error = digits(".3g"), digits(".2g")
     columns = (

@@ -33,8 +33,9 @@ class Score:
 class Spread:
     """The distribution of a contender's time ratios over the random scenes of one kind.
 
-    A contender is a solver in the benchmark. A ratio is the baseline contender's time to reach the
-    target error, divided by the time of this contender.
+    A contender is a solver in the benchmark. All contenders are compared with a baseline contender.
+    A ratio is the time of the baseline contender to reach the target error, divided by the time of
+    the contender itself.
     """
 
     method: str  # name of the contender

@@ -93,9 +93,10 @@ def _compared(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
 def _after(deck: Run, steps: int, overflowed: bool) -> list[str]:
     """Return texts that describe faults in the deck's records after the last row of our port.
 
-    The deck is a run of the program on the author's own cards. Our Fortran port has `steps` rows.
-    If the port overflowed, the deck must have further records, none of which has three finite
-    components of omega. Otherwise the deck must have no further records.
+    The deck is a run of the program on the author's own cards. Its records are the rows of its
+    output file TAPE5. Our Fortran port has `steps` rows. If the port overflowed, the deck must have
+    further records, none of which has three finite components of omega. Otherwise the deck must
+    have no further records.
     """
     rest = deck.tape5[steps:]
     if not overflowed:

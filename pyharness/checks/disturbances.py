@@ -52,7 +52,8 @@ class Probe:
     def difference(self) -> float:
         """Return the largest absolute difference between a measured and a derived element.
 
-        The result is not finite if an element is not finite.
+        The result is not finite if an element is not finite. The elements belong to a vector or
+        matrix, which is both measured by running a program and derived by theory.
         """
         return float(np.abs(self.found - self.derived).max())
 
@@ -114,10 +115,11 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 def later_steps(scene: Scene, listing: Listing) -> Probe:
     """Return a spinning top's perturbation after all steps of a scene, measured and derived.
 
-    `listing` is the program that is run, with a choice of its defects. The coefficient C and the
-    torque are zero. omega3 is the spin, and omega1 and omega2 are the perturbation. The equations
-    are then linear, so that the perturbation may be of any size. The derived perturbation is the
-    initial perturbation, multiplied by the program's amplification matrix in every step.
+    `listing` is the program that is run, with a choice of its defects. The coefficient C of Euler's
+    equations and the torque are zero. omega3 is the spin, and omega1 and omega2 are the
+    perturbation. The equations are then linear, so that the perturbation may be of any size. The
+    derived perturbation is the initial perturbation, multiplied by the program's amplification
+    matrix in every step.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
@@ -165,8 +167,9 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
 
     z is the step size times an eigenvalue of the equations of a spinning top. It has the direction
     -1 or 1j from 0. The distance is measured by bisection over runs of the program `listing`. If
-    the program propagates a second vector from step to step, growth is measured by the change of
-    omega from step to step. Otherwise the constant part of omega would hide the growth.
+    the program propagates a second vector besides omega from step to step, growth is measured by
+    the change of omega from step to step. Otherwise the constant part of omega would hide the
+    growth.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -197,10 +200,11 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
 
 
 def _moved(listing: Listing, step: int) -> float:
-    """Return the factor by which a defect has moved the collocation points of a step.
+    """Return the factor by which a defect has moved the collocation points in a step.
 
-    With the defect `dt-accumulates`, the factor is the number `step` of the step, counted from 1.
-    If the program version `listing` does not have this defect, the factor is 1.
+    With the defect `dt-accumulates`, the distances of the collocation points from the start of the
+    step are multiplied by the number `step` of the step, counted from 1. This number is then the
+    factor. If the program version `listing` does not have this defect, the factor is 1.
     """
     return float(step) if listing.has("dt-accumulates") else 1.0
 
@@ -268,8 +272,9 @@ def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Arra
     """Return a bound on the rounding error of each omega in a step, in units of 2**-53 rad/s.
 
     `sizes` are bounds of abs(omega) before the step. `moved` is the factor by which a defect has
-    moved the collocation points. The bound sums the terms of the step with all signs positive,
-    because rounding errors are proportional to these terms.
+    multiplied the distances of the collocation points from the start of the step. The bound sums
+    the terms of the step with all signs positive, because rounding errors are proportional to these
+    terms.
     """
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":

@@ -89,7 +89,7 @@ def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: floa
 def _doubling(
     matrix: Amplification, rate: float, time: float, smallest: float, missed: float = 0.0
 ) -> float:
-    """Return the smallest step (s) with which, by theory, a wobble grows by 2 exp(`missed`).
+    """Return the smallest step (s) for which, by theory, a wobble grows 2 exp(`missed`)-fold.
 
     `missed` allows for a peak of the wobble between two steps. `matrix` is the amplification matrix
     of a step, `rate` is the angular frequency of the wobble (1/s), and `time` (s) is the duration

@@ -56,7 +56,7 @@ _Result = tuple[Array, float]
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
     """Yield checks that compare every method with the published results of each problem.
 
-    A method that can't take a problem is left out. The ids of the checks are
+    A method that can't solve a problem is left out. The ids of the checks are
     ``external/<problem>/<time>/<method>``. The value of a check is the difference from the
     published result, in the problem's unit. Value and limit are for the component of omega with the
     largest ratio of value to limit. `only` has the leading parts of the requested ids.
@@ -113,7 +113,8 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 
     `values` are the published results, and `only` has the leading parts of the requested ids. The
     value of a check is the angle between the two attitudes (rad). The limit is the sum of the
-    published accuracy, the tolerance, and the effect of rounding the input numbers of the problem.
+    published accuracy, the tolerance of the method, and the effect of rounding the input numbers of
+    the problem.
     """
     scene, times = problem.scene, [float(value.time) for value in values]
     for method in (name for name in _SOLVED if REGISTRY[name].attitude and values):
@@ -212,7 +213,7 @@ def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Re
     """Return omega and its error bound (rad/s) by a method at the time of each published value.
 
     `method` may also be a program of the thesis. An element is None if the program's linear solver
-    declares the equations of even the longest steps singular.
+    declares the equations singular even with the longest step that is tried.
     """
     if method in PROGRAMS:
         return [_program(problem, value, method) for value in values]
@@ -254,7 +255,8 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     `value` is a published result. The step is halved until the error is below a tenth of the
     published accuracy, or is rounding error. The error is estimated from the last halving, and
     doubled for safety. Rounding may add half a unit in the last place per step. Return None if the
-    program's linear solver declares the equations of even the longest steps singular.
+    program's linear solver declares the equations singular even with the longest step that is
+    tried.
     """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)

@@ -93,7 +93,7 @@ def golden(chosen: Selection) -> Iterator[Attempt]:
     within twice this error, because processors and compilers may round their operations
     differently. If sine and cosine come from another mathematical library than in the record,
     results under a torque with waves may differ by rounding. Yield nothing if the folder does not
-    exist.
+    exist. A deferred check is computed only if it is requested.
     """
     if not chosen.record.is_dir():
         return

@@ -90,7 +90,7 @@ def check_all(
     A trial is a group of checks under one kind of extreme conditions. ``held(name, time)`` yields
     the checks in the scene of `name` at `time` (s); by default it is the function `hold`. In the
     scenes for which `has_programs` is true, the errors of the programs of the thesis are also
-    reported, without a limit.
+    reported, without a limit. A deferred check is computed only if it is requested.
     """
     for each in EXTREMES[suite]():
         name = named(suite, "", each.name, scene=each.scene)
@@ -111,14 +111,16 @@ def hold(
 
     `methods` has the names of the methods. `truth` computes the true solution. `tolerances` returns
     the tolerances at which a method is tried, by default those of the function `affordable`.
-    `judged` makes the checks of one method at one tolerance.
+    `judged` makes the checks of one method at one tolerance. A deferred check is computed only if
+    it is requested.
 
-    By default, the limit of the error is the sum of three terms. The first term is the error that
-    the method promises to make, and the second is rounding. The error amplification multiplies
-    both. The third term is the error of the true solution. If the sum leaves fewer than two digits
-    of omega, no limit is set. Without torque, the errors of energy and momentum always have a
-    limit, because the flow does not amplify them. A method fails if it refuses a scene that it must
-    take.
+    By default, the limit of the error is the sum of three terms. The first term is the method's
+    tolerance or, for a fixed step without torque, a bound that follows from the method's order. The
+    second term is the rounding error. The error amplification of the motion multiplies both. The
+    third term is the error of the true solution. If there is no first term, or if the sum leaves
+    fewer than two digits of omega, no limit is set. Without torque, the errors of energy and
+    momentum always have a limit, because the flow does not amplify them. A method fails if it
+    refuses a scene that it must solve.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -138,9 +140,9 @@ def run_method(name: str, scene: Scene, time: float, tolerance: float | None) ->
     """Return omega at `time` (s) by the method `name`, and how the run ended, as an `End`.
 
     If the tolerance is None, the method uses the scene's step size and runs as a prepared solver.
-    Such a solver is set up once and takes many initial conditions. The methods `auto` and `quick`
-    always run as prepared solvers. If a prepared solver refuses the scene, the result may state
-    this. Any other refusal raises InputError.
+    Such a solver is set up once by `prepare` for one scene, and then takes many initial conditions.
+    The methods `auto` and `quick` always run as prepared solvers. If a prepared solver refuses the
+    scene, the result may state the refusal. Any other refusal raises InputError.
     """
     if name in ("auto", "quick") or tolerance is None:
         return prepared_candidate(name, tolerance or 1.0).end(scene, time)
@@ -154,11 +156,12 @@ def _steps(scene: Scene, time: float) -> int:
 def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse a scene; every other refusal is a fault.
 
-    `tried` has the method and the scene, and `truth` is the true solution. `why` is the message of
-    the refusal and does not matter here. The method `closed-form` may refuse a scene that has no
-    closed form. The method `quick` may refuse every scene, because it requires that A, B and C are
-    not 0 and that few steps suffice. Methods that use the Taylor series may refuse a torque with a
-    wave whose phase exceeds 1e8 radians, because they would take too long.
+    A method refuses a scene if it gives a message instead of a result. `tried` has the method and
+    the scene, and `truth` is the true solution. `why` is the message of the refusal and does not
+    matter here. The method `closed-form` may refuse a scene that has no closed form. The method
+    `quick` may refuse every scene, because it requires that the coefficients A, B and C of Euler's
+    equations are not 0 and that few steps suffice. Methods that use the Taylor series may refuse a
+    torque with a wave whose phase exceeds 1e8 radians, because they would take too long.
     """
     method, scene = tried.method, tried.scene
     if method == "closed-form":
@@ -169,11 +172,12 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
 
 
 def _derived(truth: Truth, tried: MethodRun) -> float | None:
-    """Return the limit of a method's error: its promised error and rounding, amplified by the flow.
+    """Return the limit of a method's error: the errors of its steps and rounding, both amplified.
 
     `tried` is the run of the method, and `truth` is the true solution. The limit is relative to the
-    largest omega. It is None if the method promises no error, and infinite if it would leave fewer
-    than two digits of omega. The limit of a closed form is not amplified.
+    largest omega. It is None if no bound on the errors of the steps is known, and infinite if it
+    would leave fewer than two digits of omega. The amplification is the error amplification of the
+    motion. The limit of a closed form is not amplified.
     """
     made = promised_sum(tried, truth)
     if truth.exact and tried.method in FORMS:
@@ -232,7 +236,7 @@ def scene_of(name: Name) -> Scene:
 
 
 def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
-    """Return the bound that a method promises on the sum of the errors of its steps.
+    """Return the bound that checks set on the sum of the errors of a method's steps.
 
     `tried` is the run of the method, and `truth` is the true solution. The bound is relative to the
     largest omega. For a method with a fixed step in a scene without torque, it follows from the
@@ -276,7 +280,7 @@ def describe_programs(name: Name) -> Iterator[Attempt]:
 
     The programs of the thesis, original and corrected, run over the steps of the scene that belongs
     to `name`. The error of omega is relative to the largest omega, and is taken at about ten of the
-    steps.
+    steps. A deferred check is computed only if it is requested.
     """
     scene = scene_of(name)
     every = max(1, scene.steps // _ROWS)

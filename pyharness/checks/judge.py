@@ -44,8 +44,8 @@ class Answer:
 def of_end(method: str, end: End) -> Answer:
     """Return the answer of `method` for one time, made from the `End` of its call.
 
-    An `End` has omega at this time and how the run ended. If a prepared solver has refused the
-    scene, the answer contains no omega but the reason.
+    An `End` has omega at this time and how the run ended. If a solver that `prepare` set up for the
+    scene has refused it, the answer contains the reason instead of omega.
     """
     if end.is_refused:
         return Answer(refusal=f"{method}: {end.ended}")
@@ -107,8 +107,9 @@ def by_end(
 ) -> MethodRun:
     """Return a deferred run of a candidate, a method or a prepared solver, until one `time` (s).
 
-    The run is made when its results are first needed. `method` is the name of the method, on which
-    the error limit and the messages of the check depend.
+    A prepared solver is one that `prepare` has set up for one scene. The run is made when its
+    results are first needed. `method` is the name of the method, on which the error limit and the
+    messages of the check depend.
     """
     return MethodRun(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
@@ -211,7 +212,8 @@ class Policy:
     """A rule for judging methods: the limit of the error, and the scenes that a method may refuse.
 
     The function `limit` takes the true solution and the run of the method. The function
-    `may_refuse` takes the run, the true solution and the message with which the method refused.
+    `may_refuse` takes the run, the true solution and the message with which the method refused. A
+    method refuses a scene if it gives a message instead of a result.
     """
 
     limit: Callable[[Truth, MethodRun], float | None]
@@ -258,9 +260,9 @@ def tolerance_of(tried: MethodRun) -> float:
 def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse the scene of the run `tried` with the message `why`.
 
-    The method `closed-form` may refuse a scene that has no closed form. The method `quick` may
-    refuse a scene if one of the coefficients A, B and C is 0. The true solution `truth` does not
-    matter.
+    A method refuses a scene if it gives a message instead of a result. The method `closed-form` may
+    refuse a scene that has no closed form. The method `quick` may refuse a scene if one of the
+    coefficients A, B and C of Euler's equations is 0. The true solution `truth` does not matter.
     """
     if tried.method == "quick":
         # `quick` requires that A, B and C are not 0.

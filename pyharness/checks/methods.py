@@ -48,8 +48,9 @@ _PREPARED_TURNED = ("auto", "taylor")
 def methods(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of omega by every method with a tolerance.
 
-    In each case of Table 1, omega is compared with the high-precision reference solution, at all
-    times of the case and at one later time. `chosen` selects the checks.
+    In each case of Table 1 of the thesis, omega is compared with the high-precision reference
+    solution, at all times of the case and at one later time. `chosen` selects the checks. A
+    deferred check is computed only if it is requested.
     """
     for case in cases(chosen):
         scene = case_scene(case)
@@ -59,9 +60,10 @@ def methods(chosen: Selection) -> Iterator[Attempt]:
 def prepared(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of prepared solvers against the reference, forward and back in time.
 
-    A prepared solver is set up once for a scene, and then called for any initial omega. Methods
-    with a fixed step and Gauss collocation use the scene's step size. Their prepared solvers are
-    compared bit for bit with a run of the method that is not prepared.
+    A prepared solver is set up once by `prepare` for a scene, and then called for any initial
+    omega. Methods with a fixed step and Gauss collocation use the scene's step size. Their prepared
+    solvers are compared bit for bit with a run of the method that is not prepared. A deferred check
+    is computed only if it is requested.
     """
     for case in cases(chosen):
         scene = case_scene(case)
@@ -73,10 +75,11 @@ def prepared(chosen: Selection) -> Iterator[Attempt]:
 
 
 def attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of attitudes against the reference in every case of Table 1.
+    """Yield deferred checks of attitudes against a reference in the cases of Table 1 of the thesis.
 
     Every method that propagates the attitude is tried, by the function `solve` and as a prepared
-    solver, which is set up once for many calls.
+    solver, which `prepare` sets up once for a scene and many calls. A deferred check is computed
+    only if it is requested.
     """
     for case in cases(chosen):
         scene = replace(case_scene(case), attitude=START)
@@ -87,7 +90,7 @@ def attitudes(chosen: Selection) -> Iterator[Attempt]:
 
 
 def cases(chosen: Selection, thin: Sequence[int] = (4, 5)) -> Sequence[int]:
-    """Return the numbers of the cases of Table 1 in which checks are made.
+    """Return the numbers of the cases of Table 1 of the thesis in which checks are made.
 
     They are all cases, or only the cases `thin` if `chosen` is the selection of the self-test.
     """
@@ -147,10 +150,11 @@ def _judged(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Na
 
 
 def _same_steps(scene: Scene, name: Name) -> Check:
-    """Return the check that a prepared solver gives the right bits after 100 steps of a scene.
+    """Return the check that a prepared solver gives the required bits after 100 steps of a scene.
 
-    For a method with a fixed step, they must be the bits of the function `solve`. For Gauss
-    collocation, they must be those of a direct call of the compiled kernel.
+    A prepared solver is one that `prepare` has set up for one scene. For a method with a fixed
+    step, the required bits are the result of the function `solve`. For Gauss collocation, they are
+    the result of a direct call of the compiled kernel.
     """
     method, time = name.subject, 100.0 * scene.step_size
     found = prepared_candidate(method, 1.0).end(scene, time).omega

@@ -35,7 +35,8 @@ _ORDER_SLACK = 0.2
 def orders(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of the order of each corrected program and each fixed-step method.
 
-    The value of a check is the expected order minus the measured one. `chosen` selects the checks.
+    The value of a check is the theoretical order minus the measured one. `chosen` selects the
+    checks. A deferred check is computed only if it is requested.
     """
     for case in cases(chosen, (5,)):
         scene = case_scene(case)
@@ -76,7 +77,7 @@ def _of_method(scene: Scene, truth: Callable[[], Reference], name: Name) -> Chec
 
 
 def judged_order(name: Name, found: Order) -> Check:
-    """Return the check that a measured order is at most a small slack below the expected one.
+    """Return the check that a measured order is at most a small slack below the theoretical one.
 
     The slack is `_ORDER_SLACK`. The check also passes if the error is as small as rounding before
     an order can be observed. It fails if the order can't be determined for another reason.

@@ -190,10 +190,10 @@ _OF_METHODS: dict[str, dict[str, Any]] = {
 
 
 def length_picture(found: Sequence["Drift"]) -> Picture:
-    """Return a picture of errors in energy and phase against the number of steps.
+    """Return a picture of the errors in a motion's energy and phase against the number of steps.
 
     `found` has the errors for each motion, method and quantity. There is a column of panels for
-    each motion.
+    each motion. The phase is the position along the closed curve of omega in a torque-free motion.
     """
     from matplotlib.figure import Figure
 

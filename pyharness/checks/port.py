@@ -30,9 +30,10 @@ Cell = tuple[str, Listing, int]
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
     """Return name, listing and case number of the requested cells.
 
-    A cell is a listing with a case of Table 1, and a listing is a program with a choice of its
-    defects and readings. `cells` has the leading parts of names of cells, as in
-    ``two-term/case-3``. If it is empty, all cells of the programs and cases are requested.
+    A cell is a listing with a case of Table 1 of the thesis. A listing is a program with a choice
+    of its defects, and of its readings of doubtful cards. `cells` has the leading parts of names of
+    cells, as in ``two-term/case-3``. If it is empty, all cells of the programs and cases are
+    requested.
     """
     return [
         (cell_name(listing, case), listing, case)
@@ -77,8 +78,8 @@ def differences(twin: Trajectory, answer: Answer) -> list[str]:
 
     A port is an implementation of a program in any language, and `twin` is the run of our Python
     version. The texts report the first row that differs, the number of rows, and how the run ended.
-    They also report where the stop test ended it, and the first error code IER that differs. The
-    list is empty if nothing differs.
+    They also report where the Runge-Kutta program's stop test ended it, and the first error code
+    IER that differs. The list is empty if nothing differs.
     """
     wanted, given = _rows(twin), answer.rows
     found = []

@@ -71,7 +71,10 @@ class PortProcess:
     """
 
     def __init__(self, command: str, patience: float = PATIENCE) -> None:
-        """Store the command to start the port, and the longest time to wait for an answer (s)."""
+        """Store the command to start the port, and the longest time to wait for an answer (s).
+
+        A port is an implementation of the programs of the thesis, which runs as another process.
+        """
         self._words = split_command(command)
         self._patience = patience
 
@@ -110,7 +113,10 @@ class PortProcess:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End the port's process and all processes that it started, whatever they are doing."""
+        """End the port's process and all processes that it started, whatever they are doing.
+
+        A port is an implementation of the programs of the thesis, which runs as another process.
+        """
         # If all processes of the group have ended, the group is not found. macOS reports this as
         # PermissionError.
         with contextlib.suppress(ProcessLookupError, PermissionError):
@@ -169,7 +175,8 @@ class PortProcess:
     def _hear(self) -> bool:
         """Read what the port's process wrote to stderr, and return whether there was any output.
 
-        The last part of the output is kept for error messages.
+        The last part of the output is kept for error messages. A port is an implementation of the
+        programs of the thesis, which runs as another process.
         """
         try:
             piece = os.read(self._errors.fileno(), _PIECE)

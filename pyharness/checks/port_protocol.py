@@ -50,8 +50,8 @@ def request(
 
     A port is an implementation of the programs in any language. `listing` is the program with a
     choice of its defects. The decimal numbers in the line reproduce floats exactly. `lipschitz` is
-    the constant of the stop test (1/s), by default the constant in the author's decks. If
-    `may_stop` is false, the test does not end the run.
+    the constant of the Runge-Kutta program's stop test (1/s), by default the constant in the
+    author's decks. If `may_stop` is false, the test does not end the run.
     """
     asked = {
         "schema": SCHEMAS["port request"],

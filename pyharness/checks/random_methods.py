@@ -79,7 +79,8 @@ def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     limits of the range of binary64. Any other method may refuse a scene of the kinds `_MAY_REFUSE`,
     whose motion may diverge or be too fast. It may also refuse a scene whose error amplification,
     which `truth` has, exceeds `_CALM`. The method `quick` may refuse every scene. A method of SciPy
-    may refuse a tolerance that is too fine for it.
+    may refuse a tolerance that is too fine for it. A method refuses a scene if it gives a message
+    instead of a result.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -113,10 +114,11 @@ The tolerance is multiplied by the error amplification only if this exceeds `LIV
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
     """Yield deferred checks that compare omega from every entry point with the true omega.
 
-    An entry point is `solve` or a prepared solver, with one method. The random scenes are drawn
-    from the seed of `chosen`, the selection of checks. If a scene has no true solution, a single
-    check reports this. This check passes if the scene is of the kinds `_MAY_REFUSE`, whose motion
-    may diverge or be too fast.
+    An entry point is the function `solve`, or a solver that `prepare` sets up for one scene, each
+    with one method. The random scenes are drawn from the seed of `chosen`, the selection of checks.
+    If a scene has no true solution, a single check reports this. This check passes if the scene is
+    of the kinds `_MAY_REFUSE`, whose motion may diverge or be too fast. A deferred check is
+    computed only if it is requested.
     """
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
@@ -141,9 +143,10 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks that compare attitudes with the true attitude in random scenes.
 
     The attitudes are computed by the automatic choice of a method, by the Taylor series and by a
-    prepared solver. The scenes are drawn from the seed of `chosen`, the selection of checks. A
-    scene is left out if its true attitude can't be computed, or if rounding errors leave no correct
-    digit of the attitude.
+    solver that `prepare` sets up for the scene. The scenes are drawn from the seed of `chosen`, the
+    selection of checks. A scene is left out if its true attitude can't be computed, or if rounding
+    errors leave no correct digit of the attitude. A deferred check is computed only if it is
+    requested.
     """
     tolerance_at = METHODS["taylor"].finest
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
@@ -175,9 +178,10 @@ def _requested(chosen: Selection, number: int, entrances: Entrances) -> Entrance
 def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
     """Return a deferred run for each entry point, by its name, in the random scene `drawn`.
 
-    An entry point is `solve` or a prepared solver, with one method, as in ``solve-taylor``.
-    `number` is the number of the random draw. Methods of SciPy and the reference solver are slow.
-    They are tried in few draws, and in no draw if `thin` is set, as in the self-test of the checks.
+    An entry point is the function `solve`, or a solver that `prepare` sets up for one scene, each
+    with one method, as in ``solve-taylor``. `number` is the number of the random draw. Methods of
+    SciPy and the reference solver are slow. They are tried in few draws, and in no draw if `thin`
+    is set, as in the self-test of the checks.
     """
     forms = ["closed-form"] if closed_form(drawn.scene) else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]

@@ -47,7 +47,8 @@ def schemes(chosen: Selection) -> Iterator[Attempt]:
 
     Each step is recomputed from the program's own state before the step. The value of a check is
     the largest ratio of a difference to its rounding bound, for omega and translational velocity.
-    The limit is 1. `chosen` is the selection of checks.
+    The limit is 1. `chosen` is the selection of checks. A deferred check is computed only if it is
+    requested.
     """
     for case in cases(chosen, (7,)):
         for program in PROGRAMS:

@@ -48,7 +48,8 @@ def stops(chosen: Selection) -> Iterator[Attempt]:
     The test (equation 19 of the thesis) compares quotients with a stop constant. It is checked in
     every form that a listing, a choice of the program's defects, can give it. A check compares the
     number of the step, the variable and the quotient of the stop. Its value is the largest ratio of
-    a quotient's difference to its rounding bound. The limit is 1.
+    a quotient's difference to its rounding bound. The limit is 1. A deferred check is computed only
+    if it is requested.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):

@@ -26,9 +26,9 @@ The arguments are those of `Name`.
 class Trial:
     """A group of checks of `pyharness stress` under one kind of extreme conditions.
 
-    `title` describes the conditions, and `bound` explains how the limits are derived. `attempts`
-    takes the leading parts of the requested ids. It returns the deferred computations of the checks
-    that may have these ids.
+    `title` describes the conditions, and `bound` explains how the limits of the checks are derived.
+    `attempts` takes the leading parts of the requested ids. It returns the deferred computations of
+    the checks that may have these ids.
     """
 
     name: str

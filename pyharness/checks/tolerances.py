@@ -33,9 +33,10 @@ _STAGES = {"dop853": 12, "lsoda": 2, "radau": 20, "rk45": 6}
 
 
 def of_case(name: str, thin: bool) -> list[float]:
-    """Return the tolerances at which the method `name` is checked in a case of Table 1.
+    """Return the tolerances at which a method is checked in a case of Table 1 of the thesis.
 
-    With `thin`, which `pyharness verify --self-test` sets, there is only one tolerance.
+    `name` is the name of the method. With `thin`, which `pyharness verify --self-test` sets, there
+    is only one tolerance.
     """
     finest = METHODS[name].finest
     if name in SCIPY_METHODS:
@@ -48,9 +49,9 @@ def of_case(name: str, thin: bool) -> list[float]:
 def finest(name: str, scene: Scene, time: float) -> float:
     """Return the finest tolerance at which a method is checked until `time` (s) in a scene.
 
-    The result is the finest tolerance that the method `name` claims to meet. A method of
-    `solve_ivp` may not meet this tolerance in the scene. The result is then the finest tolerance of
-    the list `_LADDER` that the method can meet, or 1 if there is none.
+    The result is the smallest tolerance that the function `solve` accepts for the method `name`. A
+    method of `solve_ivp` may not meet this tolerance in the scene. The result is then the finest
+    tolerance of the list `_LADDER` that the method can meet, or 1 if there is none.
     """
     met = finest_of(name, scene, time)
     claimed = REGISTRY[name].finest

@@ -31,7 +31,7 @@ def words(chosen: Selection) -> Iterator[Attempt]:
     program with a case and a listing, a choice of its defects. In the first comparison, the Python
     version in our arithmetic of 53 bits must agree with the Python version in floats. In the
     second, the program compiled for each machine word must agree with the Python version in that
-    word.
+    word. A deferred check is computed only if it is requested.
 
     If `chosen.only` requests some checks, both comparisons cover every cell. Otherwise the first
     covers the original listing and listings with at most one defect or reading, an interpretation

@@ -73,7 +73,7 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
 
 
 def chosen_effort(options: argparse.Namespace) -> float:
-    """Return the factor on the work limits that --effort gives, by default 1."""
+    """Return the factor on the limits of a computation's work that --effort gives, by default 1."""
     return positive(options.effort, "--effort", 1.0)
 
 
@@ -191,7 +191,7 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
 
 
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
-    """Print a warning for each reading or conjecture that is requested, but active in no listing.
+    """Print a warning for each reading or conjecture that is requested, but used in no listing.
 
     A reading is an interpretation of a doubtful card, and a conjecture an assumption about a
     missing card. `listings` are the versions of the programs that the command runs.
@@ -203,10 +203,10 @@ def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> N
 
 
 def listing_text(listing: Listing) -> str:
-    """Return a line that describes a listing (version of a program): its label and active defects.
+    """Return a line that describes a listing (version of a program): its label and its defects.
 
-    The label is original, corrected or custom. The line also has the names of the active readings
-    (of doubtful cards) and conjectures (about missing cards), if there are any.
+    The label is original, corrected or custom. The line also has the names of the readings (of
+    doubtful cards) and conjectures (about missing cards) that the listing uses, if there are any.
     """
     active = ", ".join(sorted(listing.defects)) or "no defects"
     more = {"readings": listing.readings, "conjectures": listing.conjectures}

@@ -123,14 +123,14 @@ class _DeferredInterrupt:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Restore the previous signal handler, and call it if Ctrl-C was deferred."""
+        """Restore the previous signal handler, and call it if Ctrl-C was pressed in between."""
         if self._holds:
             signal.signal(signal.SIGINT, self._before)
         if self._came and callable(self._before):
             self._before(signal.SIGINT, None)
 
     def check(self) -> None:
-        """Raise KeyboardInterrupt if an interrupt by Ctrl-C was deferred."""
+        """Raise KeyboardInterrupt if Ctrl-C was pressed since the context was entered."""
         if self._came:
             raise KeyboardInterrupt
 
@@ -217,8 +217,9 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
 def _why_not_made(folder: Path) -> str:
     """Return the reason why a folder can't be made, or an empty text if it can be made.
 
-    The reason begins with a colon. To find it, the folder is made and removed again. Permissions
-    alone do not show that a name is too long, or that a file system accepts no folder.
+    The reason begins with a colon. To find the reason, the folder is made and removed again,
+    because permissions alone do not show that a name is too long, or that a file system accepts no
+    folder.
     """
     if not folder.parent.is_dir():
         return ": there is no such folder"
@@ -281,7 +282,8 @@ def check_tree(path: str, mark: str, option: str) -> None:
 def _why_not_anew(folder: Path, mark: str) -> str:
     """Return the reason why a folder may not be replaced, or an empty text if it may be.
 
-    `mark` is the name of the JSON file that lists the files which an earlier run wrote.
+    A folder may not be replaced if, for example, it has a file that no earlier run of the command
+    wrote. `mark` is the name of the JSON file that lists the files which an earlier run wrote.
     """
     if Path.cwd().is_relative_to(folder):
         return "is the folder that you are in, or one above it"

@@ -16,7 +16,7 @@ _NARROWEST, _WIDEST = 80, 100  # columns
 
 
 class _Formatter(argparse.HelpFormatter):
-    """A help formatter whose usage line lists no options, and which keeps the lines of the example.
+    """A help formatter that omits the options from the usage line, and keeps an example's lines.
 
     The example is the text at the end of a help text.
     """

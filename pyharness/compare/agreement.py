@@ -19,8 +19,8 @@ from pyharness.truth.reference import Reference
 class Accuracy:
     """The errors of a trajectory against the reference solution.
 
-    They are the errors of omega, translational velocity and attitude, and the drifts of energy and
-    angular momentum.
+    The class has the errors of omega, translational velocity and attitude, and the drifts of energy
+    and angular momentum, which are constant without torque.
     """
 
     omega: tuple[float, float, float]  # largest error of each component (rad/s)
@@ -45,8 +45,8 @@ def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy
     """Return the errors of a trajectory against the reference solution `truth`.
 
     The trajectory and `truth` must have rows at the same times. If one of them ends earlier, the
-    comparison ends with it. Energy and angular momentum, which are constant without torque, are
-    compared with their initial values in `scene`.
+    later rows of the other are not compared. Energy and angular momentum, which are constant
+    without torque, are compared with their initial values in `scene`.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
@@ -107,10 +107,10 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
     """Return the names of the results in which two trajectories of a program differ.
 
-    First the numbers of steps and of evaluations, the status and the result of the stop test are
-    compared. If any of these differ, the list has only their names. Otherwise the rows at all times
-    and the error code IER of the linear solver are compared bit for bit. The list is empty if all
-    results agree.
+    First the numbers of steps, the numbers of evaluations, the ways in which the runs ended, and
+    the results of the stop test are compared. If any of these differ, the list has only their
+    names. Otherwise the rows at all times and the error code IER of the linear solver are compared
+    bit for bit. The list is empty if all results agree.
     """
     counts = (
         ("steps", first.steps, second.steps),
@@ -146,7 +146,8 @@ def ulps(x: Array, y: Array) -> float:
     """Return the largest distance between corresponding elements of two arrays of one shape.
 
     The distance is in units in the last place: the number of steps from one float to the other
-    through all representable floats. It is 0 for two NaNs, and infinite for a NaN and a number.
+    through all representable floats. The distance of two NaNs is 0, and that of a NaN and a number
+    is infinite.
     """
     both_nan = np.isnan(x) & np.isnan(y)
     one_nan = np.isnan(x) ^ np.isnan(y)

@@ -29,7 +29,10 @@ _SAME = 1e-9  # relative difference up to which two times are equal; the step si
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """The result of a candidate (a method, prepared solver or program) for a scene at one time."""
+    """The result at one time when a method, prepared solver or program has solved a scene.
+
+    A prepared solver is made by `prepare` for a single scene.
+    """
 
     omega: Array  # shape (3,), rad/s; NaN if the candidate did not reach the time
     ended: str = "complete"  # how the run ended: "complete", or why there is no full result
@@ -39,22 +42,25 @@ class End:
 
     @property
     def is_refused(self) -> bool:
-        """Return whether a prepared solver refused the scene or exceeded its work limit."""
+        """Return whether a prepared solver can't solve the scene, or exceeded its work limit.
+
+        A prepared solver is made by `prepare` for a single scene.
+        """
         return self.ended in ("refused", "gave up")
 
     @property
     def has_result(self) -> bool:
         """Return whether the method, prepared solver or program reached the requested time.
 
-        The result may nevertheless be "sensitive": its amplified rounding error exceeds the
-        tolerance.
+        A prepared solver is made by `prepare` for a single scene. The result may nevertheless be
+        "sensitive": its amplified rounding error is too large for the relative tolerance.
         """
         return self.ended in WITH_ALL_ROWS
 
 
 @dataclass(frozen=True)
 class Ready:
-    """An integration from time 0 to one time, divided so that only its main part is timed.
+    """An integration from time 0 to one time, in two parts of which only the first is timed.
 
     `run` is the function to time, which integrates without any preparation. `read` converts the
     result of `run` to an End.
@@ -66,9 +72,11 @@ class Ready:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A method with its tolerance, a prepared solver, or a program with its active defects.
+    """A method with its tolerance, a prepared solver, or a program, as one common interface.
 
-    Checks and timings run all three by the same functions.
+    The prepared solver is one that `prepare` makes for a single scene. The program is one of the
+    thesis, with a choice of its defects. Checks and timings run all three kinds of candidates by
+    the same functions.
     """
 
     name: str
@@ -80,7 +88,10 @@ class Candidate:
     rows: Callable[..., Trajectory]
 
     def end(self, scene: Scene, time: float) -> End:
-        """Return the result at one `time` (s); raise InputError if the candidate has none."""
+        """Return the result at one `time` (s); raise InputError if the candidate has none.
+
+        The candidate is a method, a solver prepared for one scene by `prepare`, or a program.
+        """
         ready = self.ready(scene, time)
         return ready.read(ready.run())
 
@@ -89,8 +100,8 @@ def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candid
     """Return a `Candidate` (common interface of solvers) that runs a method by `solve`.
 
     `name` is the name of the method. `tolerance` is relative to the largest component of omega, and
-    `effort` is the factor on the work limit. The candidate's rows include the attitude if the scene
-    has one.
+    `effort` is the factor by which the work limit of the method is multiplied. The candidate's rows
+    include the attitude if the scene has one.
     """
 
     def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
@@ -105,10 +116,10 @@ def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candid
 
 
 def prepared_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a `Candidate` (common interface of solvers) that runs a prepared solver.
+    """Return a `Candidate` (common interface of solvers) that runs a solver made by `prepare`.
 
-    The solver is prepared for a scene and the method `name`. If `primed` is true, the solver is
-    first called with another initial omega. This call must have no effect on the result.
+    The solver is prepared for a single scene and the method `name`. If `primed` is true, the solver
+    is first called with another initial omega. This call must have no effect on the result.
     `tolerance` is relative to the largest component of omega; None selects the default of the
     method. A method with a fixed step, and Gauss collocation, use the scene's step size.
     """
@@ -125,7 +136,8 @@ def prepared_candidate(name: str, tolerance: float | None, primed: bool = False)
 def attitude_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
     """Return a `Candidate` (common interface) that runs a prepared solver for omega and attitude.
 
-    The arguments have the same meanings as those of `prepared_candidate`.
+    A solver that `prepare` makes for a single scene is called a prepared solver. The arguments have
+    the same meanings as those of `prepared_candidate`.
     """
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -157,8 +169,8 @@ def program_candidate(
 ) -> Candidate:
     """Return a `Candidate` (common interface of solvers) that runs a program of the thesis.
 
-    `listing` is the program with its active defects. The other arguments are those of
-    `Program.run`.
+    `listing` is the program with those of its defects that are not corrected. The other arguments
+    are those of `Program.run`.
     """
     options = lipschitz, may_stop, velocity
 
@@ -185,8 +197,8 @@ def program_candidate(
 def unstopped(listing: Listing) -> Candidate:
     """Return a `Candidate` that runs a compiled program of the thesis without its stop test.
 
-    A `Candidate` is a common interface of solvers. `listing` is the program with its active
-    defects. The program does not compute the translational velocity.
+    A `Candidate` is a common interface of solvers. `listing` is the program with those of its
+    defects that are not corrected. The program does not compute the translational velocity.
     """
     return program_candidate(listing, may_stop=False, velocity=False)
 

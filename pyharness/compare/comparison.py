@@ -60,7 +60,7 @@ class ProgramFinding:
 
     @property
     def who(self) -> str:
-        """Return the program's name and its version's label, as in ``two-term original``."""
+        """Return the program's name and its version's label, for example ``two-term original``."""
         return f"{self.listing.program} {self.listing.label}"
 
 
@@ -118,8 +118,8 @@ class Comparison:
     def digits(self) -> float | None:
         """Return the number of correct decimal digits that amplified rounding errors permit.
 
-        The number is a limit for all methods in binary64. It is None if the error amplification is
-        unknown.
+        No method in binary64 can have more correct digits. The number is None if the error
+        amplification is unknown.
         """
         return None if self.growth is None else digits_left(ROUNDING * self.growth)
 
@@ -184,8 +184,8 @@ def compare_programs(
     scene : Scene
         The body, the initial condition, the torque and the steps.
     listings : sequence of Listing, optional
-        The programs to run, each with its active defects; by default all three programs, original
-        and corrected.
+        The programs to run, each with a choice of its defects; by default all three programs,
+        original and corrected.
     lipschitz : float
         The Lipschitz constant of the stop test (1/s), which only the Runge-Kutta program has.
     may_stop : bool
@@ -272,13 +272,13 @@ def listings_for(
 ) -> list[Listing]:
     """Return the listings to compare: for each program the original and the corrected listing.
 
-    A listing is a version of a program, with some of its defects, readings (of doubtful cards) and
-    conjectures (about missing cards) active. `fix` has names of those to correct, and `keep` of
-    those to leave active. If a program has any of these names, the listing with this selection
-    comes between the other two. The selection starts from the listing `base`, ``original`` or
-    ``corrected``. If only `base` is given, without `fix` and `keep`, it is the only listing of each
-    program. `readings` and `conjectures` have the same meaning as in `subset`. Raise InputError for
-    a name that none of `programs` has.
+    A listing is a version of a program: a choice of its defects, of readings (interpretations of
+    doubtful cards) and of conjectures (assumptions about missing cards). `fix` has names of defects
+    to correct, and `keep` names of defects to keep. If a program has any of these defects, the
+    listing with this selection comes between the other two. The selection starts from the listing
+    `base`, ``original`` or ``corrected``. If only `base` is given, without `fix` and `keep`, it is
+    the only listing of each program. `readings` and `conjectures` have the same meaning as in
+    `subset`. Raise InputError for a name that none of `programs` has.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]

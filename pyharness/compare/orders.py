@@ -46,7 +46,7 @@ State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensit
 
 @dataclass(frozen=True)
 class Order:
-    """An order of convergence, measured by halving the step, or the reason why it is unknown."""
+    """A method's order of convergence, measured by halving the step, or why it is unknown."""
 
     due: int  # the expected order, known from theory
     # `as due`: the expected order was observed. `rounding`: before the order could be observed, the
@@ -63,7 +63,7 @@ class Order:
 
     @property
     def is_judged(self) -> bool:
-        """Return whether the measurement decides if the method has its expected order."""
+        """Return whether the measurement decides if the method has its theoretical order."""
         return self.state in ("as due", "rounding", "misses")
 
     def __str__(self) -> str:
@@ -82,8 +82,8 @@ class _SingularError(Exception):
     """The signal that a run failed at a step size for which its matrix may be singular.
 
     If the linear solver LEQT1F finds the collocation matrix singular, the program uses the
-    right-hand sides in place of the solution. The program then is another method, whose order is
-    not measured.
+    right-hand sides in place of the solution. With this substitution the program is another method,
+    whose order is not measured.
     """
 
 
@@ -92,10 +92,10 @@ def measured_order(
 ) -> Order:
     """Measure the order with which omega of a compiled program converges to `truth`.
 
-    `listing` is the program with its active defects. The function `order_of` makes the measurement,
-    and explains `truth`, `pairs` and the result. The state of the result is `sensitive` instead of
-    `misses` if the error may be amplified rounding error. It is `misses` if the program does not
-    converge, but a textbook method of the same order converges.
+    `listing` is the program with those of its defects that are not corrected. The function
+    `order_of` makes the measurement, and explains `truth`, `pairs` and the result. The state of the
+    result is `sensitive` if the error may be amplified rounding error. The state is `misses` if the
+    program does not converge with its order, but a textbook method of the same order does.
     """
 
     def omega(finer: Scene) -> Array:
@@ -131,11 +131,11 @@ def order_of(
 
     `scene` has the largest step size, and `truth` is the reference solution at its times.
     `solution` takes a scene and returns its `quantity` after each step, shape (n, 3), with fewer
-    rows after an overflow. `due` is the expected order. The measurement ends when the order is at
-    least `due` - 0.5 in `pairs` consecutive halvings, when it is smaller in as many halvings, or
-    when the error is only rounding error. There are at most `most_steps` steps; by default at most
-    2**18, or eight halvings if these need more. The result is an Order, which has the measured
-    order and the state of the measurement.
+    rows after an overflow. `due` is the order that theory predicts. The measurement ends when the
+    order is at least `due` - 0.5 in `pairs` consecutive halvings, when it is smaller in as many
+    halvings, or when the error is only rounding error. A run has at most `most_steps` steps; by
+    default at most 2**18, or as many as eight halvings lead to, if these are more. The result is an
+    Order, which has the measured order and the state of the measurement.
     """
     n = len(truth.time)
     if n < scene.steps:
@@ -194,8 +194,8 @@ def _shows(order: float, due: int) -> bool:
 def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
     """Yield the scene with its own step size, with half of it, with a quarter, and so on.
 
-    All these scenes have the same last time. They have at most `most_steps` steps, or, if
-    `most_steps` is None, as many as `order_of` uses by default.
+    All these scenes have the same last time, and at most `most_steps` steps, or, if `most_steps` is
+    None, as many as `order_of` uses by default.
     """
     most = max(_MOST_STEPS, scene.steps << _HALVINGS) if most_steps is None else most_steps
     for halvings in itertools.count():
@@ -213,8 +213,9 @@ def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
 def _fastest(scene: Scene, omega: Array) -> float:
     """Return the fastest rate (rad/s) that a step has to resolve.
 
-    It is the largest angular frequency of the torque's waves, or a bound on the rate at which the
-    equations change a perturbation of the solution `omega` (rad/s), whichever is larger.
+    The rate is the larger of two: the largest angular frequency of the torque's sines and cosines,
+    and a bound on the rate at which Euler's equations change a perturbation of the solution `omega`
+    (rad/s).
     """
     sizes = np.abs(np.vstack([scene.omega, omega]))
     others = np.roll(sizes, -1, axis=1) + np.roll(sizes, -2, axis=1)

@@ -32,10 +32,10 @@ _MARKERS: dict[str, dict[str, Any]] = {
 def comparison_picture(comparison: Comparison) -> Picture:
     """Return the picture of a comparison of programs, and the table of numbers that it shows.
 
-    Each program has a column of panels. Three panels show the components of omega (rad/s) over
-    time, for the versions of the program and for the reference solution. A panel below shows the
-    error of omega (rad/s). If attitudes were requested, another panel shows the error of the
-    attitude (rad).
+    Each program has a column of panels. Three panels show the three components of omega (rad/s) as
+    functions of time, for the versions of the program and for the reference solution. A panel below
+    shows the error of omega (rad/s). If attitudes were requested, another panel shows the error of
+    the attitude (rad).
     """
     from matplotlib.figure import Figure
 

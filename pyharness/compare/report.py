@@ -33,8 +33,9 @@ _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 def comparison_report(comparison: Comparison) -> Report:
     """Return the report of a comparison of programs and methods with the reference solution.
 
-    The methods are those of SciPy's `solve_ivp`. The report says whether all results are as
-    expected.
+    The methods are those of SciPy's `solve_ivp`. The report also says whether Fortran and the
+    Python port of each program agree, and whether the corrected programs converge with their
+    orders.
     """
     in_floats = comparison.word == BINARY64
     scene, truth = heading(comparison.scene), comparison.reference
@@ -90,9 +91,11 @@ def comparison_report(comparison: Comparison) -> Report:
 def verdict(comparison: Comparison) -> list[str]:
     """Return sentences that say whether the results of a comparison are as expected.
 
-    If all results are as expected, the first sentence says so; otherwise there is a sentence for
-    each unexpected result. A further sentence says if the scene is sensitive to rounding errors. A
-    sentence names each corrected program whose order of convergence could not be determined.
+    Expected is that Fortran and the Python port of each program agree, and that the corrected
+    programs converge with their orders. The first sentence says if all results are as expected;
+    otherwise there is a sentence for each unexpected result. A further sentence says if the scene
+    is sensitive to rounding errors. A sentence names each corrected program whose order of
+    convergence could not be determined.
     """
     told = [f"UNEXPECTED: {each}" for each in comparison.unexpected] or [_as_expected(comparison)]
     if comparison.is_sensitive:

@@ -28,11 +28,11 @@ def seconds(
     """Return the time of one call of each function in `runs` (s), measured in several rounds.
 
     In each of the `rounds` rounds, each function is called repeatedly for about `length` seconds. A
-    first call before the rounds is not counted. If this first call takes longer than `slow` (s),
-    the function is timed in at most three rounds. If it takes longer than five times `slow`, the
-    function is timed in one round. The result is the median of the times of the rounds, or another
-    `statistic`. `say` is called with a message at the beginning of each round. `clocks` has a clock
-    (s) for each function; by default it is the wall clock.
+    first call before the rounds is not counted. A function whose first call takes longer than
+    `slow` (s) is timed in at most three rounds. A function whose first call takes longer than five
+    times `slow` is timed in one round. The result is the median of the times of the rounds, or
+    another `statistic`. `say` is called with a message at the beginning of each round. `clocks` has
+    a clock (s) for each function; by default it is the wall clock.
     """
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))
@@ -73,8 +73,9 @@ def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> floa
 def ended_after(limit: float) -> Iterator[None]:
     """Raise RuntimeError in a ``with`` block of Python code that takes longer than `limit` (s).
 
-    If a compiled function is running then, the error is raised after its end. Only the main thread
-    may use this context manager, because only the main thread receives signals.
+    If a compiled function is running at the limit, the error is raised after the function has
+    ended. Only the main thread may use this context manager, because only the main thread receives
+    signals.
     """
 
     def end(*_: object) -> None:

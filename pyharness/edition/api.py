@@ -20,7 +20,7 @@ class Item(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A public name on the API page: its signature, its docstring in parts, its methods if a class.
+    """A public name on the API page: its signature, its docstring in parts, the methods of a class.
 
     `anchor` is the anchor of the name in the page, and `kind` is "function", "class" or "property".
     `summary` is the first line of the docstring, `text` has the further paragraphs, and `groups`

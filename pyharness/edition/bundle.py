@@ -23,7 +23,7 @@ def bundle(entry: Path) -> str:
 
     The script runs inside a function, so that it defines no global names. Raise ValueError, with
     file and line, for an unsupported form of import or export, and for an import of a missing file
-    or name. Modules that import each other are refused too.
+    or name. Also raise ValueError if modules import each other.
     """
     exports: dict[Path, list[str]] = {}
     parts: list[str] = []

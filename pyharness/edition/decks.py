@@ -95,8 +95,8 @@ def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
 def _scan(card: Card) -> list[Run] | None:
     """Return the line of the scan that shows a card, as runs of characters.
 
-    The runs are the card number, a dash and the text without blanks. Return None if the scan lacks
-    the card.
+    The runs are the card number, a dash, and one or more runs for the text without blanks. Return
+    None if the scan lacks the card.
     """
     if card.lost:
         return None

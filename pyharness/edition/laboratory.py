@@ -59,7 +59,7 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the JSON values with which the script of a web page runs any case and program.
+    """Return the JSON values with which a web page's script runs any program on any case.
 
     The page, the laboratory, runs the programs of the thesis in the browser.
     """
@@ -98,8 +98,8 @@ def _first() -> dict[str, Any]:
     """Return the values with which the web page shows the run that `DEFAULTS` specifies.
 
     The values include how the run ended, its first and last rows, and the largest error of omega
-    (rad/s) against the reference solution. They also include the page that the program prints, and
-    the command that repeats the run.
+    (rad/s) against the reference solution. The values also include the page that the program
+    prints, and the command that repeats the run.
     """
     scene = case_scene(DEFAULTS["case"])
     program = DEFAULTS["program"]
@@ -126,8 +126,8 @@ def _row(run: Trajectory, number: int, error: float) -> list[str]:
 
     `number` is the index of the step, from 0. The cells are the number of the step, the time (s),
     omega (rad/s), the translational velocity (m/s), and the variable TIME of the program (s). The
-    cell for IER, an error code of the collocation programs, is empty. The last cell is `error`, the
-    error of omega (rad/s).
+    next cell, for the error code IER of the collocation programs, is empty. The last cell is
+    `error`, the error of omega (rad/s).
     """
     assert run.velocity is not None
     values = [run.time[number], *run.omega[number], *run.velocity[number]]

@@ -74,7 +74,7 @@ def kinds(judged: Sequence[Judgement]) -> Markup:
 
 
 def account() -> dict[str, Markup]:
-    """Return, by identifier, the texts that occur both in pages and in documents, as HTML.
+    """Return, by identifier, the texts that both web pages and documents have, as HTML.
 
     The texts are the statements in ``data/account.toml``, and the descriptions in
     ``data/apparatus.toml`` of the effects of single defects.

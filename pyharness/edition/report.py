@@ -15,9 +15,9 @@ _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
     """Return the JSON record of the web site that the command `pyharness edition` writes.
 
-    The key `build` has the versions, compiler and flags of the installation that wrote the site.
-    The key `files` has the size of each file in bytes, by its path. `content` maps the path of each
-    file to its content.
+    The key `build` has the versions, the compiler and the compiler flags of the installation that
+    wrote the site. The key `files` has the size of each file in bytes, by its path. `content` maps
+    the path of each file to its content.
     """
     return {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
 

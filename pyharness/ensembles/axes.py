@@ -76,7 +76,7 @@ class Axis:
     def coordinates(self) -> NDArray[Any]:
         """Return all values of the axis: names, or floats in the unit of the varied quantity.
 
-        The array has shape (count,). It is cached, so callers must not change it.
+        The array has shape (count,). The array is cached, so callers must not change it.
         """
         return _coordinates(self)
 
@@ -123,7 +123,8 @@ def _between(first: float, last: float, made: Callable[[float, float], Floats]) 
     """Return ``made(first, last)``, but without an overflow if `last - first` is not finite.
 
     `made` is a function that returns values between two ends, for example evenly spaced values. If
-    the difference overflows, `made` is called with halved ends, and its values are doubled.
+    the difference of the ends overflows, `made` is called with halved ends, and its values are
+    doubled.
     """
     if math.isfinite(last - first):
         return made(first, last)
@@ -229,8 +230,8 @@ def _checked(where: str, axis: Axis) -> Axis:
 
     The field, which is the quantity that varies along the axis, determines the allowed values. The
     extreme values are the smallest and the largest of the listed or normally distributed values;
-    for other axes they are the ends of the range. The distribution `sphere` is not checked. `where`
-    is the beginning of the error message.
+    for other axes they are the ends of the range. The distribution `sphere` is not checked, because
+    it has no parameters. `where` is the beginning of the error message.
     """
     field = NUMBERS[axis.field]
     if axis.how == "sphere":

@@ -20,10 +20,10 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
     """Return the listing of a program that the fields `listing` and `reading` of a sweep describe.
 
     A listing is a program with a choice of its defects and readings (interpretations of doubtful
-    cards). `listing` is ``original`` (all defects), ``corrected`` (no defect), ``fix:`` with the
-    only defects to correct, or ``keep:`` with the only defects to keep. `reading` is ``adopted``,
-    or the names of readings to activate that this edition does not adopt. Several names are joined
-    by ``+``. Raise InputError for an unknown name.
+    cards). `listing` is ``original`` (all defects), ``corrected`` (no defect), ``fix:`` followed by
+    the only defects to correct, or ``keep:`` followed by the only defects to keep. `reading` is
+    ``adopted``, or the names of readings to activate that this edition does not adopt. Several
+    names are joined by ``+``. Raise InputError for an unknown name.
     """
     how, _, names = listing.partition(":")
     readings = [] if reading == "adopted" else reading.split("+")
@@ -35,7 +35,7 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 
 
 def looped_fields(sweep: Sweep) -> list[str]:
-    """Return the names of the varied quantities that are equal in all scenes of a batch.
+    """Return the names of the varied quantities that must be equal in all scenes of a batch.
 
     A sweep solves a grid of scenes. A batch is a set of scenes that are solved in one call. The
     function `batches` makes a batch for each combination of the values of these quantities.
@@ -107,8 +107,8 @@ def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
 
     The kind is `moments` (of inertia, kg m2) or `coefficients` (A, B, C of Euler's equations). The
     numbers have the shape (n, 3). `scene` has the values that do not vary between the scenes. `own`
-    maps the name of each varied quantity to its n values. If the body does not vary, the kind is
-    empty and the numbers are None.
+    maps the name of each varied quantity to its n values. If no axis of the sweep varies the body,
+    the kind is empty and the numbers are None.
     """
     if scene.coefficients is not None:
         found = _three("body.coefficients", scene.coefficients, own, n)

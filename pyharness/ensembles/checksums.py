@@ -18,7 +18,7 @@ _PIECE = 1 << 20  # bytes read at once
 
 
 class DamageError(Exception):
-    """The error that a file in a store, the folder with a sweep's results, is not as written.
+    """The error that a file in a sweep's folder of results differs from what was written.
 
     The message names the file and the damage.
     """
@@ -91,7 +91,7 @@ def check_files(
 def read_bounded(folder: Path, name: str, limit: int) -> bytes:
     """Return the content of the file `name` in the folder `folder` of a store (a sweep's results).
 
-    Raise DamageError if the file is missing, is no regular file, or has more than `limit` bytes.
+    Raise DamageError if the file is missing, is not a regular file, or has more than `limit` bytes.
     """
     handle = _opened(folder, name, limit)
     try:
@@ -163,8 +163,9 @@ def exists(folder: Path, name: str) -> bool:
 def clear(folder: Path, name: str) -> None:
     """Remove any file or folder at the path `name` in `folder`, so that a file can be written.
 
-    `folder` is the folder of a sweep's results. A file in the place of one of the parent folders of
-    `name` is removed too. If a link is at the path, the link is removed, but not its target.
+    `folder` is the folder of a sweep's results. If a file is in the place of one of the parent
+    folders of `name`, this file is removed too. If a link is at the path, the link is removed, but
+    not its target.
     """
     path = folder
     for part in Path(name).parts[:-1]:

@@ -14,7 +14,7 @@ from multiprocessing import connection, resource_tracker
 def deaf_children() -> Iterator[None]:
     """Block Ctrl-C (SIGINT) in all processes and threads that are started within this context.
 
-    A terminal sends SIGINT to all of its processes, but only the parent process is to handle the
+    A terminal sends SIGINT to all of its processes, but only the parent process should react to the
     signal. The signal is also blocked in the thread that enters the context. If a signal arrives
     during the context, this thread receives it when the context ends.
     """
@@ -46,8 +46,8 @@ def _start_tracker() -> None:
 def end_with_parent() -> None:
     """Start a thread that ends this process as soon as its parent process has ended.
 
-    The reason for the end of the parent process does not matter. A process without a parent process
-    starts no thread.
+    The reason for the end of the parent process does not matter. If this process has no parent
+    process in `multiprocessing`, no thread is started.
     """
     parent = multiprocessing.parent_process()
     if parent is None:

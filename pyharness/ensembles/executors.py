@@ -55,8 +55,9 @@ def engine(
     The executor ends when the context ends. `executor` is ``here`` (this process), ``processes`` or
     ``dask``. `workers` is the number of processes, by default the number of processors. `address`
     is the address of a Dask scheduler; without it, the executor `dask` starts a cluster on this
-    machine. Raise InputError if no scheduler with a worker answers at the address. The iterator
-    over the results raises InputError if no process or worker is left to compute them.
+    machine. Raise InputError if no scheduler with a worker answers at the address. While results
+    are read from the `Engine`, InputError is raised if no process or worker is left to compute
+    them.
     """
     if executor == "here":
         yield Engine(1, _here, is_here=True)

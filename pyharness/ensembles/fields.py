@@ -18,10 +18,10 @@ class Field:
     """A number of a scene, or of its solver, that an axis of a sweep's grid of scenes may vary.
 
     `units` is the unit of the number and `title` its description. The function `takes` returns
-    whether a value is allowed, and `allowed` describes the allowed values. If `looped`, all scenes
-    that one call solves must have the same value. Two of these fields (`OF_PROGRAMS` in
-    `pyharness.methods.batch`) are an exception, because programs accept an array of values. If
-    `whole`, values are rounded to integers.
+    whether a value is allowed, and `allowed` describes the allowed values. If `looped` is true, all
+    scenes that one call solves must have the same value of this number. Only the programs of the
+    thesis also accept an array of values of two of these numbers, step size and Lipschitz constant.
+    If `whole` is true, values are rounded to integers.
     """
 
     units: str

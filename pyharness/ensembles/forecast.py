@@ -30,12 +30,12 @@ _FILES = 20  # largest number of chunks that are solved, or written and read, fo
 
 @dataclass(frozen=True)
 class Estimate:
-    """The expected cost of computing the missing chunks of a sweep.
+    """The estimated cost of computing the missing chunks of a sweep.
 
     A chunk is a block of the sweep's grid of scenes. `n_scenes` and `n_chunks` count the scenes and
     chunks of the whole sweep, and `n_missing` the chunks to compute. `n_bytes` is the size of the
     missing chunks on disk, before compression. `memory` is the memory that all workers need
-    together, in bytes. `seconds` is the expected duration (s).
+    together, in bytes. `seconds` is the estimated duration (s).
     """
 
     n_scenes: int
@@ -50,9 +50,9 @@ def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
     """Return the seconds to solve and write the missing chunks of a sweep, and to read all chunks.
 
     A chunk is a block of the sweep's grid of scenes. `path` is the folder of the results,
-    `n_missing` the number of chunks that it lacks, and `own` the engine that computes them. If
-    other processes compute the chunks, this process writes them at the same time. In this case only
-    the longer of the times to solve and to write counts.
+    `n_missing` the number of chunks that it lacks, and `own` the started executor that computes
+    them. If other processes compute the chunks, this process writes them at the same time. In this
+    case only the longer of the times to solve and to write counts.
     """
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
@@ -107,8 +107,8 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 def seconds_per_chunk(sweep: Sweep) -> float:
     """Return the seconds to solve a chunk, which is a block of a sweep's grid, in this process.
 
-    They are computed from the measured time of sample scenes. If the result is below 0.2 s, whole
-    chunks are measured instead.
+    The seconds are computed from the measured time of sample scenes. If the result is below 0.2 s,
+    the time of whole chunks is measured instead.
     """
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)
@@ -148,10 +148,10 @@ def seconds_per_scene(sweep: Sweep) -> float:
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """Return the indices of sampled scenes, changed so that many of the scenes share a batch.
 
-    A batch is a set of scenes that are solved in one call; they must have the same value along some
-    dimensions of the grid. `where` has the indices of the scenes: an array for each dimension, as
-    the result. Along those dimensions the indices are changed to at most five distinct values. The
-    batches of the sample then have many scenes, as in a real computation.
+    A batch is a set of scenes that are solved in one call, and that must have the same index along
+    some dimensions of the grid. `where` has the indices of the scenes: an array for each dimension,
+    as the result. Along those dimensions the indices are changed to at most five distinct values.
+    The batches of the sample then have many scenes, as in a real computation.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found = []

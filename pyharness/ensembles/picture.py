@@ -32,9 +32,10 @@ _ORDERS = 3.0
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
     """Return the reduction (quantity stored for each scene) of a sweep that the picture shows.
 
-    It is the reduction `name`. If `name` is None, it is the first reduction with numerical values.
-    If the values of all reductions are codes of outcomes, as for `status`, it is the first
-    reduction. Raise InputError if the sweep has no reduction `name`.
+    The picture shows the reduction `name`. If `name` is None, the picture shows the first reduction
+    whose values are not codes of outcomes, as those of `status` are. If all reductions have such
+    codes, the picture shows the first reduction. Raise InputError if the sweep has no reduction
+    `name`.
     """
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
@@ -46,9 +47,9 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     """Return the picture of the reduction `asked`, a quantity stored for each scene of a sweep.
 
-    `store` has the values. The picture is a map over two dimensions of the sweep's grid. They are
-    the last two dimensions with several numbers that are not random. If there are fewer than two
-    such dimensions, the picture is a line or dots.
+    `store` has the values. The picture is a map over two dimensions of the sweep's grid. These are
+    the last two dimensions that have several values, all of them numbers and not random. If there
+    are fewer than two such dimensions, the picture is a line or dots.
     """
     from matplotlib.figure import Figure
 

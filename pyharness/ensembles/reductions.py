@@ -261,10 +261,11 @@ REDUCTIONS = {
 
 
 def empty(asked: ReductionSpec, n: int) -> Found:
-    """Return an array for the values of the reduction `asked` in n scenes, all marked missing.
+    """Return an array for the values of a reduction in n scenes, with all values marked missing.
 
-    A reduction is a quantity that a sweep stores for each scene. Missing values are NaN, or -1 in
-    an integer array. The shape is (n,), or (n, components) if the quantity has several components.
+    A reduction is a quantity that a sweep stores for each scene; `asked` is the requested one.
+    Missing values are NaN, or -1 in an integer array. The shape is (n,), or (n, components) if the
+    quantity has several components.
     """
     reduction = REDUCTIONS[asked.reduction]
     shape = (n, len(reduction.labels)) if reduction.labels else (n,)
@@ -274,8 +275,8 @@ def empty(asked: ReductionSpec, n: int) -> Found:
 def reduced(asked: ReductionSpec, batch: Batch) -> Found:
     """Compute the reduction `asked`, a quantity to store, for each scene of a batch.
 
-    Return an array with a row for each scene. A row is a single value if the quantity has only one
-    component.
+    A batch is a set of scenes that are solved in one call. Return an array with a row for each
+    scene. A row is a single value if the quantity has only one component.
     """
     given = {**dict(asked.parameters), "function": asked.function}
     # NumPy's warnings are suppressed, because infinities and NaN are valid results.

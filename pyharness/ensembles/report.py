@@ -46,11 +46,12 @@ class Found(NamedTuple):
 
 
 def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
-    """Return statistics of a stored quantity over all scenes of a sweep, for each component.
+    """Return statistics of a stored quantity, for each component, and counts of its integer values.
 
-    `asked` is the quantity, and `store` has its values. If the values are integers that represent
-    outcomes, as for `status`, there are no statistics, and the second result counts the scenes with
-    each integer. For other quantities the second result is empty. The values are read in blocks.
+    `asked` is the quantity, and `store` has its values. The statistics are over all scenes of a
+    sweep. If the values are integers that represent outcomes, as for `status`, the statistics are
+    empty, and the counts have the number of scenes with each integer. For other quantities the
+    counts are empty. The values are read in blocks.
     """
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)

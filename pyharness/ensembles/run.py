@@ -51,7 +51,7 @@ def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int
     A chunk is a block of the sweep's grid of scenes. `missing` is the number of missing chunks,
     `path` the folder of the results, and `workers` the number of processes. Raise InputError if the
     free disk space or half of the machine's memory is too small, or if there are too many chunks.
-    The check allocates no arrays, so that even the largest grid is refused at once.
+    The check allocates no arrays, so that it takes no noticeable time even for the largest grid.
     """
     n_bytes = sweep.n_scenes * bytes_per_scene(sweep) * missing // sweep.n_chunks
     shown = f"{short_count(sweep.n_scenes)} scenes in {short_count(sweep.n_chunks)} chunks"

@@ -177,9 +177,9 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
     """Make or open the store (result folder) of a sweep, lock it, check it, and yield it.
 
     The lock excludes other processes. Raise InputError if the folder `path` is the store of another
-    sweep, no store, or a damaged store; its files are then not changed. With `repair`, damage is
-    not an error: damaged chunks (blocks of the results) are removed and count as not computed yet,
-    and damaged metadata are written again.
+    sweep, is no store, or is a damaged store; its files are then not changed. With `repair`, damage
+    is not an error: damaged chunks (blocks of the results) are removed and count as not computed
+    yet, and damaged metadata are written again.
     """
     check_zarr()
     folder = Path(path)
@@ -279,8 +279,8 @@ def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
 def _make(sweep: Sweep, folder: Path) -> None:
     """Make a folder for the results of a sweep under a temporary name, and rename it to `folder`.
 
-    At any time, `folder` is therefore either missing, or has all metadata of the sweep. It has no
-    results yet.
+    Because of the renaming, `folder` is at any time either missing, or has all metadata of the
+    sweep. The folder has no results yet.
     """
     with filled(sweep, folder) as new:
         try:
@@ -297,8 +297,8 @@ def _make(sweep: Sweep, folder: Path) -> None:
 def scratch(sweep: Sweep, path: str) -> Iterator[Store]:
     """Yield a temporary store (result folder) of a sweep, without results.
 
-    The store is in the folder that contains `path`, and is removed when the context ends. It is
-    used to measure the speed of the disk.
+    The temporary store serves to measure the speed of the disk. It is in the folder that contains
+    `path`, and is removed when the context ends.
     """
     with filled(sweep, Path(path)) as new:
         yield Store(sweep, new)

@@ -46,9 +46,9 @@ def label(sweep: Sweep) -> Label:
 def labels(folder: Path) -> list[Label]:
     """Return the identities that two files in `folder`, a folder of a sweep's results, state.
 
-    An identity is the format, the pyharness version and the SHA-256 of the sweep. One is in the
-    metadata, and one in the first line of the file with the checksums of the metadata. An identity
-    that can't be read is left out. In an undamaged folder both are equal.
+    An identity is the format, the pyharness version and the SHA-256 of the sweep. One identity is
+    in the metadata, and the other in the first line of the file with the checksums of the metadata.
+    An identity that can't be read is left out. In an undamaged folder the two identities are equal.
     """
     found = []
     with contextlib.suppress(

@@ -85,10 +85,11 @@ class Sweep:
     def chunk_shape(self) -> tuple[int, ...]:
         """Return the number of scenes of a chunk along each dimension of the grid.
 
-        A chunk is a block of the grid that is computed and stored at once. It covers some of the
-        last dimensions completely, and the dimension before them in part. Along earlier dimensions
-        it has length 1. It also has length 1 along dimensions of programs, methods, listings
-        (versions of a program) or readings, so that all of its scenes have the same solver.
+        A chunk is a block of the grid that is computed and stored at once. A chunk covers some of
+        the last dimensions completely, and the dimension before them in part. Along earlier
+        dimensions a chunk has length 1. It also has length 1 along dimensions of programs, methods,
+        listings (versions of a program) or readings, so that all of its scenes have the same
+        solver.
         """
         single = {axis.dimension for axis in self.axes if axis.is_choice}
         room = self.chunk

@@ -105,7 +105,8 @@ def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
     """Return the scene from which all scenes of a sweep are made, and the bytes of its scene file.
 
     `table` is the table [scene] of the sweep file, and `path` the path of the sweep file. The bytes
-    are empty if the table names no scene file. Otherwise they begin with an additional zero byte.
+    are empty if the table names no scene file. Otherwise the bytes begin with an additional zero
+    byte, which separates them from the sweep file's text in the sweep's SHA-256.
     """
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
@@ -268,8 +269,8 @@ def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
     """Yield each combination of program, method, listing and reading that occurs on the axes.
 
     A listing is a version of a program, and a reading an interpretation of doubtful cards. A
-    combination maps those of these fields that are on axes to their names. Axes with the same
-    dimension vary together.
+    combination has the names of the program, method, listing and reading, as far as axes of the
+    sweep's grid vary them. Axes with the same dimension vary together.
     """
     words = [axis for axis in axes if axis.is_choice]
     counts = {axis.dimension: axis.count for axis in words}
@@ -279,7 +280,7 @@ def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
 
 
 def _check_solvers(sweep: Sweep) -> None:
-    """Raise InputError if the sweep has an unknown program, method, listing or reading.
+    """Raise InputError if a sweep names an unknown program, method, listing or reading.
 
     A listing is a version of a program, and a reading an interpretation of doubtful cards. Also
     raise InputError if a method does not allow the tolerance, or if an end time `t_end` is 0.

@@ -30,7 +30,8 @@ class Effect:
     A listing is a program with a choice of its defects. `omega` (rad/s) and `velocity`
     (translational, m/s) are the largest errors of any component over the completed `steps`, against
     the reference solution. `ended` is how the run ended, for example ``complete`` or ``overflow``.
-    `stop` is the variable and step at which the stop test ended the run, or None.
+    `stop` is the variable and step at which the Lipschitz test of the Runge-Kutta program ended the
+    run, or None.
     """
 
     listing: Listing
@@ -102,8 +103,8 @@ def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0
 def case_truth(case: int) -> Reference:
     """Return the reference solution of a case at the end of each step, with translational velocity.
 
-    `case` is the number of a case in Table 1 of the thesis. The solution is computed once and
-    cached.
+    `case` is the number of one of the seven cases in Table 1 of the thesis. The solution is
+    computed once and cached.
     """
     scene = case_scene(case)
     return reference(scene, scene.times(), velocity=True)
@@ -112,11 +113,11 @@ def case_truth(case: int) -> Reference:
 def effects_of(name: str) -> Iterator[CaseEffects]:
     """Yield the effect of the apparatus entry `name` in each of its programs, case by case.
 
-    The entry must have a switch in the programs. For a defect, `CaseEffects` describes the four
-    listings (versions of the program). A reading (interpretation of a doubtful card) and a
-    conjecture (assumption where no card exists) have other listings. `original` and
-    `corrected_alone` are the original listing with and without the entry, and `kept_alone` and
-    `corrected` are the corrected listing with and without it. No listing has a reading by default.
+    The entry must have a switch in the programs. The effect is shown by four listings (versions of
+    the program), which `CaseEffects` describes for a defect. For a reading (interpretation of a
+    doubtful card) or a conjecture (assumption where no card exists), the fields `original` and
+    `corrected_alone` have the original program with and without the entry. The fields `kept_alone`
+    and `corrected` have the corrected program with and without the entry.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -147,8 +148,8 @@ def lattice(
     The errors are of omega against the reference solution, and an overflow counts as infinite. The
     subsets also include or omit each of the `readings` (interpretations of doubtful cards). If the
     torque varies, they also include or omit the original program's conjectures (assumptions where
-    no card exists). A reading has no effect on a corrected statement. `effort` is a factor on the
-    work limit.
+    no card exists). A reading of a statement has no effect if a defect of this statement is
+    corrected. `effort` is a factor on the work limit.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)

@@ -41,8 +41,8 @@ _HALF = 48  # width, in characters, of each of two texts printed side by side
 def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
     """Return the report of the critical apparatus, with a line for each entry.
 
-    An entry describes a doubtful or faulty passage of the printed programs. Its line has the name,
-    kind, certainty, flag (number of the switch in the programs) and summary.
+    An entry describes a doubtful or faulty passage of the printed programs. The line of an entry
+    has its name, kind, certainty, flag (number of the switch in the programs) and summary.
     """
     rows = [
         [each["id"], each["kind"], each["certainty"], each.get("flag", "-"), each["summary"]]
@@ -89,7 +89,8 @@ def entry_report(
 def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
     """Return lines with two of the `texts` side by side.
 
-    `heads` are two arguments: the keys of the two texts, and also the headings above them.
+    Two further arguments, `heads`, are the keys of the two texts to show, and also the headings
+    above them.
     """
     columns = [[head, "-" * _HALF, *textwrap.wrap(texts[head], _HALF)] for head in heads]
     pairs = zip_longest(*columns, fillvalue="")
@@ -97,12 +98,12 @@ def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
 
 
 def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
-    """Return a legend, and for each program a table with the errors and stops of four listings.
+    """Return a legend, and for each program a table of the errors of four of its versions.
 
-    A listing is a version of the program; a table has a row for each case. `is_reading` is true if
-    the effects are those of an interpretation of a doubtful card, or of an assumption where no card
-    exists. The legend then describes the listings as original and corrected, each with and without
-    it.
+    A table has a row for each case. A row also shows where the Lipschitz test stopped a run.
+    `is_reading` is true if the effects are those of an interpretation of a doubtful card, or of an
+    assumption where no card exists. The legend then describes the listings as original and
+    corrected, each with and without it.
     """
     columns = ("original", "this alone corrected", "this alone kept", "all corrected")
     if is_reading:
@@ -129,8 +130,9 @@ def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Repor
     """Return the report of every subset of each program's defects, with the errors it causes.
 
     `scene` is the scene that was run. `found` maps each program to its outcomes, in the order in
-    which the report shows them. The report writes a subset as letters: one for each active defect,
-    reading (interpretation of a doubtful card) or conjecture (assumption where no card exists).
+    which the report shows them. The report writes a subset as letters: one for each defect, reading
+    (interpretation of a doubtful card) or conjecture (assumption where no card exists) that the
+    program has in this run.
     """
     text: list[Section] = []
     rows = []

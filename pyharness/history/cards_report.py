@@ -66,12 +66,13 @@ def card_record(card: Card) -> dict[str, Any]:
 def scan_report(
     faults: Sequence[str], undeclared: Sequence[str], lines: int, digest: str
 ) -> Report:
-    """Return the report on whether our tables explain every line of a scan of the printed programs.
+    """Return the report on whether our text of the programs explains every line of a scan of them.
 
-    `faults` has a sentence for each line in which the scan and the tables disagree. `undeclared`
-    has a sentence for each disagreement between the cards and the apparatus entries, which describe
-    doubtful or faulty cards. `lines` is the number of lines that the tables expect, and `digest`
-    the SHA-256 of the scan.
+    The text is our tables of the cards and of their differences from the scan. `faults` has a
+    sentence for each line in which the scan and these tables disagree. `undeclared` has a sentence
+    for each disagreement between the cards and the apparatus entries, which describe doubtful or
+    faulty cards. `lines` is the number of lines that the tables expect, and `digest` the SHA-256 of
+    the scan.
     """
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)

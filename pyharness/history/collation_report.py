@@ -17,10 +17,11 @@ _COLUMNS = (
 
 
 def collation_report(found: Sequence[Row]) -> Report:
-    """Return the report on whether the decks and the text of the thesis agree on each operation.
+    """Return the report on whether the three decks agree with each other and with the thesis.
 
     A deck consists of the cards of one of the three programs. Each row of `found` is one operation
-    of the programs, with the reason for any disagreement.
+    of the programs. It states whether the decks' statements agree, whether they agree with the text
+    of the thesis, and the reason for any disagreement.
     """
     told = faults([*found])
     rows = [

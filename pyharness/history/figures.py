@@ -266,9 +266,9 @@ def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
     """Draw omega1 of a figure of the original programs and of a corrected figure in one picture.
 
     The figure of the original programs, `first`, must contain a limit: the curve to which a program
-    converges as its step size goes to zero. It shows approximately how omega1 of a run that ended
-    early would have continued. Of the figure of the corrected programs, `second`, only the last
-    curve is drawn, because its other curves would cover the same line.
+    converges as its step size goes to zero. This limit shows approximately how omega1 of a run that
+    ended early would have continued. Of the figure of the corrected programs, `second`, only the
+    last curve is drawn, because its other curves would cover the same line.
     """
     from matplotlib.figure import Figure
 
@@ -322,8 +322,9 @@ def _draw(
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
     """Return the bottom and top (rad/s) of the vertical axis in the plot of one omega component.
 
-    `row` is the component: 0, 1 or 2. All curves of `finding` that stay near the reference solution
-    are within the axis. A curve that diverges may leave the frame.
+    `row` is the component: 0, 1 or 2. The range contains the reference solution and the curves of
+    `finding`. A curve counts as diverging if its distance from the reference's range of values
+    exceeds the largest |omega| of the reference. Such a curve may leave the plot.
     """
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())

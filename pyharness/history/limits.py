@@ -124,7 +124,7 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
 def limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float = 1.0
 ) -> Array:
-    """Return the omega (rad/s) to which an original program tends as its step goes to zero.
+    """Return the limit of an original program's omega (rad/s) as its step size goes to zero.
 
     The shape is (times, 3); rows are NaN where the program has no limit. `program` is the program
     as printed. `truth` is the reference solution at `times` (s). `effort` multiplies the work limit

@@ -50,8 +50,8 @@ class Fit:
     case : int
         The number of the case of our page in Table 1.
     fields : int
-        How many numbers are compared. A number at a place where the other page has none is
-        included.
+        How many numbers are compared. A number is also counted if the other page has none at its
+        place.
     differences : tuple of Difference
         The numbers that the two pages print differently.
     """
@@ -157,9 +157,9 @@ def _numbers(text: str) -> list[list[str]]:
 def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
     """Return the report on which program, listing and arithmetic print the page in file `path`.
 
-    `found` has the comparisons of this page with the pages of our programs, the page with the
-    fewest differences first. If every comparison has differences, the report shows the first
-    differences from the first page.
+    A listing is the original or the corrected form of a program. `found` has the comparisons of
+    this page with the pages of our programs, the page with the fewest differences first. If every
+    comparison has differences, the report shows the first differences from the first page.
     """
     best = found[0]
     whole = [each for each in found if each.is_whole]

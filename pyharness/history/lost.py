@@ -33,7 +33,7 @@ TERMS = 2
 
 @dataclass(frozen=True)
 class Attempt:
-    """The result of one method, programmed with one mistake, on Cases 1 and 2 of Table 1.
+    """The result of one method, programmed with one mistake, on Cases 1 and 2 of the thesis.
 
     `weighting` names the weighted residual method. `mistake` is the identifier of the mistake in
     `data/lost.toml`. The solutions of both cases are known. `shares` maps a case to the largest
@@ -49,10 +49,11 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A conjectured mistake in lost programs, with its results: an `Attempt` for each weighting.
+    """A mistake that lost programs of the thesis may have had, with its results.
 
-    A weighting defines a weighted residual method. `mistake` is the identifier of the mistake, and
-    `summary` its description, in `data/lost.toml`.
+    A weighting defines a weighted residual method, and its `Attempt` the errors of this method,
+    programmed with the mistake. `mistake` is the identifier of the mistake, and `summary` its
+    description, in `data/lost.toml`.
     """
 
     mistake: str
@@ -63,7 +64,8 @@ class Ranked:
     def in_both(self) -> int:
         """Return how many weighted residual methods fail, with this mistake, in both cases.
 
-        The cases are Case 1 and Case 2.
+        The cases are Cases 1 and 2 of Table 1 of the thesis. A method fails in a case if its error
+        exceeds a tenth of the largest omega.
         """
         return sum(len(each.failed) == len(CASES) for each in self.attempts)
 
@@ -71,18 +73,20 @@ class Ranked:
     def in_either(self) -> int:
         """Return how many weighted residual methods fail, with this mistake, in at least one case.
 
-        The cases are Case 1 and Case 2.
+        The cases are Cases 1 and 2 of Table 1 of the thesis. A method fails in a case if its error
+        exceeds a tenth of the largest omega.
         """
         return sum(bool(each.failed) for each in self.attempts)
 
 
 def ranked(word: str = BINARY64) -> list[Ranked]:
-    """Run every method with every conjectured mistake, in the arithmetic named `word`.
+    """Run each method with each mistake that its lost program may have had, in arithmetic `word`.
 
-    The methods are the weighted residual methods `WEIGHTINGS`, on Cases 1 and 2. A method fails in
-    a case if its error exceeds a tenth of the largest omega. Return the mistakes, sorted by the
-    number of methods that fail with them in both cases, the largest number first. Mistakes with
-    equal numbers are sorted by the number of methods that fail in at least one case.
+    The methods are the weighted residual methods `WEIGHTINGS`, on Cases 1 and 2 of Table 1 of the
+    thesis. `word` is the name of the arithmetic. A method fails in a case if its error exceeds a
+    tenth of the largest omega. Return the mistakes, sorted by the number of methods that fail with
+    them in both cases, the largest number first. Mistakes with equal numbers are sorted by the
+    number of methods that fail in at least one case.
     """
     limit = facts("lost")["limit"]
     found = []
@@ -181,7 +185,8 @@ def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
     In a step omega is approximated by omega(0) + c1 t + c2 t**2. c1 and c2 solve the linear
     equations with the matrix `matrix`. `right` has the right-hand sides, one row for each
     component. `mistake` is the identifier of a programming mistake in `data/lost.toml`. `second` is
-    true for the correction, and false for the first estimate.
+    true for the correction, which is computed with the products of the first estimate, and false
+    for the first estimate.
     """
     if mistake == "transposed":
         matrix = matrix.T
@@ -232,7 +237,8 @@ def halved(scene: Scene, weighting: str) -> float:
     """Return the factor by which halving the step size reduces the error of a method.
 
     `weighting` names the weighted residual method, programmed without a mistake. The error is the
-    largest one of omega over the run. The end time is the same with both step sizes.
+    largest error of omega over the run, against the reference solution. The end time is the same
+    with both step sizes.
     """
     finer = replace(scene, step_size=scene.step_size / 2.0, steps=2 * scene.steps)
     return _share(scene, weighting, "none") / _share(finer, weighting, "none")
@@ -247,11 +253,11 @@ _TABLE = (
 
 
 def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
-    """Return the report on every conjectured mistake, with its errors and its number of failures.
+    """Return the report on the mistakes that lost programs may have had, with errors and failures.
 
-    The failures are those of weighted residual methods that are programmed with the mistake.
-    `found` has the mistakes with their results, and `word` is the name of the arithmetic in which
-    they were computed.
+    The programs were for weighted residual methods. A method that is programmed with a mistake
+    fails in a case if its error exceeds a tenth of the largest omega. `found` has the mistakes with
+    their results, and `word` is the name of the arithmetic in which they were computed.
     """
     rows = [
         [

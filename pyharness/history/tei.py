@@ -71,7 +71,8 @@ class _Page(NamedTuple):
 def tei_document() -> bytes:
     """Return the cards of the programs and the critical apparatus as a TEI document, in UTF-8.
 
-    TEI is an XML format for editions of texts.
+    TEI is an XML format for editions of texts. The critical apparatus describes, for example, the
+    mistakes and the doubtful statements of the programs.
     """
     root = xml.Element("TEI", xmlns="http://www.tei-c.org/ns/1.0")
     root.set(_XML + "lang", "en")
@@ -288,7 +289,8 @@ def _with_text(
 def _id(card: Card) -> str:
     """Return a card's XML identifier, as in ``two-term.1660``.
 
-    Unlike the name of a card, the identifier may not contain a colon.
+    Here 1660 is the number on the card. Unlike the name of a card, the identifier may not contain a
+    colon.
     """
     return f"{card.program}.{card.number}"
 

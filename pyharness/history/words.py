@@ -39,7 +39,7 @@ class WordRun:
         Bits of the significand.
     rule : str
         The rounding rule: ``nearest-even``, ``chop`` (towards zero), or ``FX`` and ``RX``, the
-        unrounded and the rounded operations of the CDC.
+        unrounded and the rounded operations of the CDC 6600.
     stop : str
         Why and at which step the run ended early: ``V2 at 25`` if the stop test of the Runge-Kutta
         program failed for the variable V2, or ``overflow at 50``. Empty if the run is complete.
@@ -68,7 +68,7 @@ class WordRun:
 
 @dataclass(frozen=True)
 class WordCell:
-    """The runs of one program on one case of Table 1, in several arithmetics.
+    """The runs of one program on one case of the thesis, in several arithmetics.
 
     The program is either original or corrected. `double` is the run in binary64, and `widest` the
     run with 113 bits of significand. `runs` has one run for each pair of a chosen number of bits
@@ -87,10 +87,10 @@ class WordCell:
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
     def settled(self, rule: str, same: Callable[[WordRun], bool]) -> int | None:
-        """Return the least p (bits) such that `same` holds for all runs with at least p bits.
+        """Return the least number p of significand bits from which on `same` holds for every run.
 
-        `same` is a predicate of one run. Only runs with the rounding rule `rule` count. Return None
-        if there is no such p.
+        `same` is a predicate of one run. It must hold for all runs with at least p bits. Only runs
+        with the rounding rule `rule` count. Return None if there is no such p.
         """
         least = None
         for run in sorted((r for r in self.runs if r.rule == rule), key=lambda run: -run.p):

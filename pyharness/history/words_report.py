@@ -29,7 +29,7 @@ def words_report(cells: Sequence[WordCell]) -> Report:
     """Return the report of `pyharness words`: how the arithmetic changes printed pages and errors.
 
     Each of the `cells` has the runs of one program, original or corrected, on one case, in several
-    arithmetics. All cells must have the same word lengths.
+    arithmetics. All cells must have runs with the same numbers of significand bits.
     """
     runs = [run for cell in cells for run in cell.runs]
     data = numbers(_FIELDS, [list(asdict(run).values()) for run in runs])
@@ -95,10 +95,10 @@ def _machine(cells: Sequence[WordCell]) -> Table:
 
 
 def _changes(cells: Sequence[WordCell]) -> list[str]:
-    """Return, for each arithmetic of the CDC, a sentence on how its runs differ from binary64.
+    """Return, for both arithmetics of the CDC 6600, how the runs differ from those in binary64.
 
-    `cells` have the runs. The two arithmetics have 48 bits of significand. One has unrounded
-    operations, and the other rounded operations.
+    The result has one sentence for each arithmetic. `cells` have the runs. The two arithmetics have
+    48 bits of significand. One has unrounded operations, and the other rounded operations.
     """
     told = []
     for name, p, rule in _MACHINE:
@@ -148,7 +148,7 @@ def _errors(cells: Sequence[WordCell]) -> Table:
 
 
 def _picture(cells: Sequence[WordCell]) -> Picture:
-    """Draw the largest error of omega (rad/s) against the word length p (bits).
+    """Draw the largest error of omega (rad/s) against the number p of significand bits.
 
     `cells` have the runs with their errors. There is a plot for each program, original and
     corrected. A dashed line shows the truncation error of the method, which is the error with 113

@@ -127,7 +127,7 @@ class Batch:
         """Return the number of steps that the program completed in each scene, shape (n,).
 
         The number is smaller than the requested number if the run overflowed or was stopped. The
-        batch must be solved by a program.
+        batch must be solved by one of the three programs of the thesis.
         """
         return self._program.n_rows
 
@@ -137,7 +137,7 @@ class Batch:
 
         An integer is the position, from 1, of the variable's name in
         `pyharness.model.trajectory.STOP_VARIABLES`, such as U1. It is 0 for a run that the test did
-        not stop. The batch must be solved by a program.
+        not stop. The batch must be solved by one of the three programs of the thesis.
         """
         return self._program.stop_variable
 
@@ -172,7 +172,8 @@ class Batch:
 
         The times are the ends of `samples` equal parts of the time from 0 to `t_end`. Attitudes are
         quaternions from body to space, scalar first. The attitude at time 0 is (1, 0, 0, 0). The
-        batch must be solved by a method, not by a program.
+        batch must be solved by a modern method of this package, because the programs of the thesis
+        compute no attitude.
         """
         ends = []
         for i in range(samples):
@@ -199,7 +200,7 @@ class Batch:
         return replace(self, arrays={**self.arrays, "omega0": omega0})
 
     def run(self, at: list[int]) -> ProgramEnsemble:
-        """Run the program for all scenes and return its results at the steps `at`.
+        """Run the program of the thesis for all scenes, and return its results at the steps `at`.
 
         `at` contains step numbers, from 1, in ascending order. If possible, all scenes are run in
         one call. They are run one by one if the linear terms of their torques (`torque_rate`)
@@ -244,10 +245,10 @@ class Batch:
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
         """Return the states of all scenes at `t_end` (s, shape (n,)), computed by `method`.
 
-        A method in `PREPARED`, which has a kernel for many scenes, solves all scenes in one call of
-        `solve_many`. Any other method solves the scenes one by one. `tolerance` is the largest
-        allowed error, relative to the largest |omega|, and `more` contains additional arguments of
-        `solve_many`, such as `attitude0`.
+        A method in `PREPARED`, the methods with a compiled kernel for many scenes, solves all
+        scenes in one call of `solve_many`. Any other method solves the scenes one by one.
+        `tolerance` is the largest allowed error, relative to the largest |omega|, and the keyword
+        arguments `more` are passed to `solve_many`, such as `attitude0`.
         """
         if method not in PREPARED:
             return self._solve_each(method, tolerance, t_end)

@@ -22,9 +22,9 @@ def known_solution(
     """Return the trajectory of a scene at `times` (s) from its closed form.
 
     `tolerance` is the largest allowed error, relative to the largest |omega|. It does not change
-    the computed omegas. If the amplified rounding errors exceed it, the trajectory ends as
-    `sensitive`. `effort` multiplies the work limit of some ten seconds. Raise InputError if the
-    scene has no closed form, or if the work limit is exceeded.
+    the computed omegas. If the rounding errors, amplified by the motion, exceed it, the
+    trajectory's `ended` is ``sensitive``. `effort` multiplies the work limit of some ten seconds.
+    Raise InputError if the scene has no closed form, or if the work limit is exceeded.
     """
     work = np.array([effort, 0.0])
     attitudes = None

@@ -19,9 +19,10 @@ class Ensemble(BatchResult):
     omega : ndarray, shape (n, 3)
         Angular velocities about the body axes at the end, rad/s; NaN for a body without a result.
     status : ndarray of int8, shape (n,)
-        How the computation of each body ended: 0 `complete`, 2 `overflow`, 3 `refused`, 4 `gave up`
-        (work limit exceeded, or no correct digit of the phase left), 6 `sensitive`. A sensitive
-        body has a result, but the rounding errors that its motion amplifies exceed the tolerance.
+        How the computation of each body ended: 0 `complete`, 2 `overflow`, 3 `refused` (the method
+        does not apply to the body), 4 `gave up` (work limit exceeded, or no correct digit of the
+        motion's phase left), 6 `sensitive`. A sensitive body has a result, but the rounding errors
+        that its motion amplifies exceed the requested tolerance.
     attitude : ndarray, shape (n, 4), or None
         Unit quaternions from body to space at the end, scalar first; None if they were not
         requested.

@@ -26,9 +26,10 @@ _NEAR_THE_END = 1e300
 
 
 def gauss(stages: int) -> Integrator:
-    """Return a solver by Gauss collocation that halves its steps until two solutions agree.
+    """Return a solver by Gauss collocation that halves its step size until two solutions agree.
 
-    `stages` is the number of stages, 1 to 8. The order of the method is twice this number.
+    `stages` is the number of stages, 1 to 8. The order of the method is twice this number. Two
+    solutions agree if the estimated error meets the requested tolerance.
 
     Let d be the largest difference in omega between two successive solutions, and r the quotient of
     their step sizes, at most 2. The estimated error of the solution with the shorter steps is

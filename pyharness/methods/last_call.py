@@ -20,8 +20,9 @@ from pyharness.model.values import Triple
 class LastCall:
     """The base class of all prepared solvers, which reports how the last call in a thread ended.
 
-    A prepared solver solves one scene by one method, for many initial omegas. The reports are
-    status, error estimate, error amplification and number of steps.
+    A prepared solver, which the function `prepare` returns, solves one scene by one method, for
+    many initial omegas. The reports are status, error estimate, error amplification and number of
+    steps.
     """
 
     plan: Plan
@@ -33,11 +34,11 @@ class LastCall:
         def _ending(self) -> tuple[int, int, float, float, Triple, float] | None: ...
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and the arguments from which `copy` and `pickle` prepare a copy."""
+        """Return the class and the arguments from which `copy` and `pickle` recreate the solver."""
         return type(self), (self.plan, *self._given)
 
     def __repr__(self) -> str:
-        """Return a text that names the class, the scene and the method."""
+        """Return a text that names the solver's class, its scene and its method."""
         return f"<{type(self).__name__} of '{self.plan.scene.name}' by {self.plan.method}>"
 
     @property
@@ -46,12 +47,13 @@ class LastCall:
 
         The texts are ``complete``, ``sensitive``, ``overflow``, ``refused`` and ``gave up``. The
         text ``gave up`` means that the work limit was exceeded, or that no correct digit of the
-        phase was left. A ``sensitive`` call has a result, but rounding errors amplified by the
-        motion exceed the tolerance; `digits` is its number of correct digits. For a closed form and
-        for Gauss collocation, whether a call was sensitive is computed when the status is read.
-        This takes microseconds for a closed form, and milliseconds for Gauss collocation. Before
-        the first call the status is ``complete``. A call that raised an InputError or was
-        interrupted does not count.
+        motion's phase was left. The text ``refused`` means that the method does not apply to the
+        arguments of the call. A ``sensitive`` call has a result, but rounding errors amplified by
+        the motion exceed the solver's tolerance; `digits` is its number of correct digits. For a
+        closed form and for Gauss collocation, whether a call was sensitive is computed when the
+        status is read. This takes microseconds for a closed form, and milliseconds for Gauss
+        collocation. Before the first call the status is ``complete``. A call that raised an
+        InputError or was interrupted does not count.
         """
         return self._found()[0]
 
@@ -97,7 +99,8 @@ class LastCall:
         """Return the number of steps of the last call, negative if the kernel chose `quick`.
 
         The method `quick` is a Runge-Kutta method for few digits. The kernel chooses between
-        `quick` and the Taylor series only if the solver's plan names the method `quick or taylor`.
+        `quick` and the Taylor series only if the solver's attribute `plan` names the method `quick
+        or taylor`.
         """
         ending = self._ending
         return 0 if ending is None else ending[1]

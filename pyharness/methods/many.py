@@ -212,8 +212,9 @@ def _solve_groups(
     Scenes with moments or coefficients are solved in one call, and scenes with a full inertia
     matrix in another one. Each scene with a torque about the axes of space is solved alone. `t_end`
     (s) is one time, or one time for each scene. `step` is the step size (s) of Gauss collocation
-    and of the methods with a fixed step. `settings` are further arguments of `solve_many`. The
-    final states are in the order of `scenes`. They are written into `out` if it is not None.
+    and of the methods with a fixed step. The keyword arguments `settings` are further arguments of
+    `solve_many`. The final states are in the order of `scenes`. They are written into `out` if it
+    is not None.
     """
     check_alike(scenes)
     if scenes[0].attitude is None and any(each.torque.in_space for each in scenes):

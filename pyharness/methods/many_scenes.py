@@ -24,8 +24,8 @@ class Axes:
     def __init__(self, axes: Array, turns: Array) -> None:
         """Store the principal axes of each body, which are the columns of `axes`, shape (n, 3, 3).
 
-        `turns` contains the rotations from principal axes to the axes of the inertia matrix once
-        more, as quaternions, scalar first, shape (n, 4).
+        `turns` contains the same axes as quaternions, scalar first, shape (n, 4), which rotate from
+        principal axes to the axes of the inertia matrices.
         """
         self.axes, self.turns = axes, turns
 
@@ -64,9 +64,10 @@ def from_rows(rows: Sequence[Scene | None]) -> dict[str, Any]:
     """Return scenes with a full inertia matrix as arrays about principal axes.
 
     The result is a dict of the arrays of `solve_many`, with one row for each scene, and the `Axes`.
-    If `rows` contains None in place of a scene, the row is NaN, and the kernel refuses it. The
-    arrays contain the coefficients A, B, C instead of moments, because the function `principal`
-    computes them more accurately than they can be computed from rounded moments.
+    If `rows` contains None in place of a scene, the row is NaN, and the kernel returns the status
+    REFUSED for it. The arrays contain the coefficients A, B, C instead of moments, because the
+    function `principal` computes them more accurately than they can be computed from rounded
+    moments.
     """
     each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
     axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))

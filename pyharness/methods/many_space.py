@@ -110,7 +110,7 @@ def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
 
 
 def _rows(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return those of several arrays that describe bodies and torques, with checked shapes.
+    """Return the arrays among `arrays` that describe bodies and torques, with checked shapes.
 
     `arrays` maps names of arguments of `solve_many` to their values. Other arguments and values of
     None are omitted.

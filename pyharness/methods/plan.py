@@ -38,8 +38,8 @@ class Plan:
 
     `method` is the name of the method that solves `scene`. `closed_form` is the kind of closed
     form, such as ``sphere``, if one is used, else None. `fallback` is the name of the method that
-    is used if `method` refuses the scene. `velocity` and `rows` state whether the translational
-    velocity and output at intermediate times are requested.
+    is used if `method` can't solve the scene, or None. `velocity` and `rows` state whether the
+    translational velocity and output at intermediate times are requested.
     """
 
     scene: Scene
@@ -51,15 +51,15 @@ class Plan:
 
     @cached_property
     def decisions(self) -> tuple[Decision, ...]:
-        """Return a decision for each part of the computation, such as each term of the equations.
+        """Return a decision for each part of the scene's solution, such as a term of the equations.
 
-        A decision states whether the part is computed, and why.
+        A decision states whether the part is computed, and the reason.
         """
         return tuple(_decisions(self))
 
     @property
     def skipped(self) -> frozenset[str]:
-        """Return the names of the parts of the computation that are not carried out."""
+        """Return the names of the parts of the solution that are not computed, such as `torque`."""
         return frozenset(each.part for each in self.decisions if not each.kept)
 
 

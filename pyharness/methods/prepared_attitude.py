@@ -70,7 +70,7 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
 
 
 def prepared_attitude(scene: Scene, method: str, tolerance: float, effort: float) -> AttitudeSolver:
-    """Return a prepared solver whose calls return omega and attitude of a scene.
+    """Return a solver of omega and attitude, prepared for many calls with the same scene.
 
     `method` is a name in `pyharness.methods.solver.PREPARED`. `tolerance` limits the error of
     omega, relative to the largest |omega|, and the error of the attitude's angle (rad). `effort`
@@ -94,7 +94,7 @@ def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
 def _check(
     usual: Quaternion, omega0: object, t_end: object, attitude0: object
 ) -> tuple[tuple[float, ...], float]:
-    """Convert arguments of a solver call whose types the C function can't read.
+    """Convert the arguments of a solver call if the C function can't read their types.
 
     Return two values. The first is a tuple of the three numbers of `omega0` (rad/s) and the four
     numbers of the initial quaternion. The second is `t_end` (s) as a float. The initial quaternion

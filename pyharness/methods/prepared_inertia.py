@@ -26,12 +26,12 @@ from pyharness.model.waves import with_merged_waves
 
 
 class InertiaSolver(Solver):
-    """A prepared solver of a scene with a full inertia matrix, used in the same way as a `Solver`.
+    """A solver, made by `prepare`, of one scene with a full inertia matrix.
 
-    The omegas that a call takes and returns are about the axes of the inertia matrix. The attribute
-    `plan` has the chosen method and the scene about principal axes. The attribute `growth` is the
-    error amplification: the largest norm of the state-transition matrices of omega about principal
-    axes.
+    It is called in the same way as a `Solver`. The omegas that a call takes and returns are about
+    the axes of the inertia matrix. The attribute `plan` has the chosen method and the scene about
+    principal axes. The attribute `growth` is the error amplification: the largest norm of the
+    state-transition matrices of omega about principal axes.
     """
 
     def __new__(
@@ -55,14 +55,14 @@ class InertiaSolver(Solver):
     _axes: Array  # the principal axes, in columns
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and the arguments from which `copy` and `pickle` prepare a copy."""
+        """Return the class and the arguments from which `copy` and `pickle` recreate the solver."""
         return type(self), (self.plan, *self._given, self._scene)
 
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array:
         """Return omega (rad/s) at `t_end` (s), shape (3,), about the axes of the inertia matrix.
 
-        `omega0` is the initial omega (rad/s), about the axes of the matrix, too. If `out`, an array
-        of three floats, is not None, the result is written into it and `out` is returned.
+        `omega0` is the initial omega (rad/s), about the same axes. If the keyword argument `out`,
+        an array of three floats, is not None, the result is written into it and `out` is returned.
         """
         start = np.array(three_floats("omega0", omega0))
         if out is not None and (found := no_buffer(out)):
@@ -103,10 +103,11 @@ class InertiaSolver(Solver):
 
 
 class InertiaAttitudeSolver(AttitudeSolver):
-    """A prepared solver of omega and attitude of a scene with a full inertia matrix.
+    """A solver, made by `prepare`, of omega and attitude of a scene with a full inertia matrix.
 
-    It is used in the same way as an `AttitudeSolver`. The omegas that a call takes and returns are
-    about the axes of the inertia matrix. The quaternions rotate from these axes to space.
+    The solver is called in the same way as an `AttitudeSolver`. The omegas that a call takes and
+    returns are about the axes of the inertia matrix. The quaternions rotate from these axes to
+    space.
     """
 
     def __new__(
@@ -131,7 +132,7 @@ class InertiaAttitudeSolver(AttitudeSolver):
     _turn: Quaternion  # from principal axes to the axes of the inertia matrix
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and the arguments from which `copy` and `pickle` prepare a copy."""
+        """Return the class and the arguments from which `copy` and `pickle` recreate the solver."""
         return type(self), (self.plan, *self._given, self._scene)
 
     def __call__(
@@ -194,11 +195,11 @@ def turned_back(attitudes: Array, turn: Any) -> Array:
 
 
 def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float) -> InertiaSolver:
-    """Return a prepared solver of a scene with a full inertia matrix, without attitude.
+    """Return a solver of omega, prepared for many calls with the same scene.
 
-    `method` is a name in `pyharness.methods.solver.PREPARED`. `tolerance` is the largest allowed
-    error, relative to the largest |omega|. `effort` multiplies the work limit of a call, some ten
-    seconds.
+    The scene must have a full inertia matrix, and the attitude is not computed. `method` is a name
+    in `pyharness.methods.solver.PREPARED`. `tolerance` is the largest allowed error, relative to
+    the largest |omega|. `effort` multiplies the work limit of a call, some ten seconds.
     """
     from pyharness.methods.plan import plan
 
@@ -209,11 +210,11 @@ def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float)
 def prepared_inertia_attitude(
     scene: Scene, method: str, tolerance: float, effort: float
 ) -> InertiaAttitudeSolver:
-    """Return a prepared solver of omega and attitude of a scene with a full inertia matrix.
+    """Return a solver of omega and attitude, prepared for many calls with the same scene.
 
-    `method` is a name in `pyharness.methods.solver.PREPARED`. `tolerance` is the largest allowed
-    error, relative to the largest |omega|. `effort` multiplies the work limit of a call, some ten
-    seconds.
+    The scene must have a full inertia matrix. `method` is a name in
+    `pyharness.methods.solver.PREPARED`. `tolerance` is the largest allowed error, relative to the
+    largest |omega|. `effort` multiplies the work limit of a call, some ten seconds.
     """
     from pyharness.methods.prepared_attitude import attitude_plan
 

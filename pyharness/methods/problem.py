@@ -118,9 +118,9 @@ def trajectory_of(
     `rows` is omega (rad/s), shape (3, n), with one column for each time. `attitudes` are
     quaternions, shape (4, n), or None. Only the first `n_rows` columns are results. `status` is an
     integer of `pyharness.model.codes.Statuses`. `steps` and `evaluations` are the numbers of steps
-    and of right-hand sides. `error` is the estimated relative error, and `growth` the error
-    amplification. The error and the error amplification are omitted if the kernel did not reach the
-    last time.
+    and of evaluations of the right-hand side. `error` is the estimated relative error, and `growth`
+    the error amplification. The error and the error amplification are omitted if the kernel did not
+    reach the last time.
     """
     ended = ENDS[status] if ENDS[status] in WITH_ALL_ROWS else "overflow"
     found = rows_trajectory(times[:n_rows], rows.T[:n_rows], evaluations, steps, ended)
@@ -135,8 +135,8 @@ def rows_trajectory(
     """Return a trajectory from omega (rad/s, shape (n, 3)) at `times` (s), without velocity.
 
     Its `recorded_time`, which differs from the true time only for programs of the thesis, is equal
-    to its `time`. `evaluations` and `steps` are the numbers of right-hand sides and of steps.
-    `ended` states how the integration ended, for example ``complete``.
+    to its `time`. `evaluations` is the number of evaluations of the right-hand side, and `steps`
+    the number of steps. `ended` states how the integration ended, for example ``complete``.
     """
     time = np.array(times, dtype=float)
     return Trajectory(time, time, omega, None, steps, evaluations, ended)

@@ -76,8 +76,8 @@ def _from(room: str, name: str, *arguments: str | int) -> Integrator:
     """Return a function that solves scenes, and imports its module when it is first called.
 
     `room` is the name of a module of `pyharness.methods`, and `name` is the name of a function in
-    this module. Without `arguments`, the function `name` solves scenes itself. With `arguments`, it
-    is called with them and returns the function that solves scenes.
+    this module. Without further arguments, the function `name` solves scenes itself. With further
+    arguments, the function `name` is called with them and returns the function that solves scenes.
     """
 
     def solve(*given: Any) -> Trajectory:
@@ -211,9 +211,10 @@ def check_attitude(method: str) -> None:
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
     """Raise InputError if a torque about the axes of space acts and the method can't solve it.
 
-    `method` is a name in the registry of methods. The error is also raised if `attitude` is false,
-    which means that the attitude is not computed. The reason is that such a torque depends on the
-    attitude. A scene without such a torque raises no error.
+    `method` is a name in the registry of methods. The error is also raised for such a torque if
+    `attitude` is false, which means that the attitude is not computed. Its components about the
+    body axes are then unknown, because they depend on the attitude. A scene without such a torque
+    raises no error.
     """
     if not scene.torque.in_space:
         return

@@ -155,8 +155,8 @@ def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
 def plan_report(scene: Scene, plan: "Plan") -> Report:
     """Return the report of a plan: the chosen method, and a table of the parts of the computation.
 
-    `plan` is the plan for `scene`, made before the scene is solved. The table states for each part
-    whether it is computed, and why.
+    `plan` is the plan for `scene`, made before the scene is solved. The table states for each part,
+    such as the torque, whether it is computed, and why.
     """
     table = Table(
         words("part computed why"),

@@ -72,9 +72,9 @@ _SHORTEST_SPAN = 2.0**-300
 class _Ahead(NamedTuple):
     """The results of a preliminary integration with few digits, which set the local tolerance.
 
-    The local tolerance is the tolerance of one step. The results are the largest |omega|, the phase
-    of the motion and of the torque waves, the error amplification, and the angle by which the body
-    rotates.
+    The local tolerance is the tolerance of one step. The preliminary integration determines the
+    largest |omega|, the phase of the motion and of the torque waves, the error amplification, and
+    the angle by which the body rotates.
     """
 
     largest: float  # largest abs(omega) of any component from 0 to the end, rad/s
@@ -207,9 +207,9 @@ def _rows_of(
 ) -> Trajectory:
     """Return a trajectory from rows of omega, shape (n, 3), or of omega and attitude, (n, 7).
 
-    `times` (s) are the times of the rows. `evaluations` and `steps` are the numbers of right-hand
-    sides and of steps. `ended` states how the integration ended, for example ``complete``. The
-    attitudes are normalised to unit quaternions.
+    `times` (s) are the times of the rows. `evaluations` is the number of evaluations of the
+    right-hand side, and `steps` the number of steps. `ended` states how the integration ended, for
+    example ``complete``. The attitudes are normalised to unit quaternions.
     """
     found = rows_trajectory(times, rows[:, :3], evaluations, steps, ended)
     if rows.shape[1] == 3:
@@ -226,8 +226,8 @@ class _Run:
     """The integrations of one scene from 0 to `end` (s) by `solve_ivp`, with one work limit.
 
     Preliminary integrations with few digits precede the main integration. The work limit applies to
-    the number of right-hand sides of all of them, and `effort` multiplies it. `name` is SciPy's
-    name of the method of the main integration.
+    the number of evaluations of the right-hand side in all of them, and `effort` multiplies it.
+    `name` is SciPy's name of the method of the main integration.
     """
 
     def __init__(self, scene: Scene, end: float, name: str, effort: float = 1.0) -> None:
@@ -297,7 +297,7 @@ class _Run:
                 ) from None
 
     def _scale_by_torque(self) -> float:
-        """Return a bound of the omega (rad/s) that the torque alone can cause until the end.
+        """Return a bound of the |omega| (rad/s) that the torque alone can cause until the end time.
 
         The result is 1 if the bound is not finite.
         """
@@ -325,12 +325,13 @@ class _Run:
     def ahead(self) -> _Ahead:
         """Integrate with few digits, and return the quantities that set the local tolerance.
 
-        The absolute tolerance is a fraction of the largest |omega| that is expected. The
-        integration is repeated with a smaller expected value until the solution's |omega| is not
-        much smaller than expected. If omega grows without bound, there is no largest |omega|. The
-        result then contains, in its place, the larger of the expected value and the omega that
-        torque alone would cause. In this case the phase and the error amplification are unknown and
-        have their least values, 0 and 1.
+        The absolute tolerance is a fraction of an estimate of the largest |omega|. The first
+        estimate is the initial |omega|; for a body at rest it follows from the torque. If the
+        |omega| of the solution is much smaller than the estimate, the integration is repeated with
+        a smaller estimate. If omega grows without bound, there is no largest |omega|. The result
+        then contains, in its place, the larger of the estimate and the omega that torque alone
+        would cause. In this case the phase and the error amplification are unknown and have their
+        least values, 0 and 1.
         """
         scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()
         if scale == 0.0:
@@ -378,9 +379,8 @@ def _pushes(scene: Scene) -> list[tuple[float, float]]:
 def _turned(scene: Scene, span: float, largest: float) -> float:
     """Return the sum of the phases (rad) of all torque waves over the time `span` (s).
 
-    The phase of a wave is limited to a ratio: the omega that the wave can add, divided by
-    `largest`, the largest |omega| (rad/s). Therefore a wave that hardly changes omega hardly
-    contributes.
+    The phase of a wave counts at most as the omega that the wave can add, divided by `largest`, the
+    largest |omega| (rad/s). Therefore a wave that hardly changes omega hardly contributes.
     """
     found = 0.0
     for push, frequency in _pushes(scene):

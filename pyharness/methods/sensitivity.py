@@ -26,12 +26,13 @@ _LITTLE_WORK = 5e-3
 
 
 def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
-    """Return whether amplified rounding errors are too large for the relative tolerance.
+    """Return whether rounding errors, amplified by the motion, are too large for the tolerance.
 
     The amplified rounding error is the unit roundoff times `growth` times (1 + `noise`). It is too
-    large if it exceeds 0.3 times the tolerance. `growth` is the error amplification of the motion,
-    and `noise` is the rounding error of the torque over the rounding error of omega. If `growth` is
-    None, which means unknown, the result is False.
+    large if it exceeds 0.3 times `tolerance`, the largest allowed error relative to the largest
+    |omega|. `growth` is the error amplification of the motion, and `noise` is the rounding error of
+    the torque divided by the rounding error of omega. If `growth` is None, which means unknown, the
+    result is False.
     """
     return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
 
@@ -68,9 +69,9 @@ def closed_form_estimate(
 
     `omega0` is the initial omega (rad/s). The error of omega is relative to the largest |omega|
     from 0 to `t_end`. For a scene with an attitude the estimate includes the error of the
-    attitude's angle (rad). `noise` is the rounding error of the torque over the rounding error of
-    omega, as `torque_noise` returns it. If the error amplification is unknown, for example because
-    the scene has no closed form, both results are None.
+    attitude's angle (rad). `noise` is the rounding error of the torque divided by the rounding
+    error of omega, as `torque_noise` returns it. If the error amplification is unknown, for example
+    because the scene has no closed form, both results are None.
     """
     growth: float | None = 1.0
     # A sphere does not amplify perturbations.

@@ -137,11 +137,11 @@ def solve(
 def finest(method: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method of the registry can meet from 0 to `time` (s).
 
-    For most methods this tolerance does not depend on the scene and is the one that the method
-    claims to meet (`Method.finest`). Methods of SciPy's `solve_ivp` accept no local tolerance below
-    some 2e-14. Their smallest tolerance exceeds the claimed one if many local errors add up or if
-    the motion amplifies them. Raise InputError if too many steps would be needed to determine their
-    smallest tolerance.
+    For most methods this tolerance does not depend on the scene and is the constant `Method.finest`
+    of the registry. Methods of SciPy's `solve_ivp` accept no local tolerance below some 2e-14.
+    Their smallest tolerance exceeds this constant if many local errors add up or if the motion
+    amplifies them. Raise InputError if too many steps would be needed to determine their smallest
+    tolerance.
     """
     claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:
@@ -156,9 +156,9 @@ def by_plan(
 ) -> Trajectory:
     """Return the trajectory at `times` (s) by the method that `plan` chooses for the scene.
 
-    This function is the method `auto`. If the chosen method refuses the scene, the second method
-    that `plan` names (`fallback`) solves it. `tolerance` is the largest allowed error, relative to
-    the largest |omega|. `effort` multiplies the work limit of some ten seconds.
+    This function is the method `auto`. If the chosen method raises InputError, the second method
+    that `plan` names (`fallback`) solves the scene. `tolerance` is the largest allowed error,
+    relative to the largest |omega|. `effort` multiplies the work limit of some ten seconds.
     """
     chosen = plan(scene, "auto", tolerance, rows=True)
     method = METHODS[chosen.method]

@@ -171,7 +171,7 @@ class Solver(LastCall, BoundKernel):
 
 
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
-    """Convert arguments of a solver call that are of types which the C function can't read.
+    """Convert the arguments of a solver call if the C function can't read their types.
 
     Return the three numbers of `omega0` (rad/s) as floats, and `t_end` (s) as a float. Raise
     InputError if `omega0` is not three real numbers, if `t_end` is not a real number, or if three
@@ -184,9 +184,9 @@ def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
 
 
 def no_buffer(out: object) -> str:
-    """Return why three floats can't be written into `out`, as text; empty if they can.
+    """Return the reason why three floats can't be written into `out`; empty if they can.
 
-    The text describes `out` for a message, for example by its type and shape.
+    The reason is a text that describes `out` for a message, for example by its type and shape.
     """
     if not isinstance(out, np.ndarray):
         try:

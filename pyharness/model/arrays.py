@@ -28,11 +28,11 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
     """Return user values as a float array with one row per body, or one row that all bodies share.
 
-    `shape` is the shape of one row, in which a letter such as "k" stands for any length. If
-    `values` is a single row, the result has one row. `rule` is a test that every number must pass,
-    with a phrase that names the allowed numbers. Raise InputError, with `where` in front of the
-    message, for another shape, an element that is not a real number, or a number that fails the
-    test.
+    The further arguments `shape` are the shape of one row, in which a letter such as "k" stands for
+    any length. If `values` is a single row, the result has one row. The keyword argument `rule` is
+    a test that every number must pass, with a phrase that names the allowed numbers. Raise
+    InputError, with `where` in front of the message, for another shape, an element that is not a
+    real number, or a number that fails the test.
     """
     found = numbers_of(where, values)
     own = found.shape[-len(shape) :] if shape else ()

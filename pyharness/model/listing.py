@@ -28,9 +28,9 @@ class Listing:
     defects : frozenset of str
         The active defects, which are mistakes of the printed program that are not corrected.
     readings : frozenset of str
-        The active readings. A reading is an interpretation of a doubtful original statement, other
-        than the one that we adopt. A corrected program has no readings, because no reading changes
-        a corrected statement.
+        The active readings, which are the ones that the program follows. A reading is an
+        interpretation of a doubtful original statement, other than the one that we adopt. A
+        corrected program has no readings, because no reading changes a corrected statement.
     conjectures : frozenset of str
         The active assumptions about statements that are on no printed card. Names of conjectures
         and readings are also accepted among `defects`.
@@ -67,7 +67,7 @@ class Listing:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the names, and assign each to its kind: defect, reading or conjecture.
+        """Check the given names, and assign each to its kind: defect, reading or conjecture.
 
         Raise InputError for an unknown program, or for a name that the program does not have.
         """
@@ -88,9 +88,10 @@ class Listing:
     def label(self) -> str:
         """The kind of listing, as text: `original`, `corrected` or `custom`.
 
-        The label is `corrected` if no defect, reading or conjecture is active. It is `original` if,
-        apart from readings, exactly the defects and conjectures that `switches` returns are active.
-        It is `custom` otherwise.
+        The label is `corrected` if no defect (mistake), reading (interpretation of a doubtful
+        statement) or conjecture (assumption about a missing statement) is active. It is `original`
+        if, apart from readings, exactly the defects and conjectures that `switches` returns are
+        active. It is `custom` otherwise.
         """
         if not self.active:
             return "corrected"
@@ -100,14 +101,21 @@ class Listing:
 
     @property
     def active(self) -> frozenset[str]:
-        """The names of all active defects, readings and conjectures of the listing."""
+        """The names of all active defects, readings and conjectures of the listing.
+
+        The listing is a program with a choice of these. A defect (mistake) is active if it is not
+        corrected. A reading (interpretation of a doubtful statement) or a conjecture (assumption
+        about a missing statement) is active if the program follows it.
+        """
         return self.defects | self.readings | self.conjectures
 
     @property
     def flags(self) -> int:
         """The active defects, readings and conjectures as a bit mask, an integer.
 
-        The compiled programs take this integer as an argument.
+        The compiled programs take this integer as an argument. A defect (mistake) is active if it
+        is not corrected. A reading (interpretation of a doubtful statement) or a conjecture
+        (assumption about a missing statement) is active if the program follows it.
         """
         return sum(1 << entry["flag"] for entry in flagged() if entry["id"] in self.active)
 
@@ -116,7 +124,8 @@ class Listing:
         """Return the listing of the original program, with all its defects active.
 
         The conjectures (assumptions) that belong to the original, as `switches` says, are active
-        too. So are the given `readings`, which are interpretations of doubtful statements.
+        too. The given `readings`, which are interpretations of doubtful statements, are also
+        active.
         """
         return cls(program, frozenset(switches(program)), frozenset(readings))
 
@@ -124,12 +133,18 @@ class Listing:
     def corrected(cls, program: str) -> "Listing":
         """Return the listing of the corrected program.
 
-        No defect, reading or conjecture is active in this listing.
+        In this listing no defect (mistake), reading (interpretation of a doubtful statement) or
+        conjecture (assumption about a missing statement) is active.
         """
         return cls(program, frozenset())
 
     def has(self, name: str) -> bool:
-        """Return whether the defect, reading or conjecture with this name is active."""
+        """Return whether the defect, reading or conjecture with this name is active.
+
+        A defect (mistake) is active if it is not corrected. A reading (interpretation of a doubtful
+        statement) or a conjecture (assumption about a missing statement) is active if the program
+        follows it.
+        """
         return name in self.active
 
 
@@ -172,9 +187,9 @@ def switchable(program: str | None = None) -> tuple[str, ...]:
 def switches(program: str) -> tuple[str, ...]:
     """Return the names of the defects and conjectures that are active in the original program.
 
-    All its defects (mistakes) are active. A conjecture (an assumption about a statement that is on
-    no card) is active if its entry in `data/apparatus.toml` has the key `in_original`, with the
-    value true.
+    All its defects (mistakes) are active, which means that they are not corrected. A conjecture (an
+    assumption about a statement that is on no card) is active, which means that the program follows
+    it, if its entry in `data/apparatus.toml` has the key `in_original`, with the value true.
     """
     return tuple(
         entry["id"]

@@ -44,8 +44,9 @@ def _wave(wave: Wave) -> dict[str, Any]:
 def listing_record(listing: Listing) -> dict[str, Any]:
     """Return a listing, a program with a choice of its defects, as a dictionary for JSON.
 
-    Its keys are "label", as in "corrected", and "defects", "readings" and "conjectures". These
-    three have lists of the active names.
+    Its keys are "label", as in "corrected", and "defects", "readings" and "conjectures". The last
+    three have lists of the names of the mistakes that are kept, of the interpretations of doubtful
+    statements, and of the assumptions about missing statements.
     """
     return {
         "label": listing.label,
@@ -59,8 +60,8 @@ def ending_record(trajectory: Trajectory) -> dict[str, Any]:
     """Return how a run ended, as a dictionary for JSON.
 
     Its keys are "steps", "evaluations" (of the right-hand side), "stop" and "ended". "stop" has the
-    step, variable and quotient with which the Lipschitz test stopped the run, or is None. "ended"
-    is the status in words, as in "complete".
+    step, the variable and the Lipschitz quotient (1/s) at which the Lipschitz test stopped the run,
+    or is None. "ended" is the status in words, as in "complete".
     """
     stop = trajectory.stop
     return {

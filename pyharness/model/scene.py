@@ -361,7 +361,7 @@ class Scene:
         return [n * self.step_size for n in range(1, self.steps + 1)]
 
     def normalized_torque(self, time: float) -> Triple:
-        """Return the torque over the moments, M = N / I, at `time` (s): three components (1/s2).
+        """Return M = N / I, the torque divided by the moments, at `time` (s): three numbers (1/s2).
 
         If the body has coefficients instead of moments, its torque law is already M.
         """

@@ -72,18 +72,19 @@ def ending(trajectory: Trajectory) -> str:
 
 
 def sensitive(growth: float | None, digits: float | None) -> str:
-    """Return a phrase that describes a result whose amplified rounding error exceeds the tolerance.
+    """Return a phrase on a result whose amplified rounding error exceeds the requested tolerance.
 
-    `growth` is the error amplification. `digits` is the number of decimal digits that are correct.
+    `growth` is the error amplification of the motion. `digits` is the number of decimal digits that
+    are correct.
     """
     left = counted(math.floor(digits or 0.0), "digit")
     return f"sensitive: rounding errors are amplified by {short(growth)}; {left} left"
 
 
 def estimates(trajectory: Trajectory) -> list[str]:
-    """Return a line with a method's estimates of its own error, in a list of one element.
+    """Return a line with a method's estimates of the error of its results, as a list.
 
-    The list is empty if no estimate is known.
+    The list has one element, or none if the method estimates no error.
     """
     told = []
     if trajectory.error is not None and trajectory.digits is not None:

@@ -29,7 +29,7 @@ def short_repr(result: Any) -> str:
 
 
 def _short(value: Any) -> str:
-    """Return the value of one field as text on one line."""
+    """Return the value of one field of a dataclass as text on one line."""
     if isinstance(value, np.ndarray):
         return f"<{value.dtype} {value.shape}>"
     if isinstance(value, (tuple, list)) and value and is_dataclass(value[0]):

@@ -36,7 +36,7 @@ class Stop:
         velocity), or a norm: `U` (of omega), `UV` (of omega and velocity together).
     quotient : float
         The Lipschitz quotient (1/s): the change of the derivative between two stages of the step,
-        over the change of the variable. It is infinite if the variable did not change.
+        divided by the change of the variable. It is infinite if the variable did not change.
 
     Examples
     --------
@@ -61,7 +61,8 @@ class Trajectory:
         The true time of each row, s.
     recorded_time : ndarray, shape (n,)
         The variable TIME that a program writes to its output file TAPE5, s. A defect may make it
-        differ from `time`. For methods, which are our own solvers, it is the same as `time`.
+        differ from `time`. For methods, the modern solvers of this package, it is the same as
+        `time`.
     omega : ndarray, shape (n, 3)
         Angular velocity about the body axes, rad/s.
     velocity : ndarray, shape (n, 3), or None
@@ -71,7 +72,8 @@ class Trajectory:
     ended : {"complete", "sensitive", "stopped", "overflow"}
         How the integration ended. "stopped" means that the Lipschitz test ended it. After an
         "overflow" the rows end before the first omega that is not finite. "sensitive" means that
-        all rows are present, but the amplified rounding error exceeds the tolerance.
+        all rows are present, but the rounding error, amplified by the motion, exceeds the requested
+        tolerance.
     stop : Stop or None
         The point at which the Lipschitz test ended the run; None if the test did not end it.
     ier : ndarray of int, shape (n,), or None
@@ -132,7 +134,7 @@ class Trajectory:
         Returns
         -------
         scipy.spatial.transform.Rotation
-            A rotation for each row.
+            One rotation for each row (time) of the trajectory.
 
         Raises
         ------
@@ -144,7 +146,7 @@ class Trajectory:
         return Rotation.from_quat(self._attitudes()[:, [1, 2, 3, 0]])
 
     def angular_momentum(self, frame: str = "body") -> Array:
-        """Return the angular momentum about the axes of the body or of space.
+        """Return the angular momentum in each of n rows, about the axes of the body or of space.
 
         Parameters
         ----------
@@ -159,8 +161,8 @@ class Trajectory:
         Raises
         ------
         InputError
-            For a body without moments, an unknown frame, or the axes of space if the attitude was
-            not requested.
+            If the body was specified without moments of inertia. Also for an unknown frame, or the
+            axes of space if the attitude was not requested.
         """
         if frame not in FRAMES:
             raise unknown("frame", str(frame), FRAMES)
@@ -168,7 +170,7 @@ class Trajectory:
         return momentum if frame == "body" else turned_to_space(self._attitudes(), momentum)
 
     def energy(self) -> Array:
-        """Return the kinetic energy of the rotation.
+        """Return the kinetic energy of the rotation in each of the n rows of the trajectory.
 
         Returns
         -------
@@ -178,7 +180,7 @@ class Trajectory:
         Raises
         ------
         InputError
-            For a body without moments.
+            If the body was specified without moments of inertia.
         """
         energy: Array = 0.5 * (self.omega * self._momentum()).sum(axis=1)
         return energy
@@ -209,17 +211,17 @@ class Trajectory:
     def has_all_rows(self) -> bool:
         """Whether all requested rows are present in the trajectory.
 
-        A sensitive result has all rows too, although its amplified rounding error exceeds the
-        tolerance.
+        A trajectory that is reported as sensitive has all rows too. In such a trajectory the
+        amplified rounding error exceeds the tolerance.
         """
         return self.ended in WITH_ALL_ROWS
 
 
 def turned_to_space(attitude: Array, vectors: Array) -> Array:
-    """Transform n vectors from components about the body axes to components about axes of space.
+    """Transform n vectors from body-axis components to components along the axes of space.
 
-    `attitude` has a quaternion for each vector, shape (n, 4). `vectors` and the result have the
-    shape (n, 3).
+    `attitude` has a unit quaternion, from body to space, for each vector, shape (n, 4). `vectors`
+    and the result have the shape (n, 3).
     """
     scalar, vector = attitude[:, :1], attitude[:, 1:]
     twice = 2.0 * np.cross(vector, vectors)

@@ -43,7 +43,8 @@ class ExactLaw:
     def turned(self, turn: Callable[[Exact], Exact]) -> "ExactLaw":
         """Return the law with each of its vectors rotated by the function `turn`.
 
-        The vectors are the constant, the rate and the amplitudes, which have three components each.
+        The vectors are the constant torque, the rate (the factor of time in the linear term) and
+        the amplitudes of the waves, which have three components each.
         """
 
         def waves(each: tuple[ExactWave, ...]) -> tuple[ExactWave, ...]:
@@ -122,7 +123,7 @@ def _summed(waves: Iterable[Wave], even: bool) -> list[ExactWave]:
 
     All `waves` are cosines if `even` is true, otherwise sines. A sine whose frequency is opposite
     to that of the first sine in the sum is subtracted. The result is a list of pairs: an amplitude
-    in exact fractions, and a frequency.
+    (three exact fractions) and a frequency.
     """
     found: dict[float, tuple[float, Exact]] = {}
     for amplitude, frequency in waves:

@@ -214,7 +214,8 @@ def deck(program: str) -> Deck:
 def numbers(ranges: str) -> list[int]:
     """Return the list of the card numbers that a text of numbers and ranges names.
 
-    The text ``750-770, 800`` names 750, 760, 770 and 800.
+    The text ``750-770, 800`` names 750, 760, 770 and 800, because cards are numbered in steps of
+    10.
     """
     found: list[int] = []
     for each in ranges.split(",") if ranges else ():
@@ -239,13 +240,13 @@ def find(program: str, number: int) -> Card:
 
 
 def chosen(asked: Iterable[str]) -> list[Card]:
-    """Return the cards that `asked` names; all cards of the three decks if `asked` is empty.
+    """Return the cards that `asked` names; all cards of the three programs if `asked` is empty.
 
     Parameters
     ----------
     asked : iterable of str
-        Programs, card numbers and ranges: ``two-term``, ``1660``, ``1040-1090`` (of every deck that
-        has such cards), ``two-term:1660``.
+        Programs, card numbers and ranges: ``two-term``, ``1660``, ``1040-1090`` (of every program
+        that has such cards), ``two-term:1660``.
 
     Raises
     ------

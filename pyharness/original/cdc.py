@@ -15,11 +15,12 @@ LEAST, MOST = -1023, 1022
 
 
 def cdc(p: int, rounds: bool) -> Rules:
-    """Return the arithmetic of the CDC 6600 for numbers with p-bit coefficients, as `Rules`.
+    """Return the arithmetic of the CDC 6600 for numbers with p-bit coefficients.
 
-    It is the arithmetic of the rounding instructions RX if `rounds`, else of the truncating
-    instructions FX. Literals, such as the constants .2 and .01 in the programs, are rounded to
-    nearest. This is an assumption: no source states how CDC's compiler FTN converted literals.
+    The result is a `Rules` object, whose attributes are functions for the operations. It is the
+    arithmetic of the rounding instructions RX if `rounds`, else of the truncating instructions FX.
+    Literals, such as the constants .2 and .01 in the programs, are rounded to nearest. This is an
+    assumption: no source states how CDC's compiler FTN converted literals.
     """
     settled = rounding(p, LEAST, MOST, cut=True, gradual=False)
     quarter = 1 << p - 2 if rounds else 0

@@ -19,11 +19,11 @@ def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
 
 
 def all_listings(program: str) -> Iterator[Listing]:
-    """Yield every listing of a program, a choice of its defects, readings and conjectures.
+    """Yield every listing of a program, which is a choice of its switches and readings.
 
-    Each subset of the switches is combined with each subset of the readings. The switches are the
-    names that are active in the original program: its defects (mistakes) and some conjectures
-    (assumptions). Readings are interpretations of doubtful cards.
+    The switches of a program are its defects (mistakes) and some conjectures (assumptions), which
+    are all active in the original program. Readings are interpretations of doubtful cards. Each
+    subset of the switches is combined with each subset of the readings.
     """
     for readings in subsets(names_of("reading", program)):
         for defects in subsets(switches(program)):
@@ -31,9 +31,10 @@ def all_listings(program: str) -> Iterator[Listing]:
 
 
 def all_cells() -> Iterator[tuple[Listing, int]]:
-    """Yield every pair of a listing and the number of a case of Table 1, for all programs.
+    """Yield every pair of a listing and the number of a case of the thesis, for all programs.
 
-    A listing is a program with a choice of its defects, readings and conjectures. For a case with
+    A listing is a program with a choice of its defects (mistakes), readings (interpretations of
+    doubtful cards) and conjectures (assumptions). The cases are those of Table 1. For a case with
     an initial torque, each listing is also yielded with the conjecture `initial-torque`.
     """
     for program in PROGRAMS:
@@ -46,7 +47,7 @@ def all_cells() -> Iterator[tuple[Listing, int]]:
 
 
 def cell_name(listing: Listing, case: int) -> str:
-    """Return a name for the combination of a listing and a case of Table 1.
+    """Return a name for the combination of a listing and a case of Table 1 of the thesis.
 
     A listing is a program with a choice of its defects. An example of a name is
     ``two-term/case-3/dt-accumulates+torque-held``.
@@ -57,9 +58,9 @@ def cell_name(listing: Listing, case: int) -> str:
 def listing_name(listing: Listing) -> str:
     """Return a name, without blanks, for a listing (a choice of a program's defects).
 
-    The name is ``corrected``, or ``original`` followed by the active readings, each after a colon.
-    For any other listing it consists of the names of all active defects, readings and conjectures,
-    joined by ``+``.
+    The name is ``corrected``, or ``original`` followed by the chosen readings (interpretations of
+    doubtful cards), each after a colon. For any other listing it consists of the names of all
+    chosen defects, readings and conjectures (assumptions), joined by ``+``.
     """
     if listing.label == "custom":
         return "+".join(sorted(listing.active))

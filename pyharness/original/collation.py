@@ -37,7 +37,8 @@ def expected_lines() -> list[tuple[str, str]]:
 def unexplained(scan: str) -> list[str]:
     """Return one sentence for each line in which a scan disagrees with our tables of cards.
 
-    `scan` is the text of the whole thesis, as scanned. The list is empty if all lines agree.
+    The cards are the lines of the programs. `scan` is the text of the whole thesis, as scanned. The
+    list is empty if all lines agree.
 
     Raises
     ------
@@ -70,10 +71,11 @@ def unexplained(scan: str) -> list[str]:
 def undeclared() -> list[str]:
     """Return one sentence for each disagreement between the cards and the critical apparatus.
 
-    The apparatus has entries that explain the deviations of the scan from our text of the cards. A
-    card names an entry for each deviation. This entry must declare the deviation. Conversely, each
-    deviation that an entry declares must be recorded with a card. A card that is missing from the
-    scan must name an entry of the kind ``missing text``.
+    The cards are the lines of the programs. The apparatus has entries that explain the deviations
+    of the thesis's scan from our text of the cards. A card names an entry for each deviation. This
+    entry must declare the deviation. Conversely, each deviation that an entry declares must be
+    recorded with a card. A card that is missing from the scan must name an entry of the kind
+    ``missing text``.
     """
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):

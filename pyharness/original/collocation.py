@@ -37,9 +37,9 @@ def integrate(
     as the program computes it.
 
     The function `rates` returns the right-hand sides of all unknowns at one point. Its first
-    argument is the list of the torques over the moments (1/s2) at the start and at all collocation
-    points. The others are the number k of the point (0 for the start), and the unknowns at this
-    point.
+    argument is the list of the torques divided by the moments of inertia (1/s2) at the start and at
+    all collocation points. The others are the number k of the point (0 for the start), and the
+    unknowns at this point.
     """
     h = scene.step_size
     dt = h
@@ -75,9 +75,9 @@ def interval(
 
     `start` contains the unknowns at the start of the interval. The collocation points `points` and
     the time `end` of the result are in seconds from the start. The function `rates` returns the
-    right-hand sides at point k (0 for the start), from k and the unknowns. IER is the code of the
-    linear solver LEQT1F in its second call, which computes the correction. The programs print this
-    code.
+    right-hand sides at point k (0 for the start), from k and the unknowns. The linear solver LEQT1F
+    is called twice, for a first estimate and for its correction. IER is the error code of the
+    second call, which the programs print.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))
@@ -98,10 +98,10 @@ def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[flo
 
 
 def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
-    """Return the matrix of the derivatives of t, t**2, ... at the collocation points (eq. 36).
+    """Return the matrix of the derivatives of t, t**2, ... at the collocation points.
 
-    The matrix has a row for each of `points` (s), and a column for each power of t. There are as
-    many powers as points.
+    This is the matrix of equation 36 of the thesis. It has a row for each of `points` (s), and a
+    column for each power of t. There are as many powers as points.
     """
     return [
         [1.0, 2.0 * t, 3.0 * (t * t), 4.0 * (t * t * t), 5.0 * (t * t * t * t)][: len(points)]

@@ -25,11 +25,11 @@ def run(
 ) -> Trajectory:
     """Run the compiled program of a listing in a word, which is a floating-point format.
 
-    `listing` is the program with its active defects. `lipschitz` is the constant of the stop test
-    (1/s), and `may_stop` says whether the test may end the run. The result is that of
-    `in_word.run`, which runs the Python version (twin). Raise InputError if the extension's
-    compiler does not support the word, or if angles of the torque's waves are too large for the
-    extension's sine. Raise NotBuiltError if the extension is not built.
+    `listing` is the program with its active defects. `lipschitz` is the Lipschitz constant (1/s) of
+    the Runge-Kutta program's stop test, and `may_stop` says whether this test may end the run. The
+    result is that of `in_word.run`, which runs the Python version (twin). Raise InputError if the
+    extension's compiler does not support the word, or if angles of the torque's waves are too large
+    for the extension's sine. Raise NotBuiltError if the extension is not built.
     """
     if word.p > 53:
         _check_angles(scene)

@@ -173,9 +173,10 @@ def _renamed(statement: str, names: str) -> str:
 
 
 def _names_a_card(entry: dict[str, Any], row: Row) -> bool:
-    """Return whether an entry of the critical apparatus names a card of a row, or no card at all.
+    """Return whether an entry of the critical apparatus names a card of a row, or names no card.
 
-    The row is one of the table that compares the programs' cards with the text of the thesis.
+    The critical apparatus explains deviations in the thesis's programs. The row is one of the table
+    that compares the programs' cards with the text of the thesis.
     """
     return not entry["cards"] or any(
         set(numbers(entry["cards"].get(program, ""))) & set(numbers(cards))

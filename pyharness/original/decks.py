@@ -64,11 +64,12 @@ def deck_text(
     Parameters
     ----------
     listing : Listing
-        The program, its active defects and readings.
+        The program, with its active defects and its readings (interpretations of doubtful cards).
     scene : Scene, optional
-        A case of Table 1. Its numbers are written on the deck's own assignment cards, and its
-        number of steps in the DO statement. By default it is the case on the published cards: Case
-        2 with 300 steps in the collocation decks, Case 5 with 100 steps in the Runge-Kutta deck.
+        A case of Table 1 of the thesis. Its numbers are written on the deck's own assignment cards,
+        and its number of steps in the DO statement. By default it is the case on the published
+        cards: Case 2 with 300 steps in the collocation decks, Case 5 with 100 steps in the
+        Runge-Kutta deck.
     dialect : {"1982", "gfortran", "ftn"}
         With "1982" the text is that of the cards, without changes for a compiler. "ftn" is for the
         compiler for which the decks were written, and adds only the torque of Case 7. "gfortran"
@@ -147,8 +148,8 @@ def _is_made(
 
     An alteration deletes, replaces or inserts cards, for example to correct a defect. `alteration`
     is an entry of `data/cards/alterations.toml`, and applies if all its conditions are satisfied.
-    `listing` is a program with a choice of its defects. `case` is the number of the case of Table
-    1, or None for the case on the published cards.
+    `listing` is a program with a choice of its defects. `case` is the number of the case of Table 1
+    of the thesis, or None for the case on the published cards.
     """
     named = alteration.get
     return (
@@ -177,16 +178,19 @@ def model_cards(terms: int) -> dict[int, str]:
     """Return the text of each card, by card number, of a collocation deck with `terms` terms.
 
     The cards are derived from the four-term deck, and have new numbers. They are a conjecture,
-    because V.2 of the thesis uses models of three and five terms in Case 6, but the thesis does not
-    print their decks. With n terms the collocation points are at the fractions k/(n+1) of the
-    interval, where k is 1 to n.
+    because V.2 of the thesis uses models of three and five terms in Case 6 of Table 1, but the
+    thesis does not print their decks. With n terms the collocation points are at the fractions
+    k/(n+1) of the interval, where k is 1 to n.
     """
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
     end = f"T{terms + 1}"
 
     def made(start: str, last: str, new: list[str]) -> None:
-        """Replace the cards from the text `start` to the text `last` by the statements `new`."""
+        """Replace the cards from the text `start` to the text `last` by the statements `new`.
+
+        The first card that is replaced reads `start`, and the last one reads `last`.
+        """
         first = next(n for n, each in enumerate(text) if each.strip() == start)
         after = next(n for n in range(first, len(text)) if text[n].strip() == last)
         text[first : after + 1] = [f"      {each}" for each in new]

@@ -16,8 +16,8 @@ Vector = Sequence[float]
 def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
     """Return F, G, H of the thesis's equations 16-18, the rates of change of omega (rad/s2).
 
-    `coefficients` contains A, B, C of Euler's equations, `m` the torque over the moment of inertia
-    about each axis (1/s2), and `u` the angular velocity omega (rad/s).
+    `coefficients` contains A, B, C of Euler's equations, `m` the torque divided by the moment of
+    inertia about each axis (1/s2), and `u` the angular velocity omega (rad/s).
     """
     a, b, c = coefficients
     return [m[0] + a * u[1] * u[2], m[1] + b * u[0] * u[2], m[2] + c * u[0] * u[1]]
@@ -26,8 +26,8 @@ def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
 def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
     """Return F/m - omega x V, the rate of change of the translational velocity (m/s2).
 
-    `acceleration` is the force over the mass F/m (m/s2), `u` the angular velocity omega (rad/s) and
-    `v` the velocity V (m/s), all along the body axes.
+    `acceleration` is the force divided by the mass, F/m, (m/s2), `u` the angular velocity omega
+    (rad/s) and `v` the velocity V (m/s), all along the body axes.
     """
     return [
         acceleration[0] + v[1] * u[2] - v[2] * u[1],
@@ -37,7 +37,7 @@ def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
 
 
 def accelerations(scene: Scene, listing: Listing) -> list[float]:
-    """Return the force over the mass along each body axis (m/s2).
+    """Return the force divided by the mass along each body axis (m/s2).
 
     With the defect `three-masses` in `listing`, each axis has its own mass. Without the defect the
     first mass is used for all axes.
@@ -47,10 +47,11 @@ def accelerations(scene: Scene, listing: Listing) -> list[float]:
 
 
 def initial_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque of a scene over its moments of inertia (1/s2), or None.
+    """Return the initial torque of a scene divided by its moments of inertia (1/s2).
 
-    The result is None if the scene has no moments, or is not a case of Table 1 with an initial
-    torque. By the conjecture (assumption) `initial-torque` this torque acts during the first step.
+    The result is None if the scene has no moments, or is not a case of Table 1 of the thesis with
+    an initial torque. By the conjecture (assumption) `initial-torque` this torque acts during the
+    first step.
     """
     given = card_torque(scene)
     if given is None or scene.moments is None:
@@ -73,9 +74,9 @@ def all_finite(values: Vector) -> bool:
 
 
 class Record:
-    """The rows of the run of a program's Python version, from which a trajectory is made.
+    """The results of a run of a program's Python version, from which a trajectory is made.
 
-    The rows are added step by step.
+    A row of results is added for each step.
     """
 
     def __init__(self, scene: Scene, evaluations_per_step: int) -> None:
@@ -90,7 +91,7 @@ class Record:
         self._ier: list[int] = []
 
     def add(self, recorded_time: float, omega: Vector, velocity: Vector, ier: int = 0) -> None:
-        """Add the row of results of the next step.
+        """Add the results of the next step to this record, as a row.
 
         `recorded_time` is TIME (s) as the program computes it. `omega` (rad/s) and `velocity` (m/s)
         are the results of the step. `ier` is the error code of the linear solver in the step.

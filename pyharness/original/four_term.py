@@ -17,8 +17,9 @@ def run(
 ) -> Trajectory:
     """Run the four-term collocation program on a scene, and return its trajectory.
 
-    `listing` is the program with its active defects, readings and conjectures. `lipschitz` and
-    `may_stop` have no effect, because the program has no stop test.
+    `listing` is the program with its active defects (mistakes), readings (interpretations of
+    doubtful cards) and conjectures (assumptions). `lipschitz` and `may_stop` have no effect,
+    because the program has no stop test.
     """
     coefficients = scene.euler_coefficients
     acceleration = accelerations(scene, listing)

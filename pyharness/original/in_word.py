@@ -22,10 +22,10 @@ def run(
 ) -> Trajectory:
     """Run the Python version of a listing's program in a word, which is a floating-point format.
 
-    `listing` is the program with its active defects. `lipschitz` is the constant of the stop test
-    (1/s), and `may_stop` says whether the test may end the run. No argument is checked. The
-    trajectory contains the results rounded to floats. Its attribute `exact` contains the results as
-    numbers of the word.
+    `listing` is the program with its active defects. `lipschitz` is the Lipschitz constant (1/s) of
+    the Runge-Kutta program's stop test, and `may_stop` says whether this test may end the run. No
+    argument is checked. The trajectory contains the results rounded to floats. Its attribute
+    `exact` contains the results as numbers of the word.
     """
     twin = importlib.import_module(f"pyharness.original.{listing.program.replace('-', '_')}")
     found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)

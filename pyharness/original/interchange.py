@@ -40,8 +40,8 @@ def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
 def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
     """Return the array of numbers of the IEEE 754 format `word` that `given` represents.
 
-    `given` is an array of bytes in column-major order, as `to_bytes` returns it. Its first axis is
-    the bytes of a number. The shape of the result is that of the other axes.
+    `given` is an array of bytes in column-major order, as `to_bytes` returns it. Its first index
+    counts the bytes of a number. The result has the shape of the other axes.
     """
     size = n_bytes(word)
     written = given.tobytes(order="F")

@@ -107,14 +107,16 @@ def run_many(
     scene : Scene
         The scene that supplies every value for which no array is specified.
     listing : Listing
-        The program with its active defects, readings and conjectures.
+        The program with its active defects (mistakes that are not corrected), readings
+        (interpretations of doubtful cards) and conjectures (assumptions about missing cards).
     omega0, moments, coefficients, torque_constant : array_like, shape (n, 3) or (3,), optional
         Values that replace those of the scene: initial angular velocities (rad/s), moments of
         inertia (kg m2) or Euler coefficients A, B, C, and constant torques. Torques are in N m, or
         in 1/s2 for bodies specified by coefficients. At most one of `moments` and `coefficients`
         may be specified.
     step_size, lipschitz : array_like, shape (n,) or one number, optional
-        Step sizes (s; by default the step size of the scene) and constants of the stop test (1/s).
+        Step sizes (s; by default the step size of the scene) and constants of the Lipschitz
+        condition in the stop test (1/s).
     may_stop : bool
         Whether the stop test, which only the Runge-Kutta program has, may end runs.
     velocity : bool
@@ -205,8 +207,8 @@ def _run(
     """Run a compiled program of the thesis for n bodies, with arguments that have been checked.
 
     The arguments are those of `run_many`. `inputs` contains its arrays by name. ``inputs["body"]``
-    contains moments if `by_moments`, else coefficients. `wanted` contains the steps whose results
-    are returned.
+    contains the moments of inertia if `by_moments`, else the coefficients A, B, C of Euler's
+    equations. `wanted` contains the steps whose results are returned.
     """
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())

@@ -129,7 +129,7 @@ def operations_per_step(listing: Listing) -> Count:
     """Return the number of arithmetic operations of a listing's program in its first step.
 
     The result is a `Count`. A listing is a program with a choice of its defects. The scene is the
-    case of Table 1 that is on the published cards of the program.
+    case of Table 1 of the thesis that is on the published cards of the program.
     """
     statements = list(_statements(deck_text(listing)))
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))

@@ -94,8 +94,9 @@ def formats_of(program: str) -> dict[str, Any]:
 def _torque_cards(scene: Scene) -> tuple[float, float, float]:
     """Return the three torques (N m) on the punched input cards for a scene.
 
-    If the scene is a case of Table 1 with initial torques, these are on the cards, because no card
-    has a torque that varies with time. For any other scene the result is its constant torques.
+    No card can express a torque that varies with time. Therefore, if the scene is a case of Table 1
+    of the thesis that specifies initial torques, the result is these torques. For any other scene
+    the result is its constant torques.
     """
     cards = {entry["case"]: entry["torque"] for entry in facts("printer")["initial_torque"]}
     first, second, third = cards.get(scene.case, scene.torque.constant)

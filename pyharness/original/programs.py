@@ -73,8 +73,8 @@ class Program:
     ) -> Trajectory:
         """Run the program in binary64, with arguments that have been checked.
 
-        `options` are the arguments `lipschitz`, `may_stop` and `velocity` of `run`, in this order.
-        `implementation` is ``fortran`` or ``python``.
+        The further arguments, `options`, are the arguments `lipschitz`, `may_stop` and `velocity`
+        of `run`, in this order. `implementation` is ``fortran`` or ``python``.
         """
         if implementation == "fortran":
             return compiled.run(scene, listing, *options)
@@ -144,7 +144,7 @@ def run_program(
     implementation : {"fortran", "python"}
         The compiled program or its Python port, the twin. Their results are bit-for-bit identical.
     lipschitz : float
-        Constant of the stop test (1/s), which only the Runge-Kutta program has.
+        Lipschitz constant of the stop test (1/s), which only the Runge-Kutta program has.
     may_stop : bool
         Whether the stop test may end the run.
     velocity : bool

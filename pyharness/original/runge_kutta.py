@@ -27,8 +27,8 @@ def run(
     """Run the Runge-Kutta program on a scene, and return its trajectory.
 
     `listing` is the program with its active defects, readings (interpretations of doubtful cards)
-    and conjectures (about missing cards). `lipschitz` is the constant of the stop test (1/s). If
-    `may_stop` is false, the stop test is skipped.
+    and conjectures (about missing cards). `lipschitz` is the Lipschitz constant of the stop test
+    (1/s). If `may_stop` is false, the stop test is skipped.
     """
     a, b, c = scene.euler_coefficients
     acceleration = accelerations(scene, listing)
@@ -108,13 +108,14 @@ def lipschitz_test(
 ) -> tuple[str, float] | None:
     """Return the name of a variable that violates eq. 19, and its quotient (1/s), or None.
 
-    Equation 19 is the Lipschitz condition, by which the program may stop. `change_k` and `change_u`
-    are the magnitudes of the changes of the six right-hand sides and of the six unknowns within one
-    step. The condition is violated if the change of the right-hand sides exceeds `lipschitz` (1/s)
-    times the change of the unknowns. The compared changes are the norms over omega. With the defect
-    `lipschitz-per-component` in `listing`, each component is compared by itself. With the defect
-    `lipschitz-tests-velocity` the velocity is included. The quotient is the change of the
-    right-hand sides over the change of the unknowns. It is infinite if the unknowns do not change.
+    Equation 19 of the thesis is the Lipschitz condition, by which the program may stop. `change_k`
+    and `change_u` are the magnitudes of the changes of the six right-hand sides and of the six
+    unknowns within one step. The condition is violated if the change of the right-hand sides
+    exceeds `lipschitz` (1/s) times the change of the unknowns. For each change the norm over the
+    three components of omega is compared. With the defect `lipschitz-per-component` in `listing`,
+    each component is compared by itself. With the defect `lipschitz-tests-velocity` the velocity is
+    included. The quotient is the change of the right-hand sides divided by the change of the
+    unknowns. It is infinite if the unknowns do not change.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

@@ -43,7 +43,7 @@ class Answer(NamedTuple):
 
     @property
     def agrees(self) -> bool:
-        """Return whether our result equals the expected result; blanks are ignored."""
+        """Return whether our result equals the vector's expected result; blanks are ignored."""
         return "".join(self.vector.result.split()) == "".join(self.found.split())
 
 

@@ -74,7 +74,7 @@ class Number:
     def __truediv__(self, other: Any) -> "Number":
         """Return this number divided by `other`, rounded by the rounding rule of the word.
 
-        A nonzero number over zero is infinite; zero over zero is nan.
+        A nonzero number divided by zero is infinite; zero divided by zero is nan.
         """
         own = self.__class__
         if other.__class__ is not own:
@@ -84,7 +84,7 @@ class Number:
         return self._special(_quotient, other)
 
     def __rtruediv__(self, other: Any) -> "Number":
-        """Return `other` over this number; `other` is first converted to this number's format."""
+        """Return `other`, converted to this number's format, divided by this number."""
         return self.word(other) / self
 
     def __neg__(self) -> "Number":
@@ -269,9 +269,10 @@ class Word:
         largest: int | None = None,
         cut_literals: bool = False,
     ) -> None:
-        """Select the arithmetic for p bits and the rule, and make the class of the word's numbers.
+        """Select the arithmetic for p bits and the rounding rule; make the word's class of numbers.
 
-        A word is a floating-point format.
+        A word is a floating-point format. `largest` is its largest exponent, and `cut_literals`
+        says whether values that are converted to the format are truncated.
         """
         if rule not in RULES:
             raise unknown("rounding", rule, RULES)

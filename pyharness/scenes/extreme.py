@@ -17,7 +17,10 @@ from pyharness.scenes.rescaled import scaled
 
 
 class Circumstance(NamedTuple):
-    """One named extreme scene, and the time (s) until which methods are tested on it."""
+    """One named extreme scene, and the time (s) until which methods are tested on it.
+
+    Extreme scenes have, for example, nearly equal moments or a very large omega.
+    """
 
     name: str
     scene: Scene
@@ -171,9 +174,10 @@ TWOS = (-996, -500, -100, 100, 498, 996)
 
 
 def _scales() -> Iterator[Circumstance]:
-    """Yield scenes of one motion with rescaled time: omega times a factor, time divided by it.
+    """Yield scenes of one motion with rescaled time.
 
-    The factors are from 1e-300 to 1e300. Therefore omega is from about 1e-300 to 1e300 rad/s.
+    Omega is multiplied by a factor, and time is divided by the same factor. The factors are from
+    1e-300 to 1e300. Therefore omega is from about 1e-300 to 1e300 rad/s.
     """
     scene = in_steps(ORDINARY, ORDINARY_TIME)
     named = [(f"1e{power}", float(f"1e{power}")) for power in _TENS]

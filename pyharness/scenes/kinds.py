@@ -84,9 +84,9 @@ def _from_rest(source: Random) -> Scene:
 def _slow_waves(source: Random) -> Scene:
     """Return a random scene under a torque of slow sine or cosine terms.
 
-    Their frequencies are from 1e-12 to 0.1 rad/s, so that a phase may change by only 1e-14 rad in
-    the whole motion. In half of the scenes the body is initially at rest. `source` is the random
-    generator.
+    The frequencies of these terms are from 1e-12 to 0.1 rad/s. The angle of a sine or cosine may
+    therefore change by only 1e-14 rad in the whole motion. In half of the scenes the body is
+    initially at rest. `source` is the random generator.
     """
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-2.0, 2.0)
@@ -132,10 +132,10 @@ def _far_scale(source: Random) -> Scene:
 
 
 def _sensitive(source: Random) -> Scene:
-    """Return a random scene near a rotation about the middle axis.
+    """Return a random scene near a rotation about the axis of the middle moment of inertia.
 
-    Such a motion is sensitive: its error amplification is up to 1e6. `source` is the random
-    generator.
+    Such a motion is sensitive: an initial error of omega may grow by a factor of up to 1e6.
+    `source` is the random generator.
     """
     low, middle, high = body = _body(source)
     spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
@@ -173,7 +173,7 @@ def _no_body(source: Random) -> Scene:
 def _extreme(source: Random) -> Scene:
     """Return a random scene with numbers from nearly the whole range of binary64.
 
-    Most of these scenes overflow. `source` is the random generator.
+    In most of these scenes the solution overflows. `source` is the random generator.
     """
 
     def any_size() -> float:

@@ -19,8 +19,9 @@ _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 class Draw:
     """The random inputs of one check: a scene, a program, and parameters of their runs.
 
-    The scene is solved by methods and by the program. `listing` is a program of the thesis with a
-    random choice of its defects. A seed and the number of the check determine all inputs.
+    The scene is solved by modern methods of this package and by a program of the thesis. `listing`
+    is this program with a random choice of its defects. A seed and the number of the check
+    determine all inputs.
     """
 
     scene: Scene  # in odd draws a difficult scene, named by its kind in `NASTY`
@@ -33,9 +34,9 @@ class Draw:
 
     @property
     def time(self) -> float:
-        """The end time (s) of an integration by a method; negative if it is backward in time.
+        """The end time (s) of a method's integration; negative if it is backward in time.
 
-        Its absolute value is the scene's step size times its number of steps.
+        The absolute value is the scene's step size times the scene's number of steps.
         """
         return self.scene.step_size * self.scene.steps * (-1.0 if self.backward else 1.0)
 
@@ -50,9 +51,10 @@ class Draw:
 
 
 def weekly_seed(day: datetime.date | None = None) -> str:
-    """Return the week of `day` as text, as in 2026-W47, for a seed that changes every Monday.
+    """Return the week of `day` as text, as in 2026-W47.
 
-    If `day` is None, it is today.
+    The text is used as a seed of random checks, and changes every Monday. If `day` is None, the
+    current week is returned.
     """
     year, week, _ = (day or datetime.date.today()).isocalendar()
     return f"{year}-W{week:02d}"

@@ -31,10 +31,10 @@ _NOTHING = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class Amplification:
-    """The matrix by which one step multiplies a perturbation, with polynomials in z as elements.
+    """The matrix by which one step of a program multiplies a perturbation.
 
-    z is the step size times an eigenvalue of the Jacobian. The matrix has m rows and columns, for
-    the m vectors that the program propagates from step to step.
+    Its elements are polynomials in z, the step size times an eigenvalue of the Jacobian. The matrix
+    has m rows and columns, for the m vectors that the program propagates from step to step.
     """
 
     # fractions, shape (m, m, 5): for element (i, j) the coefficients of 1, z ... z**4. The last row
@@ -62,11 +62,12 @@ class Amplification:
         return np.asarray(np.abs(np.linalg.eigvals(self.at(z))).max(axis=-1))
 
     def moving(self) -> "Amplification":
-        """Return the matrix without the row and column of the step's result, if that is possible.
+        """Return the amplification matrix without the step's result, if that is possible.
 
-        The rows and columns belong to the vectors that a step propagates. The result can be left
-        out if no other vector depends on it, and it only accumulates the other vectors. Its
-        eigenvalue then does not depend on z. If it can't be left out, return the whole matrix.
+        The rows and columns belong to the vectors that a step propagates, one of which is its
+        result. The row and column of the result can be left out if no other vector depends on it,
+        and it only accumulates the other vectors. Its eigenvalue then does not depend on z. If it
+        can't be left out, return the whole matrix.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -114,14 +115,14 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return the integral of s**2 over a step as a collocation program computes it, over h**3.
+    """Return a collocation program's integral of s**2 over a step, divided by h**3.
 
     Here h is the step size, s is the time since the beginning of the step, and `step` is the number
     of the step, from 1. `listing` is the program with its active defects. Along the first estimate
     the right-hand side is F + s J F + s**2 Q(F). F and J are the right-hand side and its Jacobian
     at the beginning of the step, and Q is the quadratic part of the right-hand side. Therefore the
-    integral of s**2 is the weight of Q(F) in the result of the step. The exact value of this
-    integral over h**3 is 1/3.
+    integral of s**2 is the weight of Q(F) in the result of the step. The exact integral divided by
+    h**3 is 1/3.
     """
     points, weights = _quadrature(listing, step)
     found: Fraction = weights @ points**2

@@ -28,7 +28,11 @@ _SAMPLES = 256
 
 @dataclass(frozen=True)
 class Noise:
-    """Bounds of the errors of omega that one step may add, relative to the largest abs(omega)."""
+    """Bounds of the errors of omega that one step of a method may add.
+
+    The errors are the rounding error and the truncation error. Both are relative to the largest
+    abs(omega).
+    """
 
     step: float  # step size, s
     rounding: float  # bound of the rounding error, whose sign is random
@@ -82,8 +86,9 @@ class Orbit:
 def orbit(scene: Scene) -> Orbit:
     """Return samples of omega over two periods, with quantities from which error bounds follow.
 
-    The scene must have no torque, and must have moments. The result contains the largest factors
-    from an error of omega to errors of energy, momentum, frequency and phase.
+    The scene must have no torque, and must have moments. The result also contains the largest
+    factors by which an error of omega is multiplied in the errors of energy, momentum, frequency
+    and phase. The frequency is 2 pi divided by the period of omega.
     """
     a = np.array(scene.euler_coefficients)
     frequency = _frequency(a, np.array(scene.omega))
@@ -235,14 +240,14 @@ def exponent(steps: Sequence[float] | Array, found: Array) -> float:
 
     The array `found` of errors has a row for each initial condition and a column for each of the
     numbers of steps in `steps`. A straight line is fitted to the logarithm of the root mean square
-    over the logarithm of the number of steps. The power is the slope of this line.
+    as a function of the logarithm of the number of steps. The power is the slope of this line.
     """
     size = np.log(np.maximum(root_mean_square(found), 1e-300))
     return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
 
 
 def _frequency(a: Array, omega: Array) -> float:
-    """Return the frequency of omega in torque-free motion (rad/s), which is 2 pi over its period.
+    """Return the frequency of omega in torque-free motion (rad/s), 2 pi divided by its period.
 
     `a` contains the Euler coefficients A, B, C, and `omega` is the initial omega (rad/s). The
     frequency is computed by the arithmetic-geometric mean.
@@ -259,7 +264,7 @@ def _frequency(a: Array, omega: Array) -> float:
 def _steepness(a: Array, omega: Array) -> float:
     """Return the sum of the absolute derivatives of the frequency by the components of omega.
 
-    The frequency is 2 pi over the period of omega in torque-free motion. The derivatives are
+    The frequency is 2 pi divided by the period of omega in torque-free motion. The derivatives are
     central differences at `omega` (rad/s). `a` contains the Euler coefficients.
     """
     size = 1e-6 * float(np.abs(omega).max())

@@ -225,8 +225,9 @@ def _errors(
     `found` is the computed solution X of the linear system `matrix` X = `side`. The ratios are for
     the residual, for the elements of X, and for the increment, which is the change of an unknown
     over the step. The fourth number is the error of the increment, relative to the step size `step`
-    (s) times the largest element of `side`. `solver` is the exact inverse of the matrix. `sizes` is
-    abs(L) abs(U) for the LU factors of the matrix, with the rows in the order of the matrix.
+    (s) times the largest element of `side`. The argument `solver` is the exact inverse of the
+    matrix. `sizes` is abs(L) abs(U) for the LU factors of the matrix, with the rows in the order of
+    the matrix.
     """
     count = len(matrix)
     x, b = fractions(found), fractions(side)
@@ -278,7 +279,7 @@ def _columns(
     """Eliminate a matrix exactly, and yield the choice of the pivot in each column.
 
     For each column, yield the index of the pivot row, the pivot candidates by row index, and all
-    rows before this column is eliminated. A candidate is the magnitude of an element over the
+    rows before this column is eliminated. A candidate is the magnitude of an element divided by the
     largest magnitude in its row of `matrix`. The pivot rows are taken in `order`. Without `order`
     the row with the largest candidate is taken, as in the programs' linear solver LEQT1F.
     """

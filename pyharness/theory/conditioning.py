@@ -46,11 +46,11 @@ class Conditioning:
     largest: float  # largest magnitude of any component of omega until the end (rad/s)
 
     def limit(self, made: float, steps: float = 0.0) -> float:
-        """Return the largest error of omega that a method may have at the end, over `largest`.
+        """Return the largest final error of omega that a method may have, divided by `largest`.
 
         `largest` is the largest magnitude of any component of omega until the end. `made` is the
-        sum of the errors of the method's steps, over `largest`, according to its tolerance or its
-        order. This sum is multiplied by the error amplification. `steps` is the number of steps
+        sum of the errors, divided by `largest`, that the method's tolerance or order allows in its
+        steps. This sum is multiplied by the error amplification. `steps` is the number of steps
         after which the method rounds omega, or 0 if the method retains its rounding errors by
         compensated summation. The limit is at most 2. This is no restriction, because components of
         magnitude up to `largest` differ by at most 2 times `largest`.
@@ -113,7 +113,7 @@ def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
 
 
 def _nodes(scene: Scene, time: float) -> Array:
-    """Return equally spaced times from 0 to `time` (s), so close that omega changes little between.
+    """Return equally spaced times from 0 to `time` (s), with little change of omega between them.
 
     Raise InputError if more than 400 000 intervals (`_MOST_NODES`) would be needed.
     """

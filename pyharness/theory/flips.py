@@ -20,8 +20,9 @@ _NEAR = 2.0**-27
 def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
     """Return the time (s) between sign changes of omega about the middle axis, without torque.
 
-    This time is half the period of omega, and equals pi over the arithmetic-geometric mean of two
-    rates. It is infinite on the separatrix and for a steady rotation.
+    This time is half the period of omega, and equals pi divided by the arithmetic-geometric mean of
+    two rates (1/s), which follow from the moments and the initial omega. It is infinite on the
+    separatrix and for a steady rotation.
 
     Parameters
     ----------

@@ -58,9 +58,9 @@ def growth_of_bodies(first: Array, third: Array) -> Array:
     """Return the growth rate Re Q of each body about its middle axis, divided by the spin.
 
     A perturbation of steady rotation about the middle axis grows like exp(Q t), where Q is the
-    fastest rate of equation 32. A body is described by Smelt's numbers K1 = A and K3 = -C, where A
-    and C are Euler coefficients. `first` contains K1 and `third` contains K3 of each body. Both are
-    from -1 to 1 for every body.
+    fastest rate of equation 32 of the thesis. A body is described by Smelt's numbers K1 = A and K3
+    = -C, where A and C are Euler coefficients. `first` contains K1 and `third` contains K3 of each
+    body. Both are from -1 to 1 for every body.
     """
     a, c = first, -third
     # Coefficients that belong to moments satisfy A + B + C + ABC = 0. At two corners of the square

@@ -49,10 +49,10 @@ def norm(matrix: Fractions) -> Fraction:
 
 
 def collocation_matrix(points: Sequence[Fraction]) -> Fractions:
-    """Return the collocation matrix of equation 36, with a row for each collocation point t.
+    """Return the thesis's collocation matrix (equation 36), with a row for each point t.
 
-    A row contains the derivatives of t, t**2, ..., t**n with respect to t at its point, where n is
-    the number of points.
+    A row contains the derivatives of t, t**2, ..., t**n with respect to t at its collocation point
+    t, where n is the number of points.
     """
     rows = [[(j + 1) * point**j for j in range(len(points))] for point in points]
     return np.array(rows, dtype=object)

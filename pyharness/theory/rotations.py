@@ -54,7 +54,8 @@ class SteadyRotation:
     def doubling_time(self) -> float | None:
         """Return the time in which the fastest-growing perturbation doubles (s).
 
-        It is None if no perturbation grows like exp(Q t), with the rates Q of equation 32.
+        It is None if no perturbation grows like exp(Q t), with the rates Q of equation 32 of the
+        thesis.
         """
         rate = self.rates[0].real
         return math.log(2.0) / rate if rate > 0.0 else None
@@ -85,9 +86,9 @@ class SteadyRotations:
 def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
     """Return the steady rotations of a scene, and how a small perturbation of each develops.
 
-    `disturbance` is the magnitude of the perturbation over the magnitude of the rotation. Raise
-    InputError if the torque varies with time, or if a rotation or its rates are beyond the range of
-    binary64.
+    `disturbance` is the magnitude of the perturbation divided by the magnitude of the rotation.
+    Raise InputError if the torque varies with time, or if a rotation or its rates are beyond the
+    range of binary64.
     """
     if scene.body_torque.varies:
         raise InputError(
@@ -107,8 +108,9 @@ def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
 def rates(coefficients: Triple, omega: Triple) -> Rates:
     """Return the three rates Q of a steady rotation (1/s), the largest real part first.
 
-    A small perturbation of the rotation is a sum of terms proportional to exp(Q t) (eq. 32).
-    `coefficients` are A, B, C of Euler's equations, and `omega` is the steady rotation (rad/s).
+    A small perturbation of the rotation is a sum of terms proportional to exp(Q t), by equation 32
+    of the thesis. `coefficients` are A, B, C of Euler's equations, and `omega` is the steady
+    rotation (rad/s).
     """
     size = max(map(abs, omega))
     if size == 0.0:
@@ -186,7 +188,7 @@ def _growing(
     It is the time at which the second-order terms reach a tenth of the perturbation. It is infinite
     if these terms are zero, and None if they are beyond the range of binary64. `rate` is the
     fastest rate Q (1/s), and `matrix` is the Jacobian (1/s) at the steady rotation `omega` (rad/s).
-    `share` is the initial magnitude of the perturbation over the magnitude of the rotation.
+    `share` is the initial magnitude of the perturbation divided by the magnitude of the rotation.
     """
     # The eigenvector of `rate` is the null vector of the matrix less the rate.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
@@ -205,15 +207,15 @@ def _growing(
 
 
 def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | None:
-    """Return the time (s) at which linear theory has a phase error of 0.1 rad about a stable axis.
+    """Return the time (s) until an oscillation about a stable axis has a phase error of 0.1 rad.
 
-    The body has no torque. `coefficients` are A, B, C in cyclic order from the axis of the
-    rotation. `rate` is the frequency of the linear oscillation (rad/s), and `share` is the
-    magnitude of the perturbation over that of the rotation. A perturbation that tilts the rotation
-    by d (rad) towards another axis changes the frequency by a fraction. This fraction is d**2 / 4
-    times the first coefficient over the coefficient of the other axis. The time is infinite if the
-    first coefficient is 0. The result is None if the frequency is 0, because then only the spin
-    drifts.
+    It is the phase error of linear theory for a small perturbation of a rotation without torque.
+    `coefficients` are A, B, C in cyclic order from the axis of the rotation. `rate` is the
+    frequency of the oscillation in linear theory (rad/s), and `share` is the magnitude of the
+    perturbation divided by the magnitude of the rotation. A perturbation that tilts the rotation by
+    d (rad) towards another axis changes the frequency by the fraction d**2 / 4 times the first
+    coefficient divided by the coefficient of the other axis. The time is infinite if the first
+    coefficient is 0. The result is None if the frequency is 0, because then only the spin drifts.
     """
     spun, *others = map(abs, coefficients)
     if spun == 0.0:
@@ -229,7 +231,7 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
 
     At a flip, omega about the middle axis changes its sign. `coefficients` are A, B, C in cyclic
     order from the middle axis. `spin` is the rotation (rad/s), and `share` is the magnitude of the
-    perturbation over that of the rotation. The time is 2 K / lambda, which is near
+    perturbation divided by the magnitude of the rotation. The time is 2 K / lambda, which is near
     (2 / lambda) ln(4 / k') if the perturbation is small. K is the complete elliptic integral with
     the complementary modulus k', and lambda is near the growth rate of the perturbation. The time
     is shortest if the perturbation is along that other axis whose coefficient has the smaller
@@ -248,10 +250,10 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
 
 
 def _places(scene: Scene) -> tuple[str, Places]:
-    """Return a text about the steady rotations of a scene, and the list of rotations to be shown.
+    """Return a text about the steady rotations of a scene, and a list of rotations for its report.
 
     Each rotation is a pair of a description and omega (rad/s). If the rotations form a continuous
-    family, only some members are shown.
+    family, the list has only some members.
     """
     coefficients, torque = scene.euler_coefficients, scene.normalized_torque(0.0)
     held = [axis for axis in range(3) if torque[axis] != 0.0]
@@ -292,7 +294,7 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 
 
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
-    """Return a text and the steady rotations to be shown for a torque about one axis.
+    """Return a text and some steady rotations for a torque about one axis, for a report.
 
     Each rotation is a pair of a description and omega (rad/s). `held` is the number of this axis,
     from 0. The steady rotations form a hyperbola, because the product of the two other components
@@ -323,12 +325,12 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
 
 
 def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
-    """Return a text and the steady rotations to be shown for a torque across the axis of symmetry.
+    """Return a text and some steady rotations for a torque perpendicular to the axis of symmetry.
 
-    Each rotation is a pair of a description and omega (rad/s). The torque is perpendicular to the
-    axis of symmetry, whose number is `axis`, from 0. `products` are the products w2 w3, w3 w1 and
-    w1 w2 of components of omega that balance the torque (rad2/s2). The steady rotations form a
-    hyperbola. Points of one branch are shown.
+    Each rotation is a pair of a description and omega (rad/s). The text and the rotations are for a
+    report. The number of the axis of symmetry, from 0, is `axis`. `products` are the products w2
+    w3, w3 w1 and w1 w2 of components of omega that balance the torque (rad2/s2). The steady
+    rotations form a hyperbola. The result contains points of one branch.
     """
     one, other = (axis + 1) % 3, (axis + 2) % 3
     # The products w_one w_axis and w_other w_axis.

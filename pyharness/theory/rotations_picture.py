@@ -35,8 +35,9 @@ def rotations_picture(scene: Scene) -> Picture:
     """Return a picture of the polhodes of a scene's body, beside the growth rates of all bodies.
 
     The left panel shows the polhodes on the sphere of directions of the angular momentum. The right
-    panel shows, for the moments of every possible body, the growth rate about the middle axis over
-    the spin. It also marks the cases of Table 1. The scene must have moments.
+    panel shows, for the moments of every possible body, the growth rate of a perturbed rotation
+    about the middle axis, divided by the spin. It also marks the cases of Table 1 of the thesis.
+    The scene must have moments.
     """
     from matplotlib.figure import Figure
 

@@ -41,7 +41,10 @@ class Numbers:
         self._torque = size(np.array(scene.normalized_torque(0.0)))
 
     def rate(self, omega: Array) -> Array:
-        """Return the right-hand sides of Euler's equations 16-18 for each omega (rad/s2)."""
+        """Return the right-hand sides of Euler's equations for each omega (rad/s2).
+
+        The equations are 16-18 of the thesis.
+        """
         turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
         return np.asarray(self._torque + self._coefficients * turned * onward)
 
@@ -64,9 +67,10 @@ class Series:
         self._torque = np.array(scene.normalized_torque(0.0))
 
     def rate(self, omega: Array) -> Array:
-        """Return the power series of the right-hand sides of Euler's equations 16-18.
+        """Return the power series of the right-hand sides of Euler's equations.
 
-        `omega` is the power series of omega. The products of series are Cauchy products.
+        The equations are 16-18 of the thesis. `omega` is the power series of omega. The products of
+        series are Cauchy products.
         """
         turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
         result = np.zeros(omega.shape)
@@ -140,7 +144,7 @@ def collocation(program: str) -> Scheme:
 
 
 def collocation_singular(program: str) -> Scheme:
-    """Return the function for a step of a collocation program with a matrix declared singular.
+    """Return the function for a step of a collocation program whose matrix is declared singular.
 
     `program` is "two-term" or "four-term". If the matrix is singular, the linear solver LEQT1F
     returns the right-hand sides of the linear system unchanged. The program then uses these
@@ -168,7 +172,7 @@ def collocation_singular(program: str) -> Scheme:
 
 
 def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after a step of the classical Runge-Kutta method of order 4 (eq. 31).
+    """Return omega after a step of the classical Runge-Kutta method of order 4 (thesis, eq. 31).
 
     `on` evaluates the equations of a scene, and multiplies by the step size. `omega` is the value
     at the start of the step.
@@ -197,7 +201,7 @@ def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
 
 
 def improved_euler(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after a step of the improved Euler method (eq. 29).
+    """Return omega after a step of the improved Euler method (thesis, eq. 29).
 
     `on` evaluates the equations of a scene, and multiplies by the step size. `omega` is the value
     at the start of the step.
@@ -207,7 +211,7 @@ def improved_euler(on: Arithmetic, omega: Array) -> Array:
 
 
 def taylor_3(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after a step of the Taylor method with three terms (eq. 30).
+    """Return omega after a step of the Taylor method with three terms (thesis, eq. 30).
 
     The second derivative of omega is the derivative of the right-hand side F in the direction F. It
     equals half of F(omega + F) - F(omega - F), because F is quadratic. `on` evaluates F for a
@@ -272,7 +276,7 @@ def spacing(count: int) -> Sequence[Fraction]:
     The formula uses the values of a function at `count` pairs of equally spaced points. It is exact
     for polynomials of degree 2 count and below. The weight of pair i, from 1, multiplies the
     difference of the values at i and -i spacings. The sum over all pairs, divided by the spacing,
-    is the derivative.
+    is the derivative at the middle of the points.
     """
     middle = math.comb(2 * count, count)
     return [

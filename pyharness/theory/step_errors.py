@@ -99,7 +99,11 @@ class Forecaster:
         self._wandering = self._of_one_step()
 
     def at(self, steps: int) -> Forecast:
-        """Return the predicted errors at the end if the method takes `steps` equal steps."""
+        """Return the predicted errors at the end if the method takes `steps` equal steps.
+
+        The result is a `Forecast` of the truncation and rounding errors, relative to the largest
+        omega.
+        """
         here = self._path
         h = float(here.times[-1]) / steps
         largest = here.flow.largest
@@ -126,7 +130,8 @@ class Forecaster:
         """Return the step size (s) below which rounding dominates the predicted error at the end.
 
         At smaller step sizes the predicted truncation error is below the expected rounding error.
-        The step size is found by bisection between `smallest` (s) and the whole time.
+        The step size is found by bisection between `smallest` (s) and the duration of the whole
+        run.
         """
         time = float(self._path.times[-1])
         high = max(1, math.floor(time / smallest))
@@ -139,7 +144,7 @@ class Forecaster:
         return time / high
 
     def _of_one_step(self) -> float:
-        """Return the mean error at the end that one step's rounding causes, over the largest omega.
+        """Return the mean final error caused by one step's rounding, relative to the largest omega.
 
         The rounding error of a component of omega is assumed to be proportional to the component. A
         component that never changes has no rounding error.

@@ -43,11 +43,11 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
     "thesis" or a tuple, as in the function `grid`. It has an effect only for collocation.
 
     The quadrature of the weighted residual is exact for constant torques, for the following reason.
-    Along a trial function the products of two omegas in equations 13-15 have degree 2n. The weight
-    functions have degree n (Galerkin), n - 1 (least squares) or, in each subdomain, 0. The
-    Gauss-Legendre quadrature with m points is exact to degree 2m - 1. For torques that vary with
-    time the error of the quadrature is of order 2n + 1 or higher in the step size. This exceeds the
-    order of each of the methods.
+    Along a trial function the products of two omegas in equations 13-15 of the thesis have degree
+    2n. The weight functions have degree n (Galerkin), n - 1 (least squares) or, in each subdomain,
+    0. The Gauss-Legendre quadrature with m points is exact to degree 2m - 1. For torques that vary
+    with time the error of the quadrature is of order 2n + 1 or higher in the step size. This
+    exceeds the order of each of the methods.
     """
     n = terms
     if weighting == "collocation":

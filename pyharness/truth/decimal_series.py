@@ -44,7 +44,7 @@ def taylor_series(
     `coefficients` are the Euler coefficients A, B, C of the scene, and `order` is the degree of the
     Taylor polynomials. `tolerance` is the local tolerance, relative to omega and to the attitude.
     `effort` is a factor on a work limit of some ten seconds; if it is None, the limit is 100 000
-    steps. Raise InputError if the limit is exceeded.
+    steps. Raise InputError if the work limit is exceeded.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
@@ -83,11 +83,12 @@ class _Limit:
         self._before: tuple[int, Decimal] = (0, Decimal(0))
 
     def check(self, step: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
-        """Raise InputError if the number of steps so far, or its forecast, exceeds the work limit.
+        """Raise InputError if the number of steps, so far or by forecast, exceeds the work limit.
 
-        This method is called before each step of an integration by Taylor series. `step` is the
-        number of steps taken, `begin` the time reached (s), `length` the length of the next step
-        (s), and `rest` the time left until the end (s).
+        The number is checked before each step of an integration by Taylor series. The forecast is
+        the expected number of steps until the end. `step` is the number of steps taken, `begin` the
+        time reached (s), `length` the length of the next step (s), and `rest` the time left until
+        the end (s).
         """
         if step == 0:
             # The first step alone justifies a refusal only if the limit would be exceeded tenfold.
@@ -111,9 +112,9 @@ class _Limit:
         """Return a forecast of the number of steps from time 0 until the end.
 
         `step` is the number of steps that were taken until the time `begin` (s), and `rest` is the
-        time left until the end (s). The forecast assumes the same mean length of the steps. If the
-        number of steps so far grew like a power of time above 1.3, the forecast assumes that power,
-        but at most 3.
+        time left until the end (s). The forecast assumes that the mean length of the steps remains
+        the same. However, if the number of steps so far grew like time to a power above 1.3, the
+        forecast assumes that power, but at most 3.
         """
         step_before, begin_before = self._before
         power = Decimal(1)

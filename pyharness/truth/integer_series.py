@@ -56,7 +56,7 @@ class _OtherUnitError(Exception):
 def integer_series(scene: Scene, times: Sequence[float]) -> Path:
     """Return the true solution of a scene at `times` (s); the scene's step size is not used.
 
-    The times are strictly monotonic in order away from 0, on one side, and none of them is 0.
+    The times are all positive or all negative, and each is farther from 0 than the one before.
     Before it is rounded to binary64, the solution has an error of some 1e-29 of the largest omega,
     times the error amplification of the motion. Raise InputError if omega grows without bound
     before the last time, or if too many steps would be needed.
@@ -160,10 +160,11 @@ def _fixed(value: Fraction) -> int:
 
 @dataclass(frozen=True)
 class _Wave:
-    """All torque terms of one frequency, as two unknowns of the series: a sine and a cosine.
+    """All torque terms of one frequency, as two unknowns: a sine and a cosine.
 
-    If the angle, frequency times the last requested time, is below 1 rad, the first unknown is the
-    sine divided by this angle. A sine of large amplitude then has its full number of digits.
+    The unknowns are integrated by Taylor series. If the angle, frequency times the last requested
+    time, is below 1 rad, the first unknown is the sine divided by this angle. A sine of large
+    amplitude then has its full number of digits.
     """
 
     to_sine: int  # the derivative of the unknown sine is `to_sine` times the cosine

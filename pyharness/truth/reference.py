@@ -47,12 +47,18 @@ class Reference:
 
     @property
     def angle_error(self) -> float:
-        """Return a bound of the error of any attitude (rad): the estimate plus rounding errors."""
+        """Return a bound of the error of any attitude (rad).
+
+        It is the estimated error before rounding plus the rounding errors of the attitude.
+        """
         return self.angle_estimate + 4.0 * _HALF_ULP
 
     @property
     def error(self) -> float:
-        """Return a bound of the error of any omega (rad/s): the estimate plus rounding errors."""
+        """Return a bound of the error of any omega (rad/s).
+
+        It is the estimated error before rounding plus the rounding error of the largest omega.
+        """
         largest = float(np.max(np.abs(self.omega), initial=0.0))
         return self.estimate + _HALF_ULP * largest
 
@@ -66,8 +72,8 @@ def reference(
 ) -> Reference:
     """Return the true solution of `scene` at `times` (s).
 
-    The times are strictly monotonic in order away from 0, forward or backward; the first may be 0.
-    An integration by Taylor series is accurate to more digits than binary64 has. If `precise` is
+    All times have the same sign, and each is farther from 0 than the one before; the first may be
+    0. An integration by Taylor series is accurate to more digits than binary64 has. If `precise` is
     true, it is accurate to 1e-25 before rounding, unless the motion amplifies errors too much. The
     error of the series is estimated by the largest difference between two integrations with
     different order and steps. `effort` is a factor on a work limit of some ten seconds. The pace of

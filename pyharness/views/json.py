@@ -10,7 +10,10 @@ SCHEMA = 1
 
 
 def write(report: Report) -> str:
-    """Return the data of a command's report as JSON in one line, with the JSON schema's number."""
+    """Return the data of a command's report as one line of JSON, with the number of its schema.
+
+    This number identifies the version of the JSON schema.
+    """
     return json_text({"schema": SCHEMA, **report.record()})
 
 

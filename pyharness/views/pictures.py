@@ -26,8 +26,8 @@ _MOST_LINES = 4
 def check_picture(path: str) -> None:
     """Raise InputError if no picture can be written to the file `path` of the option --plot.
 
-    The suffix of `path` must be .png, .svg or .pdf, and matplotlib must be installed. Both are
-    checked before anything is computed for the picture.
+    The suffix of `path` must be .png, .svg or .pdf, and matplotlib must be installed. The suffix
+    and matplotlib are checked before anything is computed for the picture.
     """
     if _form(path) not in FORMATS:
         raise InputError(f"--plot '{path}': unknown picture format; allowed: {', '.join(FORMATS)}")
@@ -35,7 +35,10 @@ def check_picture(path: str) -> None:
 
 
 def check_matplotlib(what: str) -> None:
-    """Raise InputError if matplotlib is missing; `what` names the option or verb that needs it."""
+    """Raise InputError if matplotlib is missing.
+
+    The message names `what`, the option or subcommand that needs matplotlib, such as ``--plot``.
+    """
     try:
         import matplotlib  # noqa: F401
     except ImportError:

@@ -137,7 +137,8 @@ _Answer = tuple[Array, int, int, Array]
 def _prepared(change: Callable[[Array, _Answer], _Answer]) -> AbstractContextManager[Any]:
     """Return a context manager that changes the results of the compiled kernel of prepared solvers.
 
-    Each result becomes ``change(packed, result)``, where `packed` is the input of the kernel.
+    Each result becomes ``change(packed, result)``, where `packed` is the input of the kernel. A
+    prepared solver is one that `prepare` has set up for one scene.
     """
     entry = extension.extension().solve_packed
     kernel = SimpleNamespace(
@@ -150,7 +151,7 @@ def _stale_solver() -> AbstractContextManager[Any]:
     """Return a context manager by which prepared solvers give a stale result in every second call.
 
     The stale result is the result of the call before. This is a planted fault, which checks must
-    detect.
+    detect. A prepared solver is one that `prepare` has set up for one scene.
     """
     calls = itertools.count()
     before: list[_Answer] = []
@@ -176,7 +177,8 @@ def _too_large(packed: Array, answer: _Answer) -> _Answer:
     """Return the results of a prepared solver's kernel, with omega 1 % too large for some methods.
 
     These are the methods with a fixed step and Gauss collocation. `packed` is the input of the
-    kernel, which contains the method.
+    kernel, which contains the method. A prepared solver is one that `prepare` has set up for one
+    scene. This is a planted fault, which checks must detect.
     """
     omega, status, steps, found = answer
     return (omega * 1.01 if packed[Places.METHOD] in _FIXED else omega, status, steps, found)

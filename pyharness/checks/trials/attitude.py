@@ -180,7 +180,8 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
 def _omega_limit(scene: Scene) -> float:
     """Return the error of the angular momentum that 16 rounding errors of omega may cause.
 
-    The error is relative to the norm of the angular momentum.
+    The error is relative to the norm of the angular momentum. The rounding error of each component
+    is 2**-53 times the largest component of omega.
     """
     momentum = np.array(scene.moments) * scene.omega
     size = float(np.linalg.norm(momentum)) or 1.0

@@ -141,7 +141,8 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
 def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
     """Return omega at `time` (s) by the method `name`; NaN if a prepared solver ends before `time`.
 
-    `tolerance` is relative to the largest omega.
+    `tolerance` is relative to the largest omega. A prepared solver is one that `prepare` has set up
+    for one scene.
     """
     return run_method(name, scene, time, tolerance).omega
 

@@ -154,10 +154,11 @@ def hold(long_run: LongRun, name: Name) -> Iterator[Check]:
     """Yield the checks of the growth of a method's errors, against Brouwer's law.
 
     By this law, rounding errors of energy and momentum grow like the power 1/2 of the number of
-    steps. Rounding errors of the phase grow like the power 3/2. If the errors of a step are biased,
-    the powers are 1 and 2. The power that is fitted to the errors is compared with the expected
-    power. The errors after each number of revolutions are also compared with their bounds.
-    `long_run` is the method, and `name` names the motion.
+    steps. Rounding errors of the phase (the position along the closed curve of omega) grow like the
+    power 3/2. If the errors of a step are biased, the powers are 1 and 2. The power that is fitted
+    to the errors is compared with the power of this law. The errors after each number of
+    revolutions are also compared with their bounds. `long_run` is the method, and `name` names the
+    motion.
     """
     motion = name.circumstance
     for what, found, steps, limits in measured(long_run, MOTIONS[motion], orbit_of(motion)):
@@ -176,10 +177,10 @@ def hold(long_run: LongRun, name: Name) -> Iterator[Check]:
 class Drift:
     """The errors of one quantity of a motion by one method, as a function of the number of steps.
 
-    The quantity `what` is energy, momentum or phase. The arrays have an element for each length of
-    the integration. `steps` is the number of steps. `error` is the root mean square of the errors
-    over the initial conditions, and `limits` is the bound on the errors. `starts` is the number of
-    initial conditions.
+    The quantity `what` is energy, momentum or phase (the position along the closed curve of omega).
+    The arrays have an element for each length of the integration. `steps` is the number of steps.
+    `error` is the root mean square of the errors over the initial conditions, and `limits` is the
+    bound on the errors. `starts` is the number of initial conditions.
     """
 
     motion: str
@@ -195,7 +196,8 @@ def curves() -> Iterator[Drift]:
     """Yield the errors of energy, momentum and phase by every method on every motion of the trial.
 
     The trial of length integrates torque-free motions for up to a million revolutions. Each `Drift`
-    has the errors of one quantity as a function of the number of steps.
+    has the errors of one quantity as a function of the number of steps. The phase is the position
+    along the closed curve of omega.
     """
     for motion, scene in MOTIONS.items():
         for method, long_run in LONG_RUNS.items():
@@ -214,7 +216,7 @@ def measured(
     runs from several initial conditions to several horizons, which are numbers of revolutions. The
     errors have a row for each initial condition of `starts` and a column for each horizon. They are
     NaN for a horizon after the end of the run. The numbers of steps and the bounds have an element
-    for each horizon.
+    for each horizon. The phase is the position along the closed curve of omega.
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * long_run.revolutions]
@@ -239,7 +241,7 @@ def orbit_of(motion: str) -> Orbit:
     """Return the `Orbit` of a motion of `MOTIONS`, from which the error bounds follow.
 
     An `Orbit` has the factors from errors of omega to errors of energy, momentum and phase.
-    `motion` is the name of the motion.
+    `motion` is the name of the motion. The phase is the position along the closed curve of omega.
     """
     return brouwer.orbit(MOTIONS[motion])
 
@@ -248,7 +250,7 @@ def starts(scene: Scene, body: Orbit) -> list[Scene]:
     """Return copies of the scene with different initial omegas along one and the same motion.
 
     The errors are averaged over these scenes, since they depend on the initial phase of the motion.
-    `body` is the `Orbit` of the motion, which has its frequency.
+    `body` is the `Orbit` of the motion, which has the frequency of the motion.
     """
     times = [0.37 * k / body.frequency for k in range(STARTS)]
     rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times]).tolist()
@@ -259,7 +261,7 @@ def _prepared(name: Name) -> Check:
     """Check that a prepared solver gives the same bits as the run whose errors the trial checks.
 
     Both use the same method and the same steps, for 1e4 revolutions. `name` names the method and
-    the motion.
+    the motion. A prepared solver is one that `prepare` has set up for one scene.
     """
     method, scene = name.subject, MOTIONS[name.circumstance]
     time = 1e4 * 2.0 * math.pi / orbit_of(name.circumstance).largest
@@ -290,7 +292,7 @@ def _scipy(name: Name) -> Iterator[Check]:
 def _program(listing: Listing, name: Name) -> Iterator[Check]:
     """Report the errors of a program of the thesis after 10 and 1e4 revolutions, without a limit.
 
-    `listing` is the program with its active defects, and `name` names the scene.
+    `listing` is the program with a choice of its defects, and `name` names the scene.
     """
     scene = scene_of(name)
     found = unstopped(listing).rows(scene)

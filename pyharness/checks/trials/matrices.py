@@ -80,9 +80,9 @@ def _threshold(name: Name) -> Check:
 def _counted(listing: Listing, name: Name) -> Check:
     """Check the number of steps of a run in which the program prints IER = 129 (singular matrix).
 
-    `listing` is the program with its active defects, and `name` names the scene. In the original
-    programs the defect `dt-accumulates` moves the collocation points in later steps, so that the
-    matrix ceases to be singular.
+    `listing` is the program with a choice of its defects, and `name` names the scene. In the
+    original programs the defect `dt-accumulates` moves the collocation points in later steps, so
+    that the matrix ceases to be singular.
     """
     scene = scene_of(name)
     ier = compiled.run(scene, listing, velocity=False).ier

@@ -49,7 +49,8 @@ def _attempts() -> Iterator[Attempt]:
     """Yield deferred checks that compare the steps of every program with its amplification matrix.
 
     Every program is tried in its original and its corrected version. The Runge-Kutta program is
-    also tried with a single defect, `stage-base` or `base-not-restored`.
+    also tried with a single defect, `stage-base` or `base-not-restored`. A deferred check is
+    computed only if it is requested.
     """
     halves = [subset("runge-kutta", keep=[name]) for name in ("stage-base", "base-not-restored")]
     for listing in (*LISTINGS, *halves):
@@ -120,8 +121,8 @@ def _spin(listing: Listing, name: Name) -> Check:
     """Report, without a limit, by how much a wobble about axis 3 grows in a step of a program.
 
     The growth is the spectral radius of the program's amplification matrix less 1. `listing` is the
-    program with its active defects. `name` has the scene, a case of Table 1, whose spin about axis
-    3 is the steady rotation.
+    program with a choice of its defects. `name` has the scene, a case of Table 1 of the thesis,
+    whose spin about axis 3 is the steady rotation.
     """
     scene = scene_of(name)
     z = eigenvalues(replace(scene, omega=(0.0, 0.0, scene.omega[2])))

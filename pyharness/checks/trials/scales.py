@@ -32,7 +32,7 @@ def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) ->
 
     The motion is computed by `method`, one of our own. `powers` has the exponents of the powers of
     two by which omega is multiplied and the time divided. `kind` begins the last part of the
-    checks' ids, as in ``same-2^100``.
+    checks' ids, as in ``same-2^100``. A deferred check is computed only if it is requested.
     """
     time = scene.step_size * scene.steps
     plain = cache(lambda: _tried(method, scene, time))

@@ -19,7 +19,8 @@ def _undisturbed() -> Iterator[Attempt]:
     """Yield deferred checks that a rotation about the middle axis stays constant.
 
     Without a perturbation the constant rotation is the exact solution. Every method must return it
-    exactly, except that the method `quick` may have one rounding error.
+    exactly, except that the method `quick` may have one rounding error. A deferred check is
+    computed only if it is requested.
     """
     scene = in_steps(
         Scene("middle axis, undisturbed", (0.0, 1.0, 0.0), moments=MIDDLE_AXIS), _STAYS

@@ -46,12 +46,12 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attempt]:
-    """Yield deferred checks of a method's errors and divergence in a case of Table 1.
+    """Yield deferred checks of a method's errors and divergence in a case of Table 1 of the thesis.
 
     For every step size, the error at the end is compared with its predicted bound. The errors of
     the original programs are only reported. The step size at which truncation and rounding errors
     are equal is checked too. `listing` is the version of a program of the thesis, or None for any
-    other method.
+    other method. A deferred check is computed only if it is requested.
     """
     before = listing is not None and listing.label == "original"
     label = listing.label if listing else ""
@@ -85,9 +85,9 @@ def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attemp
 def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
     """Compare the smallest step size at which truncation dominates with the predicted one.
 
-    `method` is the name of the method, and `case` the number of a case of Table 1. `error` returns
-    the relative error of omega for a number of steps. Truncation dominates if this error equals the
-    predicted truncation error within a factor of 2.
+    `method` is the name of the method, and `case` the number of a case of Table 1 of the thesis.
+    `error` returns the relative error of omega for a number of steps. Truncation dominates if this
+    error equals the predicted truncation error within a factor of 2.
     """
     forecaster = _forecaster(case, method)
     smallest = SMALLEST
@@ -115,9 +115,10 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
     """Return the relative error of omega at the end of a run, and a note on the run.
 
-    `name` is the method, and `case` the case of Table 1 that `scene` solves. `listing` is a program
-    with its active defects, or None for any other method. The error is relative to the largest
-    omega of the motion. It is infinite or NaN if the run does not reach the end.
+    `name` is the method, and `case` the case of Table 1 of the thesis that `scene` solves.
+    `listing` is a program with a choice of its defects, or None for any other method. The error is
+    relative to the largest omega of the motion. It is infinite or NaN if the run does not reach the
+    end.
     """
     largest = _path(case).flow.largest
     note = ""
@@ -155,9 +156,9 @@ def _rows(name: str, scene: Scene) -> Trajectory:
 def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
     """Compare the smallest step for which a run diverges with the prediction of linear stability.
 
-    `listing` is a program with its active defects, or None for any other method, which `name`
-    names. If linear stability makes no prediction for the method in the case of Table 1, the step
-    is only reported.
+    `listing` is a program with a choice of its defects, or None for any other method, which `name`
+    names. If linear stability makes no prediction for the method in the case of Table 1 of the
+    thesis, the step is only reported.
     """
     scene, method = case_scene(case), name.subject
     if listing is None:

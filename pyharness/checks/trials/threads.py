@@ -110,7 +110,8 @@ def jobs() -> list[Job]:
     """Return calls of every method, prepared solver and program of the thesis in all scenes.
 
     The programs run in Fortran and in Python. Calls that raise InputError, and calls of the linear
-    solver LEQT1F, are among the calls.
+    solver LEQT1F, are among the calls. A prepared solver is one that `prepare` has set up for one
+    scene.
     """
     found = []
     for scene in SCENES:
@@ -146,7 +147,10 @@ def _prepared(scene: Scene, name: str) -> bytes:
 
 @cache
 def _shared(scene: Scene, name: str) -> Solver:
-    """Return the prepared solver for a scene and the method `name`, which all threads share."""
+    """Return the prepared solver for a scene and the method `name`, which all threads share.
+
+    The solver is set up once by `prepare`, and then called by each thread.
+    """
     return prepare(scene, name, 1e-7)
 
 
@@ -157,7 +161,7 @@ def _program(scene: Scene, listing: Listing, implementation: str) -> bytes:
 
 
 def _refusal(scene: Scene) -> bytes:
-    """Request a tolerance that no method claims to meet, which raises InputError."""
+    """Request the tolerance 1e-30, which is finer than any method accepts, to raise InputError."""
     return method_candidate("taylor", 1e-30).rows(scene, _TIMES).omega.tobytes()
 
 

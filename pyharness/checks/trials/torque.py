@@ -88,10 +88,11 @@ def averaged(scene: Scene, time: float) -> Truth:
 
 
 def summed(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) of a sphere, with a bound of few rounding errors.
+    """Return the true omega at `time` (s) of a sphere, with a bound on its few rounding errors.
 
     The closed form computes the phase of a sine wave of the torque in double-double, so that the
-    phase has no rounding error. Only the rounding errors of the terms of one sum remain.
+    phase has no rounding error. Only the rounding errors remain that arise when the terms of the
+    solution are summed.
     """
     known = reference(scene, [time])
     largest = float(np.abs([known.omega[-1], scene.omega]).max())
@@ -101,10 +102,10 @@ def summed(scene: Scene, time: float) -> Truth:
 
 
 def _wave(frequency: float) -> Circumstance:
-    """Return a test scene with fast torque waves about all axes, to be solved for 500 rad of phase.
+    """Return a test scene with fast torque waves, to be solved until their phase is 500 rad.
 
-    The waves change omega by about 1 rad/s per period. `frequency` is their angular frequency
-    (rad/s).
+    The waves (sines and cosines of time) are about all axes, and change omega by about 1 rad/s per
+    period. `frequency` is their angular frequency (rad/s).
     """
     size = 10.0 * frequency
     law = TorqueLaw(
@@ -142,8 +143,8 @@ def _tiny(size: float) -> Circumstance:
 def _resonant(moments: Triple) -> Circumstance:
     """Return a test scene whose transverse torque rotates at the precession rate of a top, 5 rad/s.
 
-    The top is the body of Case 2 of Table 1. `moments` are the moments of inertia of the scene's
-    body.
+    The top is the body of Case 2 of Table 1 of the thesis. `moments` are the moments of inertia of
+    the scene's body.
     """
     law = TorqueLaw(sines=(((0.0, -40.0, 0.0), 5.0),), cosines=(((40.0, 0.0, 0.0), 5.0),))
     scene = Scene("resonance", (0.0, 1.0, 10.0), moments=moments, torque=law, steps=2000)
@@ -197,8 +198,8 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
 def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check]:
     """Yield the check of the error of one method at the last time of the true solution.
 
-    `name` names the method and the scene. The limit is the sum of tolerance and rounding errors,
-    both times the error amplification.
+    `name` names the method and the scene. The limit is the sum of the tolerance of the method and
+    the rounding errors, both times the error amplification.
     """
     assert tolerance is not None
     method = name.subject
@@ -213,7 +214,7 @@ def _describe_axial(name: Name) -> Iterator[Attempt]:
     """Yield deferred checks that report, without a limit, the errors of runs with too large steps.
 
     `name` names the scene, whose torque has a wave (sine or cosine). In one step the phase of the
-    wave changes by a hundred radians or more.
+    wave changes by a hundred radians or more. A deferred check is computed only if it is requested.
     """
     scene = scene_of(name)
     truth = cache(lambda: brouwer.floats(axial_top(scene, scene.times())))

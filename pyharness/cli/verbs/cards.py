@@ -33,11 +33,12 @@ EXAMPLE = "cards runge-kutta:860"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the requested cards, or the result of the option that requests something else.
+    """Print punched cards of the thesis's programs, or the result that an option requests instead.
 
-    With --scan, our text of the cards is compared with a scan; with --collate, the three decks are
-    compared with each other. Return exit status 1 if one of these comparisons finds a difference
-    that the apparatus, our list of recorded deviations, does not explain. Otherwise return 0.
+    With --scan, our text of the cards is compared with a scan of the thesis. With --collate, the
+    decks of cards of the three programs are compared with each other. Return exit status 1 if one
+    of these comparisons finds a difference that the apparatus, our list of recorded deviations,
+    does not explain. Otherwise return 0.
     """
     if options.format == "tei":
         from pyharness.history.tei import tei_document

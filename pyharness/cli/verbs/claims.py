@@ -29,8 +29,9 @@ EXAMPLE = "claims --explain abstract-superior"
 def run(options: argparse.Namespace) -> int:
     """Judge whether our programs reproduce the claims of the thesis, and print the verdicts.
 
-    With --assignments, --evidence or --atlas, print for which assumptions the claims hold instead.
-    Return exit status 0.
+    With --assignments, --evidence or --atlas, print instead with which assumptions about values
+    that the thesis does not state, such as the initial omega, the claims hold. Return exit status
+    0.
     """
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain", "evidence", "word"))

@@ -34,9 +34,11 @@ EXAMPLE = "compare --case 3 --listing original --plot case-3.png"
 def run(options: argparse.Namespace) -> int:
     """Compare original and corrected programs with the reference solution of a scene.
 
-    Print the comparison. Return exit status 1 if a result is unexpected. With --strict, also return
-    it if the scene is sensitive, that is, if amplified rounding errors exceed the tolerance.
-    Otherwise return 0. With --ablate, run every subset of the programs' defects instead.
+    Print the comparison. Return exit status 1 if Fortran and the Python port of a program differ,
+    or if a corrected program does not converge with its order. With --strict, also return exit
+    status 1 if amplified rounding errors are too large for the tolerance of the methods in the
+    comparison. Otherwise return 0. With --ablate, run every subset of the programs' defects
+    instead.
     """
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)

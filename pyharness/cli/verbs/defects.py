@@ -18,11 +18,11 @@ EXAMPLE = "defects stage-base"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the entries of the apparatus, or one entry with its effect in every case of Table 1.
+    """Print the apparatus entries, or one entry with its effect in the seven cases of the thesis.
 
-    The apparatus is our list of the programs' defects, of readings of doubtful cards, of
-    conjectures about missing cards, and of other findings. An entry has an effect if it can be
-    switched on and off in the programs. Return exit status 0.
+    The apparatus is our list of the programs' defects, of readings (interpretations of doubtful
+    cards), of conjectures (assumptions about missing cards), and of other findings. An entry has an
+    effect if it can be switched on and off in the programs. Return exit status 0.
     """
     listed = entries(options.kind)
     if options.name is None:
@@ -40,10 +40,11 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _card(options: argparse.Namespace) -> int:
-    """Print the card that the option `name` gives, and the defects and other findings about it.
+    """Print the punched card that the option `name` gives, and our findings about the card.
 
-    If a finding can be switched on and off in the programs, its effect in all cases of Table 1 is
-    printed too. Return exit status 0.
+    The findings are, for example, defects of the program. If a finding can be switched on and off
+    in the programs, its effect in the seven cases of the thesis is printed too. Return exit status
+    0.
     """
     from pyharness.history.cards_report import cards_report
     from pyharness.original.cards import chosen

@@ -16,7 +16,7 @@ EXAMPLE = "figures --out figures"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Draw Figures 6 to 12 of the thesis, then write all files, and print a list of the figures.
+    """Draw Figures 6 to 12 of the thesis, write them to files, and print a list of the figures.
 
     Return exit status 0.
     """

@@ -50,10 +50,10 @@ EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute one trajectory by a program of the thesis or a method, and print it.
+    """Compute one trajectory by a program of the thesis or by a modern method, and print it.
 
-    Return exit status 1 if --strict is given and amplified rounding errors exceed the tolerance.
-    Otherwise return 0.
+    Return exit status 1 if --strict is given and amplified rounding errors are too large for the
+    relative tolerance of the method. Otherwise return 0.
     """
     by_method = options.method is not None
     scene = shared.chosen_scene(options, any_axes=by_method, any_torque=by_method)

@@ -21,9 +21,10 @@ EXAMPLE = "stress --only separatrix --plot separatrix.png"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the requested trials, which are groups of checks, and print their results.
+    """Run the requested trials (groups of checks of our solvers), and print their results.
 
-    Return exit status 1 if a check fails, as when an error exceeds its bound, otherwise 0.
+    Return exit status 1 if a check fails, for example because an error exceeds its derived bound.
+    Otherwise return 0.
     """
     only = shared.chosen_names(options.only, "trial", tuple(TRIALS))
     if options.plot is not None and len(_chosen(only)) != 1:

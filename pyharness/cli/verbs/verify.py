@@ -49,7 +49,7 @@ EXAMPLE = "verify --only cells,methods"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the checks of programs and methods, and print the results.
+    """Run checks of the thesis's programs and of our methods, and print the results.
 
     The options --listing-output, --port, --self-test and --update request other computations
     instead. Return exit status 1 if a check fails, otherwise 0.
@@ -183,9 +183,10 @@ def _title(chosen: Selection) -> list[str]:
 def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
     """Return a list with a line about decks or published numbers that could not be checked.
 
-    A deck is a program of the thesis in fixed-form FORTRAN. A check that can't be made is omitted
-    or counts as passed, so that only this line reports it. `chosen` is the selection of checks. The
-    list is empty if the checks could be made.
+    A deck is a program of the thesis in fixed-form FORTRAN. A check that can't be made, for example
+    without a compiler, is omitted or counts as passed, so that only this line reports it. `chosen`
+    is the selection of checks, and `checks` has their results. The list is empty if all selected
+    checks could be made.
     """
     if chosen.may_ask("decks") and compiler() is None:
         return ["decks: not run, as there is no gfortran on the PATH"]

@@ -39,7 +39,7 @@ Codes = NDArray[np.int8]
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """The verdict codes of each claim over a grid of readings, numbers of steps and starts.
+    """The verdict codes of each claim over a grid of starts, readings and numbers of steps.
 
     A start is an initial omega; a reading is an interpretation of doubtful cards. `codes` has for
     each claim of the thesis an array of codes: 0 (fails), 1 (reproduced) or 3 (in part). Its axes
@@ -59,7 +59,8 @@ class Atlas:
     def n_starts(self) -> int:
         """Return the number of starts (initial omegas) of the atlas.
 
-        The number is the same for each choice of reading (of doubtful cards) and number of steps.
+        The atlas has the same starts for each choice of a reading (interpretation of doubtful
+        cards) and a number of steps.
         """
         return len(self.magnitudes) * len(self.heights) * len(self.longitudes)
 
@@ -106,7 +107,7 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
     A start is an initial omega. `codes` has the array of verdict codes of each claim, negative
     where the sweep is incomplete. `axes` maps the dimensions of these arrays to their values, in
     order: reading of the cards, number of steps, and three coordinates of the start. Raise
-    InputError if the axes are others, or if the sweep is incomplete.
+    InputError if the sweep has other axes, or is incomplete.
     """
     if tuple(axes) != (*CHOSEN, *WHERE) or not codes:
         allowed = ", ".join((*CHOSEN, *WHERE))
@@ -161,7 +162,7 @@ def bits(codes: Codes) -> float:
 
 
 def about(names: Sequence[str]) -> dict[int, list[str]]:
-    """Return, by number of the case, those of the claims `names` that are about this case alone.
+    """Return, for each case by its number, the claims in `names` that are about this case alone.
 
     `names` are identifiers of claims of the thesis, and so are the results. A claim about several
     cases is left out.

@@ -159,10 +159,11 @@ def _by_choice(atlas: Atlas) -> Table:
 
 
 def _turned(atlas: Atlas) -> Table:
-    """Return a table, by claim, of the fraction of starts whose verdict another choice changes.
+    """Return a table of the percentage of starts from which another choice changes a verdict.
 
-    A start is an initial omega. The other choice is a reading (interpretation of doubtful cards) or
-    a number of steps other than the first. Only one of the two is changed at a time.
+    A start is an initial omega, and a row of the table is about one claim of the thesis. The other
+    choice is a reading (interpretation of doubtful cards) or a number of steps other than the
+    first. Only one of the two is changed at a time.
     """
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]

@@ -71,8 +71,8 @@ def evidence() -> Iterator[Combination]:
     """Yield every combination of the open choices, with its verdicts on the thesis's claims.
 
     The open choices are omega(0), the readings (interpretations of doubtful cards), the conjectures
-    (assumptions where no card exists) and the number of steps. Each combination is computed when it
-    is yielded.
+    (assumptions where no card exists) and the number of steps. The verdicts of a combination are
+    computed just before it is yielded.
     """
     for assumptions in combinations():
         verdicts = {}
@@ -86,9 +86,10 @@ def evidence() -> Iterator[Combination]:
 
 
 def evidence_rule() -> str:
-    """Return the text that explains how a combination of choices is scored, for the report.
+    """Return the text in the report that explains the score of a combination of choices.
 
-    The choices are those that the thesis leaves open, for example omega(0).
+    The choices are values that the thesis does not state, for example omega(0). The score is the
+    number of claims that are reproduced with these values; one reproduced in part counts 1/2.
     """
     return (
         "Every combination of starts (one for all cases in which none is given, or those adopted), "
@@ -139,8 +140,9 @@ def undecided(found: list[Combination]) -> dict[str, list[str]]:
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
     """Return the chosen assumptions on which a claim depends, with adopted values for all others.
 
-    `entry` is the claim, as in `data/claims.toml`. With the adopted values, combinations that
-    differ only in other assumptions lead to the same test, which runs once.
+    `entry` is the claim, as in `data/claims.toml`, and `chosen` has a value for each assumption.
+    With the adopted values, combinations that differ only in other assumptions lead to the same
+    test, which runs once.
     """
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)

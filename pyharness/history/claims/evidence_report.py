@@ -38,8 +38,8 @@ def evidence_report(found: Sequence[Combination]) -> Report:
 
     The open choices are values that the thesis does not state, such as omega(0). A combination's
     score is the sum of the claims' points. The report shows the combinations with the highest and
-    lowest scores, and the claims whose verdict differs between combinations. It also shows the
-    values of each choice that occur with the highest score.
+    lowest scores, and the claims whose verdict differs between combinations. The report also shows
+    the values of each choice that occur with the highest score.
     """
     ordered = sorted(found, key=lambda each: -each.score)
     axes = list(ordered[0].choices())

@@ -86,21 +86,22 @@ class Laboratory:
     ) -> Trajectory:
         """Run a listing (a program with a choice of its defects) on a scene.
 
-        The floating-point arithmetic is the assumed one. `lipschitz` is the limit (1/s) of the stop
-        test of the Runge-Kutta program; without `may_stop` the test is skipped.
+        The floating-point arithmetic is the one that the laboratory's assumptions name. `lipschitz`
+        is the limit (1/s) of the stop test of the Runge-Kutta program; without `may_stop` the test
+        is skipped.
         """
         return _run(listing, scene, may_stop, lipschitz, self.assumptions.word)
 
     def truth(self, case: int) -> Reference:
         """Return the reference solution of a case at the end of each of its steps.
 
-        The assumptions of the laboratory determine the number of steps and, if the thesis gives
-        none, the initial omega.
+        The laboratory's assumptions determine the number of steps of the case. They also determine
+        the initial omega if the thesis gives none.
         """
         return _truth(self.scene(case))
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program as the method `run` does, and return the arrays that tests of claims need.
+        """Run a program as the method `run` does, and return omega with the outcome of the run.
 
         Omega has the rows at the steps of the case only, even if `parts` divides the step size.
         Omega is NaN after the end of the run.
@@ -158,9 +159,9 @@ class Laboratory:
 
 
 def starts() -> list[Triple]:
-    """Return the initial omegas (rad/s) that the thesis shows anywhere, and one of our own.
+    """Return all initial omegas (rad/s) that the thesis shows, and one of our own.
 
-    They are tried in the cases for which the thesis gives no initial omega.
+    These initial omegas are tried in the cases for which the thesis gives no initial omega.
     """
     return [
         (float(a), float(b), float(c)) for a, b, c in (s["omega"] for s in facts("claims")["start"])
@@ -168,9 +169,10 @@ def starts() -> list[Triple]:
 
 
 def distance(first: Array, second: Array) -> float:
-    """Return the largest difference of any omega component over the common rows (rad/s).
+    """Return the largest difference (rad/s) of any omega component between two solutions.
 
-    The arrays have the shape (rows, 3). If one of them is longer, its additional rows do not count.
+    The arrays `first` and `second` have the shape (rows, 3). If one of them is longer, its
+    additional rows do not count.
     """
     n = min(len(first), len(second))
     with np.errstate(all="ignore"):
@@ -250,7 +252,7 @@ def by_literals(
     the names, from `LITERALS`, of the literals that are divided. `terms` is 2 for the two-term deck
     and 4 for the four-term deck. All scenes run at once and must have constant torque. Return omega
     (rad/s) of every scene at the steps of the unchanged deck, shape (scenes, steps, 3); NaN from an
-    overflow on. The result equals that of the decks but for rounding error.
+    overflow on. Apart from rounding errors, the result equals that of the changed decks.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
@@ -272,8 +274,8 @@ def integrate_models(
     equations in its last axis, and `torque` is the constant torque divided by the moments (rad/s2).
     `terms` is the number of terms of the trial functions. The collocation points divide the
     interval (0, dt) evenly, where dt (s) grows by `growth` (s) with every step. Each of the `steps`
-    steps is `end` (s) long. Return omega (rad/s), shape (n, steps, 3), which equals that of the
-    programs but for rounding error; NaN from an overflow on.
+    steps is `end` (s) long. Return omega (rad/s), shape (n, steps, 3), which equals the omega of
+    the programs but for rounding error. From an overflow on, omega is NaN.
     """
     a, b, c = coefficients.T
 

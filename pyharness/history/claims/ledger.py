@@ -114,7 +114,7 @@ def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
     """Return the verdict on one claim, for the programs that the laboratory runs.
 
     `laboratory` runs the original or the corrected programs under given assumptions. `entry` is the
-    claim, as in `data/claims.toml`; it names the test function that gives the verdict.
+    claim, as in `data/claims.toml`; the entry names the test function that gives the verdict.
     """
     (test,) = (vars(room)[entry["test"]] for room in _ROOMS if entry["test"] in vars(room))
     judged: Judged = test(laboratory, **entry.get("parameters", {}))

@@ -43,7 +43,7 @@ _OTHERS = WEIGHTINGS[1:]
 
 
 def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
-    """Judge the claim that collocation is superior to Runge-Kutta.
+    """Judge the claim of the thesis that collocation is superior to Runge-Kutta.
 
     `lab` runs the programs; only the steps that all three programs ran are compared. A case counts
     if the errors of both collocation programs are below the error of the Runge-Kutta program. The
@@ -65,13 +65,14 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 
 
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Judge the claim that eq. 19, the Lipschitz condition, is what ends unbounded runs.
+    """Judge the claim that eq. 19 of the thesis, the Lipschitz condition, ends unbounded runs.
 
-    The stop test of the Runge-Kutta program, which `lab` runs, forms a quotient: the change of the
-    slopes over the change of omega. By eq. 19 the quotient is at most the norm of the Jacobian. In
-    each of the `cases` the largest quotient is divided by the largest norm along the reference
-    solution and the run. The verdict is "reproduced" if no ratio exceeds 1.05, "reproduced in part"
-    if none exceeds 2, otherwise "false".
+    The stop test of the Runge-Kutta program, which `lab` runs, forms a quotient: the change of a
+    derivative between two stages of a step, divided by the change of its variable. By eq. 19 the
+    quotient is at most the norm of the Jacobian. In each of the `cases` the largest quotient is
+    divided by the largest norm along the reference solution and the run. The verdict is
+    "reproduced" if no ratio exceeds 1.05, "reproduced in part" if none exceeds 2, otherwise
+    "false".
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -94,7 +95,7 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
 
 
 def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Judge the claim that collocation models of more than four terms improve little on four.
+    """Judge the claim that more than four terms hardly reduce the error of a collocation model.
 
     `lab` computes the models in each of the `cases`, and `terms` are their numbers of terms above
     four. The error of the model of four terms is divided by the error of each model of more terms.
@@ -116,9 +117,10 @@ def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
 def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge the claim that some case needs a Lipschitz constant above the one on the cards.
 
-    The stop test of the Runge-Kutta program ends a run if a quotient exceeds this constant. `lab`
-    computes, for each of the `cases`, the smallest constant (1/s) with which every step passes the
-    test. The verdict is "reproduced" if one of them exceeds the constant on the program's cards.
+    The stop test of the Runge-Kutta program ends a run if the change of a derivative, divided by
+    the change of its variable, exceeds this constant. `lab` computes, for each of the `cases`, the
+    smallest constant (1/s) with which every step passes the test. The verdict is "reproduced" if
+    one of them exceeds the constant on the program's cards.
     """
     numbers = {f"case {n}: constant needed (1/s)": lab.required_constant(n) for n in cases}
     return graded(numbers, max(numbers.values()) > facts("cases")["deck"]["lipschitz"])
@@ -129,9 +131,9 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 
     `lab` runs the Runge-Kutta program with and without the test. A run without the test counts as
     unbounded if omega overflows, or exceeds `bounded` times the largest omega of the reference
-    solution. The verdict is "reproduced" if the test ends all unbounded runs and no bounded run. It
-    is "reproduced in part" if the test ends some unbounded run, otherwise "false". It is "not
-    testable" if no run is unbounded, and the test ends no bounded run.
+    solution. The verdict is "reproduced" if the test ends all unbounded runs and no bounded run.
+    The verdict is "reproduced in part" if the test ends some unbounded run, otherwise "false". The
+    verdict is "not testable" if no run is unbounded, and the test ends no bounded run.
     """
     alarms = unbounded = caught = 0
     for case in cases:
@@ -159,12 +161,13 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 
 
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
-    """Judge the claim that collocation improves with a tenth of the step, by `rules.small_step`.
+    """Judge the claim that collocation improves if the step size is divided by ten.
 
-    `lab` runs both collocation programs in all `cases`. The claim excepts the two-term program in
-    the case `exception`. The step size is on the original cards as several literals. For the
-    original programs, the numbers also show the effect of changing only some of these literals.
-    They count the cases of constant torque in which the error falls to half.
+    The verdict is that of the rule `rules.small_step`. `lab` runs both collocation programs in all
+    `cases`. The claim excepts the two-term program in the case `exception`. The step size is on the
+    original cards as several literals. The numbers that support the verdict on the original
+    programs therefore also count the cases of constant torque in which the error falls to half when
+    only some of these literals are changed.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
@@ -178,7 +181,8 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
 
     The cards have the step size as several literals, `LITERALS`. Return, by description, the counts
     for each original collocation program and each subset of the literals. The error is the largest
-    error of any omega component. A case in which the run no longer overflows also counts.
+    error of any omega component. A case also counts if the run overflows only with the original
+    literals.
     """
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
@@ -196,7 +200,7 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
 
 
 def small_step_runge_kutta(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Judge the claim that the Runge-Kutta program does not improve with a tenth of the step.
+    """Judge the claim that Runge-Kutta does not improve if the step size is divided by ten.
 
     The verdict is that of the rule `rules.small_step_runge_kutta`, which compares the errors with
     both step sizes in all `cases`. `lab` runs the program without the stop test.
@@ -209,11 +213,11 @@ def suffices(
 ) -> Judged:
     """Judge the claim that a three- or four-term model suffices for most problems.
 
-    A case counts if two errors are at most the fraction `share` of the largest omega. They are the
-    error of the four-term program in `lab`, and the error of the collocation model with `terms[0]`
-    terms. The model is left out for the original programs if the torque varies. The verdict is
-    "reproduced" if at least `enough` cases count, and "reproduced in part" if at least three do. An
-    error is the largest error of any omega component against the reference solution.
+    A case counts if two errors are at most the fraction `share` of the largest omega. The first is
+    the error of the four-term program in `lab`. The second is the error of the collocation model
+    with `terms[0]` terms, which is left out for the original programs if the torque varies. The
+    verdict is "reproduced" if at least `enough` cases count, and "reproduced in part" if at least
+    three do. An error is the largest error of any omega component against the reference solution.
     """
     numbers, good = {}, 0
     for case in cases:
@@ -232,11 +236,11 @@ def execution_time(lab: Laboratory, low: float, high: float) -> Judged:
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
     The time is measured by the floating-point operations of one step. They are counted on the cards
-    of the programs in `lab` and in our version of the linear solver LEQT1F. One count takes the
-    operations as written, and the other takes each common term once. The operations of a
-    collocation program are divided by those of Runge-Kutta, which gives four ratios for two
-    programs and two counts. The verdict is "reproduced" if all ratios are from `low` to `high`, and
-    "reproduced in part" if some are.
+    of the programs in `lab` and in our version of the linear solver LEQT1F. One count has all
+    operations as written, and the other counts a term that occurs several times only once. The
+    operations of a collocation program are divided by those of Runge-Kutta, which gives four ratios
+    for two programs and two counts. The verdict is "reproduced" if all ratios are from `low` to
+    `high`, and "reproduced in part" if some are.
     """
     counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
     numbers, inside = {}, []
@@ -252,7 +256,7 @@ def execution_time(lab: Laboratory, low: float, high: float) -> Judged:
 
 
 def seconds(lab: Laboratory) -> Judged:
-    """Count the floating-point operations of 100 steps of each program in `lab`.
+    """Count the floating-point operations of 100 steps of each program that `lab` runs.
 
     The claim of the thesis is about run times in seconds, and run times today say nothing about the
     original machine. The verdict on the claim is therefore always "not testable".
@@ -266,7 +270,7 @@ def seconds(lab: Laboratory) -> Judged:
 
 
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
-    """Judge the claim that the programs are about equally long, by the number of their cards.
+    """Judge the claim that the three programs have about the same number of cards.
 
     The number of cards of each collocation deck is divided by that of the Runge-Kutta deck. This is
     done twice: without and with the cards of our version of the linear solver LEQT1F. The decks are
@@ -322,9 +326,9 @@ def computer_error(
     """Judge the claim that rounding error makes the weightings other than collocation fail.
 
     Two sets of differences of omega (rad/s) are computed. The first set has the errors in Case 1,
-    which every method solves exactly but for rounding, at ever smaller steps. The second set has
-    the differences between runs in binary64 and in the arithmetics named in `words`, in `cases`.
-    These runs use the methods as section IV.2 of the thesis describes them. The verdict is
+    which every method solves exactly but for rounding, with smaller and smaller steps. The second
+    set has the differences between runs in binary64 and in the arithmetics named in `words`, in
+    `cases`. These runs use the methods as section IV.2 of the thesis describes them. The verdict is
     "reproduced" if the largest number of both sets reaches `limit` (rad/s), otherwise "false". For
     the original programs, which lack these methods, the verdict is "not testable".
     """
@@ -377,11 +381,11 @@ def all_succeed(
     """Judge the claim that the weighted residual methods integrate the rigid body problem.
 
     A weighting, for example collocation or Galerkin, succeeds if its error is at most the fraction
-    `share` of the largest omega. This must be so in all `cases` and with all numbers of terms in
-    `terms`. The verdict is "reproduced" if every weighting succeeds, "reproduced in part" if some
-    do, otherwise "false". An error is the largest error of any omega component against the
-    reference solution of `lab`. For the original programs, which lack the other weightings, the
-    verdict is "not testable".
+    `share` of the largest omega. To succeed, a weighting must have such errors in all `cases` and
+    with all numbers of terms in `terms`. The verdict is "reproduced" if every weighting succeeds,
+    "reproduced in part" if some do, otherwise "false". An error is the largest error of any omega
+    component against the reference solution of `lab`. For the original programs, which lack the
+    other weightings, the verdict is "not testable".
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -398,12 +402,13 @@ def all_succeed(
 
 
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Compare the corrected programs with collocation by a first estimate and one correction.
+    """Compare the corrected programs with collocation that corrects a first estimate once per step.
 
-    The numbers are the largest differences (rad/s) between the omegas of both in `cases`, under the
-    assumptions of `lab`. They are also the errors of four-term collocation with zero to three
-    corrections. The claim of the thesis is a recommendation, so the verdict is always "not
-    testable".
+    A correction solves for the coefficients of the trial functions, with the right-hand sides along
+    the previous estimate. The numbers of the result are the largest differences (rad/s) between the
+    omegas of programs and collocation in `cases`, under the assumptions of `lab`. Further numbers
+    are the errors of four-term collocation with zero to three corrections. The claim of the thesis
+    is a recommendation, so the verdict is always "not testable".
     """
     best = Laboratory(False, lab.assumptions)
     numbers = {}

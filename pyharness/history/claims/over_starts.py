@@ -38,9 +38,9 @@ class Starts:
     """The runs of the programs from n starts, for the cases in which the thesis gives no omega(0).
 
     A start is an initial omega. The class is a `rules.Bench`, from which the tests of claims obtain
-    runs and reference solutions. Programs, cases and assumptions are those of the laboratory `one`.
-    The reference solution is integrated by Taylor series from each step of the case to the next, to
-    a relative tolerance of 1e-12.
+    runs and reference solutions. The laboratory `one` has the programs, the cases and the
+    assumptions, for example about doubtful cards. The reference solution is integrated by Taylor
+    series from each step of the case to the next, to a relative tolerance of 1e-12.
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
@@ -58,7 +58,8 @@ class Starts:
         """Return the scene of a case, its step size divided by `parts`.
 
         A scene is a body with its initial omega, torque, step size and number of steps. If the
-        thesis gives no omega(0) for the case, the omega(0) of the scene is not one of the n starts.
+        thesis gives no omega(0) for the case, the scene has the omega(0) of the underlying
+        assumptions, not one of the n starts.
         """
         return self._one.scene(case, parts)
 
@@ -66,8 +67,8 @@ class Starts:
         """Run a program on a case from every start (initial omega), its step divided by `parts`.
 
         Without `may_stop` the stop test of the Runge-Kutta program is skipped. The resulting omega
-        is at the steps of the case. Its shape is (n, steps, 3), or (steps, 3) if the thesis gives
-        the case's omega(0).
+        (rad/s) is at the steps of the case, and has the shape (n, steps, 3), or (steps, 3) if the
+        thesis gives the case's omega(0).
         """
         # Only runs with the full step size are cached. Others are requested once, for their error,
         # which is itself cached.
@@ -94,8 +95,8 @@ class Starts:
         """Return omega (rad/s) of the collocation models whose trial functions have `terms` terms.
 
         There is a model for each start (initial omega). The shape is (n, steps, 3) for n starts, or
-        (steps, 3) if the thesis gives the case's omega(0). Each model equals the result of
-        `Laboratory.models` from the same start but for rounding error.
+        (steps, 3) if the thesis gives the case's omega(0). Apart from rounding errors, each model
+        equals the result of `Laboratory.models` from the same start.
         """
         return self._models(case, terms)
 
@@ -159,9 +160,9 @@ def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
 
     A batch is a set of scenes that are solved in one call; a start is the initial omega of one of
     them. `identity` is the claim's identifier. The code is FAILS, HOLDS, IN_PART or SILENT, shape
-    (n,). It is SILENT if the sweep's scene is no case of Table 1, or if the sweep varies more than
-    starts, readings (of doubtful cards) and steps. The claim itself determines which cases are run,
-    whatever the case of the sweep.
+    (n,). It is SILENT if the sweep's scene is no case of the thesis, or if the sweep varies more
+    than starts, readings (of doubtful cards) and steps. The claim itself determines which cases are
+    run, and these may be other cases than that of the sweep.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
@@ -196,8 +197,8 @@ def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
 
     `batch` has the scenes and the program of the sweep. None means that the claims of the thesis do
     not apply to the sweep, for one of four reasons. Its program is neither the original nor the
-    corrected one. Its scene is no case of Table 1. It varies body or torque. Its stop test is not
-    that of the program's cards.
+    corrected one. Its scene is none of the seven cases of the thesis. It varies body or torque. Its
+    stop test is not that of the program's cards.
     """
     if batch.listing is None or batch.arrays.keys() & _OF_CASES:
         return None

@@ -122,8 +122,9 @@ def explanation(judgement: Judgement) -> Report:
 def assignments_report(assignments: Sequence[Assignment]) -> Report:
     """Return the report on the initial omegas with which the claims about each case hold.
 
-    An assignment is one initial omega for one case in which the thesis gives none. The verdicts on
-    the claims of the thesis are for the original programs.
+    Each of the `assignments` is one initial omega for one case in which the thesis gives none, with
+    the verdicts on the claims about this case. The verdicts on the claims of the thesis are for the
+    original programs.
     """
     text: list[Section] = [
         [

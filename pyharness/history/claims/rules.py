@@ -48,7 +48,7 @@ class Grade(NamedTuple):
 
 
 class Bench(Protocol):
-    """The interface through which a test of a claim obtains runs and reference solutions.
+    """The interface from which a test of a claim obtains runs and reference solutions of cases.
 
     The runs are from one start (initial omega) or many. The step size of a run is divided by the
     factor `parts`; the rows of omega are still at the steps of the case. Without `may_stop` the
@@ -59,7 +59,7 @@ class Bench(Protocol):
         """Return the scene of a case, with its step size divided by `parts`.
 
         A scene is a body with its initial omega, torque, step size and number of steps. The runs of
-        the bench may have other initial omegas than this scene.
+        this `Bench` may start from other initial omegas than that of the scene.
         """
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
@@ -94,7 +94,7 @@ def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
     """Grade the claim of the thesis that omega3 varies in a case.
 
     The claim is reproduced if the range of omega3 over the run exceeds `limit` (rad/s). The range
-    is of the reference solution, which `bench` supplies.
+    is the largest minus the smallest value of the reference solution, which `bench` supplies.
     """
     moved = spread_of(bench.solution(case))[..., 2]
     return Grade({"range of omega3 (rad/s)": moved}, moved > limit)
@@ -115,8 +115,8 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 
     The claim is reproduced in part if both runs are complete and their omegas differ by at most the
     fraction `share` of the largest reference omega. It is reproduced as a whole if they also differ
-    in each component by at most a tenth of the component's range. `bench` supplies the runs and the
-    reference solutions.
+    in each component by at most a tenth of the component's range (largest minus smallest value).
+    `bench` supplies the runs and the reference solutions.
     """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
@@ -139,8 +139,9 @@ def fails(bench: Bench, case: int, share: float) -> Grade:
     """Grade the claim that the Runge-Kutta program fails in a case.
 
     Two conditions are tested: the run ended early, and the error of an omega component exceeds the
-    fraction `share` of the component's range. The claim is reproduced if both are true, and
-    reproduced in part if only one is true. `bench` supplies the runs and the reference solutions.
+    fraction `share` of the component's range (largest minus smallest value). The claim is
+    reproduced if both are true, and reproduced in part if only one is true. `bench` supplies the
+    runs and the reference solutions.
     """
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
@@ -163,9 +164,9 @@ def diverged(bench: Bench, case: int) -> Grade:
 def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -> Grade:
     """Grade the claim that collocation models with different numbers of terms agree in a case.
 
-    `terms` has the numbers of terms, of the first model and of the others. The claim is reproduced
-    if all other models differ from the first one by at most the fraction `share` of the largest
-    reference omega. `bench` supplies the models and the reference solution.
+    `terms` has the number of terms of each model. The claim is reproduced if all other models
+    differ from the first one in omega by at most the fraction `share` of the largest reference
+    omega. `bench` supplies the models and the reference solution.
     """
     first, *others = terms
     model, largest = bench.models(case, first), largest_of(bench.solution(case))
@@ -257,10 +258,12 @@ def largest_error(
 
 
 def share_of_range(omega: Array, truth: Array) -> Array:
-    """Return the largest error of any varying component, divided by the range of the component.
+    """Return the largest ratio of the error of an omega component to the component's range.
 
-    `omega` is the result of a run, and `truth` the reference omega of its case, both of the shape
-    (..., steps, 3). The result has the shape (...), with one number for each start (initial omega).
+    Components that do not vary are left out. The range is the largest minus the smallest value of
+    the reference omega. `omega` is the result of a run, and `truth` the reference omega of its
+    case, both of the shape (..., steps, 3). The result has the shape (...), with one number for
+    each start (initial omega).
     """
     spread = spread_of(truth)
     moving = spread > 1e-12 * largest_of(truth)[..., None]

@@ -154,9 +154,9 @@ def local_error(
 ) -> Judged:
     """Judge the claim that the error of one step of a method falls with a power of the step size.
 
-    `method` is the name of the method, and `power` the power that the thesis states. The power p,
-    with which the error of one step of size h is O(h**p), is measured in each of the `cases` in
-    `lab`. The verdict is "reproduced" if every p differs from `power` by at most `within`, and
+    `method` is the name of the method, and `power` the power that the thesis states. In each of the
+    `cases` in `lab`, the power p is measured with which the error of one step of size h decreases
+    as h**p. The verdict is "reproduced" if every p differs from `power` by at most `within`, and
     "reproduced in part" if some p does.
     """
     numbers = {}
@@ -289,10 +289,10 @@ def _weighted(t: Array, weight: Array, by: Weights) -> Array:
 
 
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
-    """Judge the claim that the rates Q of eq. 32 tell whether a steady rotation is stable.
+    """Judge the claim that the rates Q of eq. 32 of the thesis tell if a steady rotation is stable.
 
-    By eq. 32 a small perturbation of a steady rotation changes as exp(Q t). Each steady rotation of
-    the `cases` in `lab` is perturbed by 1e-8 of its size. If Re Q (1/s) is above 0, the
+    By this equation a small perturbation of a steady rotation changes as exp(Q t). Each steady
+    rotation of the `cases` in `lab` is perturbed by 1e-8 of its size. If Re Q (1/s) is above 0, the
     perturbation must grow at the rate Re Q, within the fraction `within`. If not, the perturbation
     must stay within ten times its initial size for ten periods. The verdict is "reproduced" if all
     perturbations meet this condition, otherwise "false".
@@ -323,7 +323,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
 
 
 def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Judge the claim that in some cases a trial solution of eq. 32 is the solution itself.
+    """Judge the claim that a trial solution of eq. 32 of the thesis solves some cases exactly.
 
     The trial solution is a steady rotation about axis 3, with the initial omega3, plus exponential
     functions of time. The verdict is "reproduced" if its error is at most `limit` in at least one
@@ -344,7 +344,7 @@ def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
 
 def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge the claim that one-term collocation is enough for a linear top, as in Case 1.
+    """Judge the claim that one-term collocation suffices for a linear top, here a sphere (Case 1).
 
     The verdict is "reproduced" if the error of one-term collocation in the case `case` is at most
     `limit`, otherwise "false". The error is the largest one of any omega component against the
@@ -358,11 +358,11 @@ def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
 
 
 def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
-    """Judge the claim that the products vanish from Euler's equations of a symmetric body.
+    """Judge the claim that Euler's equations of a symmetric body have no products of omegas.
 
-    The products are those of two omega components, with the coefficients A, B and C. The verdict is
-    "reproduced" if the coefficients are 0 in all `cases` of `lab`, and "reproduced in part" if they
-    are 0 in some case.
+    The products of two omega components have the coefficients A, B and C in Euler's equations. The
+    verdict is "reproduced" if the coefficients are 0 in all `cases` of `lab`, and "reproduced in
+    part" if they are 0 in some case.
     """
     left = {
         f"case {case}: largest coefficient": max(map(abs, lab.scene(case).euler_coefficients))
@@ -389,7 +389,7 @@ def step_on_cards(lab: Laboratory, step: float) -> Judged:
 
 
 def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
-    """Judge the claim that the collocation points are inside the interval of the step.
+    """Judge the claim that the collocation points are within the time interval of the step.
 
     `cases` has one case. For both collocation programs in `lab`, the fraction of steps in which all
     points are inside is computed. The verdict is "reproduced" if the fraction is 1 for both

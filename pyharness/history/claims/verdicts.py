@@ -94,7 +94,8 @@ def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim of the thesis that omega3 varies in a case.
 
     The verdict is "reproduced" if the range of omega3 over the run exceeds `limit` (rad/s),
-    otherwise "false". The range is of the reference solution, which `lab` computes.
+    otherwise "false". The range is the largest minus the smallest value of the reference solution,
+    which `lab` computes.
     """
     return judged(rules.omega3_varies(lab, case, limit), FALSE)
 
@@ -104,8 +105,8 @@ def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
 
     The verdict is "reproduced" if the error of every program in `lab` is below `limit` (rad/s),
     half a unit of the last printed digit. An error is the largest error of any omega component
-    against the reference solution. The numbers also show how many steps the Runge-Kutta program
-    runs from each initial omega in `starts`.
+    against the reference solution. The numbers that support the verdict also show how many steps
+    the Runge-Kutta program runs from each initial omega in `starts`.
     """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
@@ -230,7 +231,8 @@ def search(lab: Laboratory, case: int) -> Judged:
 
     No run can test the outcome of a search, so that the verdict is always "not testable". Its
     number is the error of the program, divided by the error of the corrected program. Both errors
-    are the largest of any omega component in case `case`, over the steps that the run of `lab` has.
+    are the largest of any omega component in case `case`, over the steps that the program's run on
+    this case completed.
     """
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
@@ -244,7 +246,8 @@ def concur(lab: Laboratory, case: int, share: float) -> Judged:
 
     `lab` runs the programs on case `case`. The verdict is "reproduced in part" if both runs are
     complete and their omegas differ by at most the fraction `share` of the largest omega. It is
-    "reproduced" if each component also differs by at most a tenth of its range.
+    "reproduced" if each component also differs by at most a tenth of its range, which is the
+    largest minus the smallest value. Otherwise it is "not reproduced".
     """
     return judged(rules.concur(lab, case, share))
 
@@ -254,7 +257,8 @@ def fails(lab: Laboratory, case: int, share: float) -> Judged:
 
     `lab` runs the program on case `case`. Two conditions are tested: the run ended early, and the
     error of an omega component exceeds the fraction `share` of the component's range. The verdict
-    is "reproduced" if both are true, and "reproduced in part" if only one is true.
+    is "reproduced" if both are true, "reproduced in part" if only one is true, else "not
+    reproduced".
     """
     return judged(rules.fails(lab, case, share))
 
@@ -286,7 +290,8 @@ def diverged(lab: Laboratory, case: int) -> Judged:
     """Judge the claim that the run of the two-term program diverged, by the rule `rules.diverged`.
 
     `lab` runs the program on case `case`. The verdict is "reproduced" if the run overflowed, or if
-    its largest error of omega exceeds the largest omega of the reference solution.
+    its largest error of omega exceeds the largest omega of the reference solution, else "not
+    reproduced".
     """
     return judged(rules.diverged(lab, case))
 
@@ -294,11 +299,12 @@ def diverged(lab: Laboratory, case: int) -> Judged:
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
     """Judge the claim that the two-term error has its cause in a motion too fast for two terms.
 
-    The corrected programs run on case `case` from each initial omega in `starts`, otherwise under
-    the assumptions of `lab`. The verdict is "reproduced" if the two-term error is more than `worse`
-    times the four-term error from every initial omega. It is "reproduced in part" if the two-term
-    error is more than `same` times the four-term error from at least one initial omega, else
-    "false". An error is the largest error of any omega component against the reference solution.
+    The corrected programs run on case `case` from each initial omega that the function `starts`
+    returns, otherwise under the assumptions of `lab`. The verdict is "reproduced" if the two-term
+    error is more than `worse` times the four-term error from every initial omega. It is "reproduced
+    in part" if the two-term error is more than `same` times the four-term error from at least one
+    initial omega, else "false". An error is the largest error of any omega component against the
+    reference solution.
     """
     numbers = {}
     for start in starts():
@@ -314,13 +320,13 @@ def models_concur(lab: Laboratory, case: int, share: float, terms: Sequence[int]
 
     `lab` computes the models for case `case`, and `terms` are their numbers of terms. By the rule
     `rules.models_concur` the verdict is "reproduced" if each model differs from the first one by at
-    most the fraction `share` of the largest omega.
+    most the fraction `share` of the largest omega, else "not reproduced".
     """
     return judged(rules.models_concur(lab, case, share, terms))
 
 
 def dynamic(lab: Laboratory, case: int, factor: float) -> Judged:
-    """Judge the claim that the motion of case `case` is the liveliest of the cases of Table 1.
+    """Judge the claim that the motion of case `case` is the liveliest in Table 1 of the thesis.
 
     `lab` runs the four-term program on each case. By the rule `rules.dynamic` the verdict is
     "reproduced" if the largest angular acceleration of the case is at least `factor` times the

@@ -38,12 +38,13 @@ class Member:
     """A weighted residual method of the thesis; the constructor raises InputError for wrong fields.
 
     `weighting` is one of `WEIGHTINGS`. `terms` is n, the number of powers of t in the trial
-    function. `corrections` is the number of corrections of the first estimate in each step. The
-    residual is omega' - f, where f is the right-hand side of Euler's equations. Its derivatives
-    with f held constant, i t**(i-1), are the weights of least squares (eq. 25). `points` is for
-    collocation only: the points where the residual vanishes, as fractions of the step. They are
-    k/(n+1) (`thesis`), the points of Gauss and Legendre (`gauss`), or n different numbers from 0 to
-    1.
+    function. `corrections` is the number of corrections in each step. A correction solves again for
+    the coefficients of the trial function, with the products of omega components from the last
+    estimate. The residual is omega' - f, where f is the right-hand side of Euler's equations. Its
+    derivatives with f held constant, i t**(i-1), are the weights of least squares (eq. 25).
+    `points` is for collocation only: the points where the residual vanishes, as fractions of the
+    step. They are k/(n+1) (`thesis`), the points of Gauss and Legendre (`gauss`), or n different
+    numbers from 0 to 1.
     """
 
     weighting: str = "collocation"
@@ -102,8 +103,10 @@ class Member:
 def converged_order(member: Member) -> int:
     """Return the order of a method's global error in the limit of many corrections per step.
 
-    `member` is a weighted residual method, which corrects its first estimate in each step. Further
-    corrections do not raise the order returned. docs/explanation/family.md derives these orders.
+    `member` is a weighted residual method, which computes a first estimate of omega in each step. A
+    correction solves again for omega, with the right-hand side of Euler's equations at the last
+    estimate. Beyond some number of corrections, further ones do not raise the order.
+    docs/explanation/family.md derives these orders.
     """
     n = member.terms
     if member.weighting == "galerkin":
@@ -124,7 +127,8 @@ def predicted_order(member: Member) -> int:
     """Return the order p of a weighted residual method, whose global error is O(h**p).
 
     Here h is the step size, and the motion is a general one. `member` is the method. Its first
-    estimate has order 1. Each correction raises the order by one, up to `converged_order`.
+    estimate has order 1. Each correction, which solves the step again with the right-hand side at
+    the last estimate, raises the order by one, up to `converged_order`.
     """
     return min(member.corrections + 1, converged_order(member))
 
@@ -133,10 +137,10 @@ def run(scene: Scene, member: Member) -> Trajectory:
     """Integrate a scene by a weighted residual method (Jacobs 1982, III.1, eq. 20-27, and IV.2).
 
     `member` is the method. Return the trajectory of omega, without translational velocity. The
-    first estimate evaluates the torque at the beginning of the step. The corrections evaluate it at
-    the nodes, the times within the step where they need the right-hand side. The global error is
-    O(h**p), with the step size h and p from `predicted_order`. The rounding error is about one unit
-    in the last place per step.
+    first estimate evaluates the torque at the beginning of the step. The corrections, which solve
+    the step again, evaluate it at the nodes, the times within the step where they need the
+    right-hand side. The global error is O(h**p), with the step size h and p from `predicted_order`.
+    In each step omega has a rounding error of about one unit in the last place.
     """
     omega = integrate(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
@@ -205,7 +209,7 @@ def _stages(matrix: Array, rates: Array) -> Array:
 
     `matrix` has shape (i, j, members); its last axis is the index of the method. `rates` contains
     derivatives of omega, shape (members, j, 3). The result has shape (members, i, 3). It contains
-    the same sums of products as `_sums` computes.
+    the same sums of products as `_sums` computes from the same matrices.
     """
     side_by_side = np.ascontiguousarray(rates.transpose(1, 2, 0))
     total: Array = matrix[:, 0, None] * side_by_side[0]

@@ -43,9 +43,9 @@ class OrderFinding:
 
     `member` is a weighted residual method. docs/explanation/family.md derives its order
     `predicted`. `measured` is None if no order can be measured, because the errors are rounding
-    errors alone or never small enough. `settled` is true if the last two measured values of the
-    order differ by at most a tenth. `error` is the largest error of any omega component with the
-    scene's own step size (rad/s), infinite after an overflow.
+    errors alone, or too large with every step size. `settled` is true if the last two measured
+    values of the order differ by at most a tenth. `error` is the largest error of any omega
+    component with the scene's own step size (rad/s), infinite after an overflow.
     """
 
     member: Member
@@ -79,7 +79,8 @@ def family_members(
     """Return a weighted residual method for each combination of scheme, `terms` and `corrections`.
 
     A scheme, in `SCHEMES`, is a weighting with its choice of collocation points. `terms` and
-    `corrections` are sequences: numbers of terms, and numbers of corrections per step.
+    `corrections` are sequences: the numbers of terms of the trial function, and the numbers of
+    corrections of the first estimate in each step.
     """
     return [Member(w, n, p, k) for w, p in SCHEMES for n in terms for k in corrections]
 
@@ -92,9 +93,9 @@ def order_table(
     """Measure the orders of convergence and the errors of many weighted residual methods at once.
 
     `members` are the methods, by default those of `family_members()`. Return an `OrderFinding` for
-    each method. `progress` is called before each phase of the work, with the number of the phase.
-    Raise InputError if the reference solution grows without bound, or if the scene has more than
-    `MOST_STEPS` steps.
+    each method. The phases of the work are the reference solution, the orders over several end
+    times, and the errors. `progress` is called before each phase, with its number. Raise InputError
+    if the reference solution grows without bound, or if the scene has more than `MOST_STEPS` steps.
     """
     if scene.steps > MOST_STEPS:
         raise InputError(f"steps is {scene.steps}; allowed for orders: 1 to {MOST_STEPS}")
@@ -156,9 +157,9 @@ def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array)
 def _slopes(errors: Array) -> list[float]:
     """Return the order of convergence from each pair of errors whose step sizes have the ratio 2.
 
-    `errors` are the errors of one method from `_ladder`, for decreasing step sizes. Each error
-    belongs to half the step size of the error two places before it. An order is returned only if
-    both errors are in the range from `_SMALLEST` to `_LARGEST`.
+    `errors` are the errors of one method from `_ladder`, for decreasing step sizes. The step size
+    of an error is half the step size of the error two places before it. An order is returned only
+    if both errors are in the range from `_SMALLEST`, 5e-14, to `_LARGEST`, 1e-2.
     """
     return [
         math.log2(coarse / fine)

@@ -16,7 +16,7 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
 
     `found` has the measured and derived order of each method and its error. The tables have a row
     for each weighting, choice of collocation points and number of terms n, and a column for each
-    number of corrections k.
+    number of corrections k of the first estimate in each step.
     """
     names = ("predicted", "measured", "settled", "error")
     measures = [{name: getattr(each, name) for name in names} for each in found]
@@ -44,8 +44,9 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
 def verdict(found: Sequence[OrderFinding]) -> list[str]:
     """Return sentences that compare the methods' measured orders with the derived orders.
 
-    `found` has both orders of each method. If a measured order is too far below the derived order,
-    there is a sentence for each such method. Otherwise a single sentence counts the agreements.
+    `found` has both orders of each method. If measured orders are below the derived orders by more
+    than 0.25, there is a sentence for each of these methods. Otherwise a single sentence counts the
+    methods whose orders agree.
     """
     unexpected = _unexpected(found)
     if unexpected:

@@ -70,9 +70,9 @@ class Workload:
     def group(self) -> str:
         """Return the name of the group of problems over which ratios of run times are averaged.
 
-        All problems of a group have the same end time. Scenes with a torque and scenes without
-        torque are in separate groups. They share a group only if no attitude is requested and the
-        end time is not 3 s.
+        All problems of a group have the same end time. If an attitude is requested or this time is
+        3 s, scenes with and without a torque are in separate groups. Otherwise they are in the same
+        group.
         """
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"

@@ -165,11 +165,12 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
 def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
 
-    z is the step size times an eigenvalue of the equations of a spinning top. It has the direction
-    -1 or 1j from 0. The distance is measured by bisection over runs of the program `listing`. If
-    the program propagates a second vector besides omega from step to step, growth is measured by
-    the change of omega from step to step. Otherwise the constant part of omega would hide the
-    growth.
+    z is the step size times an eigenvalue of the equations of a spinning top. It is varied along
+    `direction`, which is -1 or 1j. The distance is measured by bisection over runs of the program
+    `listing`. With the defect `base-not-restored`, the program propagates a second vector besides
+    omega from step to step. Then omega may have a constant part, which would hide the growth of a
+    perturbation. In this case growth is measured by the change of omega from step to step, and
+    otherwise by omega itself.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)

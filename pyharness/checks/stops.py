@@ -45,11 +45,11 @@ class Quotients:
 def stops(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks that the Runge-Kutta program stops where its stop test requires it.
 
-    The test (equation 19 of the thesis) compares quotients with a stop constant. It is checked in
-    every form that a listing, a choice of the program's defects, can give it. A check compares the
-    number of the step, the variable and the quotient of the stop. Its value is the largest ratio of
-    a quotient's difference to its rounding bound. The limit is 1. A deferred check is computed only
-    if it is requested.
+    The test (equation 19 of the thesis) compares quotients with a stop constant. Some defects of
+    the program change the test, which is checked with every combination of these defects. For each
+    stop of the program, its step, variable and quotient are compared with those that we compute
+    independently. The value of a check is the largest difference of two such quotients, divided by
+    its rounding bound. The limit is 1. A deferred check is computed only if it is requested.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):

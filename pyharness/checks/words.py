@@ -26,12 +26,13 @@ _THIN_CASE = 3
 def words(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks that our arithmetic of machine words is correct bit for bit.
 
-    The arithmetic has the mantissa length and rounding of a machine, such as the CDC. It is checked
-    first by test vectors of the CDC. Runs of the programs are then compared in cells. A cell is a
-    program with a case and a listing, a choice of its defects. In the first comparison, the Python
-    version in our arithmetic of 53 bits must agree with the Python version in floats. In the
-    second, the program compiled for each machine word must agree with the Python version in that
-    word. A deferred check is computed only if it is requested.
+    A machine word is a number format, such as that of CDC computers with a mantissa of 48 bits. Our
+    arithmetic reproduces its mantissa length and rounding. It is checked first by test vectors,
+    which are CDC instructions with expected results. Runs are then compared in cells. A cell is a
+    program of the thesis with a case and a listing, a choice of its defects. In the first
+    comparison, the Python version in our arithmetic of 53 bits must agree with the Python version
+    in floats. In the second, the program compiled for each machine word must agree with the Python
+    version in our arithmetic of that word. A deferred check is computed only if it is requested.
 
     If `chosen.only` requests some checks, both comparisons cover every cell. Otherwise the first
     covers the original listing and listings with at most one defect or reading, an interpretation

@@ -50,8 +50,8 @@ def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch
     """Divide selected scenes of a sweep into batches, each solved in one call, and yield them.
 
     `where` selects the scenes. It has an array for each dimension of the sweep's grid: the index of
-    every selected scene along this dimension. Each item is a pair of arrays of positions and a
-    batch. The positions are the indices, into the arrays of `where`, of the scenes in the batch.
+    every selected scene along this dimension. Each yielded item is a pair: an array of positions,
+    and a batch. The positions are the indices, into the arrays of `where`, of the batch's scenes.
     """
     columns = value_columns(sweep, where)
     looped = looped_fields(sweep)

@@ -19,9 +19,10 @@ class Field:
 
     `units` is the unit of the number and `title` its description. The function `takes` returns
     whether a value is allowed, and `allowed` describes the allowed values. If `looped` is true, all
-    scenes that one call solves must have the same value of this number. Only the programs of the
-    thesis also accept an array of values of two of these numbers, step size and Lipschitz constant.
-    If `whole` is true, values are rounded to integers.
+    scenes that one call solves must have the same value of this number. Step size and Lipschitz
+    constant are exceptions if a program of the thesis solves the scenes: one call then accepts a
+    value for each scene, although `looped` is true. If `whole` is true, values are rounded to
+    integers.
     """
 
     units: str

@@ -35,10 +35,11 @@ TERMS = 2
 class Attempt:
     """The result of one method, programmed with one mistake, on Cases 1 and 2 of the thesis.
 
-    `weighting` names the weighted residual method. `mistake` is the identifier of the mistake in
-    `data/lost.toml`. The solutions of both cases are known. `shares` maps a case to the largest
-    error of omega, divided by the largest omega; it is infinite after an overflow. `failed` has the
-    cases in which this ratio exceeds 0.1, the limit in `data/lost.toml`.
+    `weighting` names the weighted residual method, whose program the thesis does not print.
+    `mistake` is the identifier in `data/lost.toml` of a mistake that this program may have had. The
+    solutions of both cases are known. `shares` maps the number of a case to the largest error of
+    omega, divided by the largest omega; it is infinite after an overflow. `failed` has the cases in
+    which this ratio exceeds 0.1, the limit in `data/lost.toml`.
     """
 
     mistake: str
@@ -51,7 +52,8 @@ class Attempt:
 class Ranked:
     """A mistake that lost programs of the thesis may have had, with its results.
 
-    A weighting defines a weighted residual method, and its `Attempt` the errors of this method,
+    The lost programs, which the thesis does not print, were for the weighted residual methods
+    `WEIGHTINGS`. `attempts` has an `Attempt` for each of these methods: its errors if it is
     programmed with the mistake. `mistake` is the identifier of the mistake, and `summary` its
     description, in `data/lost.toml`.
     """
@@ -82,11 +84,12 @@ class Ranked:
 def ranked(word: str = BINARY64) -> list[Ranked]:
     """Run each method with each mistake that its lost program may have had, in arithmetic `word`.
 
-    The methods are the weighted residual methods `WEIGHTINGS`, on Cases 1 and 2 of Table 1 of the
-    thesis. `word` is the name of the arithmetic. A method fails in a case if its error exceeds a
-    tenth of the largest omega. Return the mistakes, sorted by the number of methods that fail with
-    them in both cases, the largest number first. Mistakes with equal numbers are sorted by the
-    number of methods that fail in at least one case.
+    The methods are the weighted residual methods `WEIGHTINGS`, whose programs the thesis does not
+    print. They run on Cases 1 and 2 of Table 1 of the thesis. `word` is the name of the arithmetic,
+    such as binary64. A method fails in a case if its error exceeds a tenth of the largest omega.
+    Return the mistakes, sorted by the number of methods that fail with them in both cases, the
+    largest number first. Mistakes with equal numbers are sorted by the number of methods that fail
+    in at least one case.
     """
     limit = facts("lost")["limit"]
     found = []
@@ -255,9 +258,10 @@ _TABLE = (
 def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
     """Return the report on the mistakes that lost programs may have had, with errors and failures.
 
-    The programs were for weighted residual methods. A method that is programmed with a mistake
-    fails in a case if its error exceeds a tenth of the largest omega. `found` has the mistakes with
-    their results, and `word` is the name of the arithmetic in which they were computed.
+    The lost programs, which the thesis does not print, were for weighted residual methods. A method
+    that is programmed with a mistake fails in a case if its error exceeds a tenth of the largest
+    omega. `found` has the mistakes with their results, and `word` is the name of the arithmetic in
+    which they were computed.
     """
     rows = [
         [

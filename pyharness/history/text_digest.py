@@ -16,11 +16,13 @@ They are the cards of each program with the scan's variants, and the apparatus.
 
 
 def text_digest(table: Callable[[str], Mapping[str, Any]] = facts) -> str:
-    """Return the first 12 hexadecimal digits of the SHA-256 of the edition's text.
+    """Return the first 12 hexadecimal digits of the SHA-256 of our edition of the programs.
 
-    The text is the content of `TABLES`: the cards, the scan's variants and the critical apparatus.
-    The digest does not depend on the Fortran and Python versions of the programs, on the project's
-    version number, or on comments in the tables.
+    The edition is the content of the files `TABLES`. These have the cards of the printed programs,
+    the places where the scan of the thesis differs from the cards, and the critical apparatus. The
+    apparatus is the list of the programs' mistakes and doubtful statements. The digest does not
+    depend on the Fortran and Python versions of the programs, on the project's version number, or
+    on comments in the tables.
 
     Parameters
     ----------

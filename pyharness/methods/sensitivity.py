@@ -46,10 +46,11 @@ def torque_noise(
 ) -> float:
     """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
 
-    The result is an estimate of the ratio of the two rounding errors. Its numerator is the sum of
-    the omegas that the terms of the torque law would cause one by one until `t_end` (s). It
-    includes the rounding of the terms in each of `steps` steps. The denominator is `scale`, the
-    largest |omega| (rad/s). If `scale` is None, it is the larger of the initial |omega|, from
+    The rounding error of such terms is relative to each term, not to their small sum. The ratio is
+    therefore estimated as a quotient of two angular velocities. The numerator is the sum of those
+    that each term of the torque law alone would cause until `t_end` (s). It includes a contribution
+    for the rounding of the terms in each of `steps` steps. The denominator is `scale`, the largest
+    |omega| (rad/s). If `scale` is None, the denominator is the larger of the initial |omega|, from
     `omega0` (rad/s), and the omega that the whole torque causes. If the terms do not nearly cancel,
     the result is 0.
     """

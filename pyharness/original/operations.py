@@ -66,10 +66,11 @@ def _value(x: Any) -> float:
 
 
 class _Number:
-    """A floating-point value that belongs to a counter of the operations on it.
+    """A floating-point value of a program, with the counter that counts each operation on it.
 
-    The same operation on the same operands returns the same object. Therefore two objects are
-    identical exactly if their values were computed in the same way.
+    If an operation was already applied to the same operands in the same order, the object that
+    resulted then is returned again. Therefore two objects are identical exactly if their values
+    were computed in the same way.
     """
 
     def __init__(self, counter: _Counter, value: float) -> None:
@@ -148,10 +149,10 @@ def operations_per_step(listing: Listing) -> Count:
 
 
 def _moved(value: Any, counter: _Counter) -> Any:
-    """Return a copy of a value that was computed before the step.
+    """Return a copy of a program's value from before a step, for counting the step's operations.
 
-    `counter` counts the operations on the copy. `value` is a number or an array of numbers. Any
-    other object is returned unchanged.
+    The operations that computed the value are not counted. Operations on the copy are counted by
+    `counter`. `value` is a number or an array of numbers. Any other object is returned unchanged.
     """
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}

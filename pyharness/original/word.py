@@ -194,8 +194,9 @@ class Number:
         """Return the result of an operation in which an operand is zero, infinite or nan.
 
         The operands are this number and `other`. `operation` is the same operation on floats, such
-        as their sum. It determines whether the result is zero, infinite or nan. If it is none of
-        these, zero was added, and the result is the operand that is not zero.
+        as their sum. It is applied to a float for each operand: the same zero, infinity or nan, or
+        1.0 or -1.0 for any other number. If this yields zero, infinity or nan, the result has this
+        value. Otherwise zero was added to a number, and the result is the other operand of the sum.
         """
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):

@@ -62,12 +62,13 @@ class Amplification:
         return np.asarray(np.abs(np.linalg.eigvals(self.at(z))).max(axis=-1))
 
     def moving(self) -> "Amplification":
-        """Return the amplification matrix without the step's result, if that is possible.
+        """Return the amplification matrix, if possible without the row and column of the result.
 
-        The rows and columns belong to the vectors that a step propagates, one of which is its
-        result. The row and column of the result can be left out if no other vector depends on it,
-        and it only accumulates the other vectors. Its eigenvalue then does not depend on z. If it
-        can't be left out, return the whole matrix.
+        Each row and column belongs to a vector that a step propagates. One of these vectors is the
+        result of the step. Its row and column are left out if two conditions are satisfied. No
+        other vector depends on the previous result, and the factor of the previous result in the
+        new one does not depend on z. This factor is the eigenvalue that is lost. If a condition is
+        not satisfied, the whole matrix is returned.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -115,14 +116,14 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return a collocation program's integral of s**2 over a step, divided by h**3.
+    """Return the integral of s**2 / h**3 over a step, by the quadrature of a collocation program.
 
-    Here h is the step size, s is the time since the beginning of the step, and `step` is the number
-    of the step, from 1. `listing` is the program with its active defects. Along the first estimate
-    the right-hand side is F + s J F + s**2 Q(F). F and J are the right-hand side and its Jacobian
-    at the beginning of the step, and Q is the quadratic part of the right-hand side. Therefore the
-    integral of s**2 is the weight of Q(F) in the result of the step. The exact integral divided by
-    h**3 is 1/3.
+    The exact integral is 1/3. Here h is the step size, s is the time since the beginning of the
+    step, and `step` is the number of the step, from 1. `listing` is the program with its active
+    defects. The program integrates the right-hand side along its first estimate of omega, a
+    straight line. There the right-hand side is F + s J F + s**2 Q(F). F and J are the right-hand
+    side and its Jacobian at the beginning of the step, and Q is the quadratic part of the
+    right-hand side. Therefore the integral of s**2 is the weight of Q(F) in the result of the step.
     """
     points, weights = _quadrature(listing, step)
     found: Fraction = weights @ points**2
@@ -172,11 +173,12 @@ def _runge_kutta(listing: Listing) -> Amplification:
 
 
 def _one(size: int, place: int) -> Fractions:
-    """Return one of the vectors that a step propagates, as a linear combination of all of them.
+    """Return the coefficients that represent vector number `place` at the start of a step.
 
-    `place` is the number of the vector, from 0, and `size` the number of vectors. The factors of
-    the combination are polynomials in z: here 1 for the vector itself and 0 for the others. The
-    result contains their coefficients, in the shape (size, number of powers of z).
+    A step begins with `size` vectors, numbered from 0. Every vector that the step computes from
+    them is a linear combination of them, with polynomials in z as factors. z is the step size
+    times an eigenvalue of the Jacobian. For the vector itself the factor is 1, and for the others
+    0. The result contains the coefficients of the factors, shape (size, number of powers of z).
     """
     result = np.full((size, _HIGHEST), Fraction(0), dtype=object)
     result[place, 0] = Fraction(1)

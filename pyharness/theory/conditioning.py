@@ -50,10 +50,11 @@ class Conditioning:
 
         `largest` is the largest magnitude of any component of omega until the end. `made` is the
         sum of the errors, divided by `largest`, that the method's tolerance or order allows in its
-        steps. This sum is multiplied by the error amplification. `steps` is the number of steps
-        after which the method rounds omega, or 0 if the method retains its rounding errors by
-        compensated summation. The limit is at most 2. This is no restriction, because components of
-        magnitude up to `largest` differ by at most 2 times `largest`.
+        steps. The limit is the sum of `made` times the error amplification, and two bounds of
+        amplified rounding errors. The second of them is proportional to `steps`, the number of
+        steps after which the method rounds omega. `steps` is 0 if the method retains its rounding
+        errors by compensated summation. The limit is at most 2. This is no restriction, because
+        components of magnitude up to `largest` differ by at most 2 times `largest`.
         """
         allowed = made * self.amplification + self.rounding + steps * self.storing
         # If the limit is NaN, no error is allowed.

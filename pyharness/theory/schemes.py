@@ -23,17 +23,18 @@ TERMS = 24
 
 
 class Numbers:
-    """The equations of a scene for a scheme that computes with numbers.
+    """Euler's equations of a scene, evaluated for numerical values of omega and of the step size.
 
-    A scheme is a function that computes one step of a method. Omega (rad/s) is an array of shape
-    (..., 3).
+    A scheme, a function that computes one step of a method, uses this class to compute with
+    numbers. It uses the class `Series` to compute with power series in the step size. Omega (rad/s)
+    is an array of shape (..., 3).
     """
 
     def __init__(self, scene: Scene, step: float, sizes: bool = False) -> None:
         """Store the coefficients and the torque of a scene's equations, and a step size (s).
 
-        If `sizes`, the absolute values of coefficients and torque are stored. The results are then
-        sums of magnitudes.
+        If `sizes`, the absolute values of coefficients and torque are stored. For non-negative
+        omega the method `rate` then returns the sum of the magnitudes of each equation's terms.
         """
         self._step = step
         size = np.abs if sizes else np.positive

@@ -231,8 +231,9 @@ def _shifted(
 def _wrong_card() -> AbstractContextManager[Any]:
     """Return a context manager that exchanges the flags of two defects in the compiled programs.
 
-    If only one of the two defects is to be corrected, the programs then correct the card of the
-    other.
+    This is a planted fault, which checks must detect. A flag tells a compiled program whether to
+    correct a defect. If only one of the two defects is to be corrected, the programs then correct
+    the card (source line) with the other defect.
     """
     known = [entry["flag"] for entry in flagged() if entry["kind"] != "reading"]
     flags = Listing.flags.fget  # type: ignore[attr-defined]

@@ -60,10 +60,11 @@ class Circumstance:
 def axial(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a symmetric body whose torque acts along its axis.
 
-    The torque has waves (sines and cosines), whose phase, frequency times t, has a random rounding
-    error in every evaluation. The function `conditioning` adds up n such errors in full, where n is
-    the number of evaluations, at least one per period. Here only 4 sqrt(n) of the errors are
-    counted (Hoeffding 1963).
+    The result also has a bound on the rounding errors of a method. The torque has waves (sines and
+    cosines), whose phase, frequency times t, has a random rounding error in every evaluation. The
+    function `conditioning` adds up n such errors in full, where n is the number of evaluations, at
+    least one per period. Random errors partly cancel, so that the bound of the result counts only
+    4 sqrt(n) of them (Hoeffding 1963).
     """
     flow = conditioning(scene, time)
     waves = scene.torque.sines + scene.torque.cosines

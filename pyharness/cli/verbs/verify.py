@@ -181,12 +181,12 @@ def _title(chosen: Selection) -> list[str]:
 
 
 def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
-    """Return a list with a line about decks or published numbers that could not be checked.
+    """Return a list with one line that reports checks which could not be made, or an empty list.
 
-    A deck is a program of the thesis in fixed-form FORTRAN. A check that can't be made, for example
-    without a compiler, is omitted or counts as passed, so that only this line reports it. `chosen`
-    is the selection of checks, and `checks` has their results. The list is empty if all selected
-    checks could be made.
+    Without a FORTRAN compiler, the decks (the thesis's programs in fixed form) are not checked.
+    With --external, the check of a published number passes if the method refuses the problem, for
+    example as too long. In the printed report, only this line shows that nothing was compared.
+    `chosen` is the selection of checks, and `checks` has their results.
     """
     if chosen.may_ask("decks") and compiler() is None:
         return ["decks: not run, as there is no gfortran on the PATH"]

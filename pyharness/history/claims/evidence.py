@@ -138,11 +138,12 @@ def undecided(found: list[Combination]) -> dict[str, list[str]]:
 
 
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
-    """Return the chosen assumptions on which a claim depends, with adopted values for all others.
+    """Return `chosen`, but with adopted values for the assumptions that do not affect a claim.
 
-    `entry` is the claim, as in `data/claims.toml`, and `chosen` has a value for each assumption.
-    With the adopted values, combinations that differ only in other assumptions lead to the same
-    test, which runs once.
+    `chosen` has a value for each assumption about what the thesis does not state. `entry` is the
+    claim, as in `data/claims.toml`, which lists the assumptions that affect it. Two combinations of
+    assumptions that differ only in others then have equal results, so that the claim's test runs
+    once for both.
     """
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)

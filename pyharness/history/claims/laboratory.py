@@ -246,13 +246,14 @@ LITERALS = ("DT=", "T=", "DT+")
 def by_literals(
     scenes: tuple[Scene, ...], terms: int, changed: frozenset[str], parts: int
 ) -> Array:
-    """Run an original collocation deck with some of its step literals divided by `parts`.
+    """Return omega as an original collocation program with changed step literals computes it.
 
-    A step literal is a place on the cards where the step size is a literal number. `changed` has
-    the names, from `LITERALS`, of the literals that are divided. `terms` is 2 for the two-term deck
-    and 4 for the four-term deck. All scenes run at once and must have constant torque. Return omega
-    (rad/s) of every scene at the steps of the unchanged deck, shape (scenes, steps, 3); NaN from an
-    overflow on. Apart from rounding errors, the result equals that of the changed decks.
+    A step literal is a place on the program's cards where the step size is a literal number.
+    `changed` has the names, from `LITERALS`, of the literals that are divided by `parts`. `terms`
+    is 2 for the two-term program and 4 for the four-term program. The cards themselves do not run:
+    an equivalent model, which differs only in rounding errors, integrates all scenes at once. The
+    scenes must have constant torque. The result (rad/s) has every scene at the steps of the
+    unchanged program, shape (scenes, steps, 3), and is NaN from an overflow on.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)

@@ -67,12 +67,13 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge the claim that eq. 19 of the thesis, the Lipschitz condition, ends unbounded runs.
 
-    The stop test of the Runge-Kutta program, which `lab` runs, forms a quotient: the change of a
-    derivative between two stages of a step, divided by the change of its variable. By eq. 19 the
-    quotient is at most the norm of the Jacobian. In each of the `cases` the largest quotient is
-    divided by the largest norm along the reference solution and the run. The verdict is
-    "reproduced" if no ratio exceeds 1.05, "reproduced in part" if none exceeds 2, otherwise
-    "false".
+    The Runge-Kutta program in `lab` ends a run if a quotient is too large: the change of a
+    derivative between two stages of a step, divided by the change of its variable. This test
+    applies eq. 19 only if its quotients are Lipschitz quotients of the differential equations.
+    These are at most the norm of the equations' Jacobian. In each of the `cases` the largest
+    quotient of the test is divided by the largest norm along the reference solution and the run.
+    The verdict is "reproduced" if no such ratio exceeds 1.05, "reproduced in part" if none exceeds
+    2, otherwise "false".
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -163,11 +164,12 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge the claim that collocation improves if the step size is divided by ten.
 
-    The verdict is that of the rule `rules.small_step`. `lab` runs both collocation programs in all
-    `cases`. The claim excepts the two-term program in the case `exception`. The step size is on the
-    original cards as several literals. The numbers that support the verdict on the original
-    programs therefore also count the cases of constant torque in which the error falls to half when
-    only some of these literals are changed.
+    The claim excepts the two-term program in the case `exception`. `lab` runs both collocation
+    programs in all `cases`. A pair of program and case improves if the error falls at least to
+    half. The verdict is "reproduced" if at least four fifths of the other pairs improve, but not
+    the exception; "reproduced in part" if at least half of the others do. The original cards have
+    the step size as several literals. For the original programs the result therefore also counts
+    the cases of constant torque that improve when only some of these literals are changed.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
@@ -202,8 +204,9 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
 def small_step_runge_kutta(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge the claim that Runge-Kutta does not improve if the step size is divided by ten.
 
-    The verdict is that of the rule `rules.small_step_runge_kutta`, which compares the errors with
-    both step sizes in all `cases`. `lab` runs the program without the stop test.
+    A case improves if the largest error of omega falls at least to half. The verdict is
+    "reproduced" if none of the `cases` improves, "reproduced in part" if at most a third of them
+    do, otherwise "not reproduced". `lab` runs the program without the stop test.
     """
     return judged(rules.small_step_runge_kutta(lab, cases))
 
@@ -407,8 +410,9 @@ def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
     A correction solves for the coefficients of the trial functions, with the right-hand sides along
     the previous estimate. The numbers of the result are the largest differences (rad/s) between the
     omegas of programs and collocation in `cases`, under the assumptions of `lab`. Further numbers
-    are the errors of four-term collocation with zero to three corrections. The claim of the thesis
-    is a recommendation, so the verdict is always "not testable".
+    are the errors of four-term collocation with zero to three corrections. The thesis recommends to
+    try a predict-correct technique. A recommendation is neither true nor false, so the verdict is
+    always "not testable".
     """
     best = Laboratory(False, lab.assumptions)
     numbers = {}

@@ -346,9 +346,10 @@ def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged
 def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that one-term collocation suffices for a linear top, here a sphere (Case 1).
 
-    The verdict is "reproduced" if the error of one-term collocation in the case `case` is at most
-    `limit`, otherwise "false". The error is the largest one of any omega component against the
-    reference solution of `lab`, relative to the largest omega.
+    A linear top is a body for which Euler's equations are linear. The verdict is "reproduced" if
+    the error of one-term collocation in the case `case` is at most `limit`, otherwise "false". The
+    error is the largest one of any omega component against the reference solution of `lab`,
+    relative to the largest omega.
     """
     found = run(lab.scene(case), Member("collocation", 1))
     truth = lab.truth(case)

@@ -186,8 +186,9 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
 
     The stop test, a Lipschitz test, is part of the program, which `lab` runs on case `case`. The
     verdict is "reproduced" if it ended the run at this step, "reproduced in part" if at another
-    step, else "not reproduced". The program is also run with every subset of its defects. The
-    numbers of the verdict name the subsets with which the test ends the run at `step`.
+    step, else "not reproduced". The program is also run with every subset of its defects, the
+    mistakes of the printed program. The result, a `Judged`, lists as evidence the subsets with
+    which the test ends the run at `step`.
     """
     stop = lab.run("runge-kutta", case).stop
     found = math.nan if stop is None else float(stop.step)
@@ -229,10 +230,10 @@ def growing(lab: Laboratory, case: int) -> Judged:
 def search(lab: Laboratory, case: int) -> Judged:
     """Judge the claim that a search for an error in the Runge-Kutta program found none.
 
-    No run can test the outcome of a search, so that the verdict is always "not testable". Its
-    number is the error of the program, divided by the error of the corrected program. Both errors
-    are the largest of any omega component in case `case`, over the steps that the program's run on
-    this case completed.
+    No run can test whether the author's search found an error, so that the verdict is always "not
+    testable". With it one number is returned: the error of the program, divided by the error of the
+    corrected program. Both errors are the largest of any omega component in case `case`, over the
+    steps that the program's run on this case completed.
     """
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
@@ -299,12 +300,13 @@ def diverged(lab: Laboratory, case: int) -> Judged:
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
     """Judge the claim that the two-term error has its cause in a motion too fast for two terms.
 
-    The corrected programs run on case `case` from each initial omega that the function `starts`
-    returns, otherwise under the assumptions of `lab`. The verdict is "reproduced" if the two-term
-    error is more than `worse` times the four-term error from every initial omega. It is "reproduced
-    in part" if the two-term error is more than `same` times the four-term error from at least one
-    initial omega, else "false". An error is the largest error of any omega component against the
-    reference solution.
+    The thesis gives no initial omega for some cases. Therefore the corrected programs run on case
+    `case` from several: all that the thesis shows anywhere, and one of our own (see `starts`).
+    All other assumptions are those of `lab`. The verdict is "reproduced" if the two-term error is
+    more than `worse` times the four-term error from every initial omega. It is "reproduced in part"
+    if the two-term error is more than `same` times the four-term error from at least one initial
+    omega, else "false". An error is the largest error of any omega component against the reference
+    solution.
     """
     numbers = {}
     for start in starts():

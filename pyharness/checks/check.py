@@ -168,7 +168,7 @@ Attempts = Iterable[Check | Attempt]
 def made(attempts: Attempts, only: Sequence[str]) -> Iterator[Check]:
     """Yield the requested checks of `attempts`, which has finished and deferred checks.
 
-    `only` has the leading parts of the requested ids, as in ``cells/two-term``. A deferred check
+    `only` has the beginnings of the requested ids, as in ``cells/two-term``. A deferred check
     (`Attempt`) is computed only if it is requested. A finished check in `attempts` is always
     yielded.
     """
@@ -190,7 +190,7 @@ def run_suites(
     """Yield the requested checks of all suites (groups of checks), computed one after another.
 
     `suites` maps the name of each suite to a function that returns its finished or deferred checks.
-    `only` has the leading parts of the requested ids. `command` is the command of pyharness that
+    `only` has the beginnings of the requested ids. `command` is the command of pyharness that
     makes the checks, such as ``verify``. An InputError that ends a suite becomes a failed check. In
     the suites `of_the_user` the InputError is raised again, because it is caused by a mistake in
     the user's input.
@@ -241,7 +241,7 @@ def selected(id: str, only: Sequence[str]) -> bool:
 def may_hold(id: str, only: Sequence[str]) -> bool:
     """Return whether `only` may request a check whose id is `id` or begins with `id`.
 
-    `only` has the leading parts of the requested ids. If the result is false, no check whose id
+    `only` has the beginnings of the requested ids. If the result is false, no check whose id
     begins with `id` needs to be computed.
     """
     return selected(id, only) or any(each.startswith(id + "/") for each in only)

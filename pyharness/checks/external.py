@@ -59,7 +59,7 @@ def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> It
     A method that can't solve a problem is left out. The ids of the checks are
     ``external/<problem>/<time>/<method>``. The value of a check is the difference from the
     published result, in the problem's unit. Value and limit are for the component of omega with the
-    largest ratio of value to limit. `only` has the leading parts of the requested ids.
+    largest ratio of value to limit. `only` has the beginnings of the requested ids.
     """
     for problem in problems:
         # Times of one sign are solved together, so that a replay of one check gives the same bits.
@@ -111,7 +111,7 @@ def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
 def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
     """Yield checks of every method that propagates attitudes against the published attitudes.
 
-    `values` are the published results, and `only` has the leading parts of the requested ids. The
+    `values` are the published results, and `only` has the beginnings of the requested ids. The
     value of a check is the angle between the two attitudes (rad). The limit is the sum of the
     published accuracy, the tolerance of the method, and the effect of rounding the input numbers of
     the problem.

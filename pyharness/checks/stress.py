@@ -27,7 +27,7 @@ class Trial:
     """A group of checks of `pyharness stress` under one kind of extreme conditions.
 
     `title` describes the conditions, and `bound` explains how the limits of the checks are derived.
-    `attempts` takes the leading parts of the requested ids. It returns the deferred computations of
+    `attempts` takes the beginnings of the requested ids. It returns the deferred computations of
     the checks that may have these ids.
     """
 

@@ -26,8 +26,9 @@ def catalogue() -> str:
 
 def _messages(tree: ast.Module) -> Iterator[str]:
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in _ERRORS and node.args:
-            if getattr(node.func, "id", "") == "unknown":
+        name = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
+        if isinstance(node, ast.Call) and name in _ERRORS and node.args:
+            if name == "unknown":
                 what, name, allowed, *where = (_text(each) for each in node.args)
                 place = "".join(f"{each}: " for each in where)
                 yield f"{place}unknown {what} '{name}'; allowed: {allowed}"

@@ -175,7 +175,7 @@ def _value(entry: object, sequence: object) -> Value:
     good_to = number(f"{where}: good_to", entry.get("good_to", 0.0))
     if not (math.isfinite(good_to) and good_to >= 0.0):
         raise InputError(
-            f"{where}: good_to is {good_to:g}; allowed: a positive error, in the unit of the "
+            f"{where}: good_to is {good_to:g}; allowed: an error from 0 on, in the unit of the "
             "printed numbers"
         )
     pointing = _pointing(where, entry, sequence, good_to)

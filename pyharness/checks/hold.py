@@ -82,24 +82,24 @@ Judged = Callable[[Truth, float | None, Name], Iterable[Check]]
 
 def check_all(
     suite: str,
-    held: Callable[[Name, float], Iterable[Attempt]] | None = None,
+    checks: Callable[[Name, float], Iterable[Attempt]] | None = None,
     has_programs: Callable[[Circumstance], bool] = lambda each: True,
 ) -> Iterator[Attempt]:
     """Yield deferred checks of all methods in the extreme scenes of the trial named `suite`.
 
-    A trial is a group of checks under one kind of extreme conditions. ``held(name, time)`` yields
-    the checks in the scene of `name` at `time` (s); by default it is the function `hold`. In the
-    scenes for which `has_programs` is true, the errors of the programs of the thesis are also
-    reported, without a limit. A deferred check is computed only if it is requested.
+    A trial is a group of checks under one kind of extreme conditions. ``checks(name, time)`` yields
+    the checks in the scene of `name` at `time` (s); by default it is the function `check_methods`.
+    In the scenes for which `has_programs` is true, the errors of the programs of the thesis are
+    also reported, without a limit. A deferred check is computed only if it is requested.
     """
     for each in EXTREMES[suite]():
         name = named(suite, "", each.name, scene=each.scene)
-        yield from (held or hold)(name, each.time)
+        yield from (checks or check_methods)(name, each.time)
         if has_programs(each):
             yield from describe_programs(name)
 
 
-def hold(
+def check_methods(
     name: Name,
     time: float,
     methods: Sequence[str] = ALL,

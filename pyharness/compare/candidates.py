@@ -178,9 +178,8 @@ def program_candidate(
         last = scene.step_size * scene.steps
         if abs(last - time) > _SAME * abs(time):
             raise InputError(
-                f"{listing.program}: its last step ends at {last:g} s, not at {time:g} s; "
-                "give a time that is a whole "
-                "number of steps"
+                f"{listing.program}: its last step ends at {last:g} s, not at {time:g} s; give "
+                "that time, or another step size or number of steps"
             )
         if implementation != "fortran":
             return Ready(partial(rows, scene), _last)

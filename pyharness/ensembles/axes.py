@@ -157,7 +157,8 @@ def axis_of(table: object, number: int) -> Axis:
         raise InputError(f"{where}: dimension must be text; allowed: a name")
     if "/" in dimension or dimension.startswith((".", "_")):
         raise InputError(
-            f"{where}: dimension '{dimension}'; allowed: letters and digits, with dots between them"
+            f"{where}: dimension '{dimension}'; allowed: a name without '/' that does not begin "
+            "with '.' or '_'"
         )
     if "values" in table:
         return _listed(where, table, field, dimension)

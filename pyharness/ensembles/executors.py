@@ -197,7 +197,7 @@ def _connected(dask: Any, address: str) -> Any:
     allowed = "allowed: the address of a Dask scheduler with workers, as in tcp://host:8786"
     where = f"--scheduler '{address}'"
     if found is None or int(found["port"]) > 65535:
-        raise InputError(f"{where}: the address is empty; {allowed}")
+        raise InputError(f"{where}: is not an address; {allowed}")
     place = found["host"].strip("[]"), int(found["port"])
     answered: list[bool] = []
     try:

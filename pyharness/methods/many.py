@@ -272,8 +272,7 @@ class _Bodies:
         torques = (self.constant, self.rate, self.sines[..., :3], self.cosines[..., :3])
         if code == Methods.CLOSED_FORM and any(each.any() for each in torques):
             raise InputError(
-                "closed-form can't solve bodies with a torque, except spheres; allowed: "
-                "auto, taylor"
+                "closed-form can't solve bodies with a torque in one call; allowed: auto, taylor"
             )
         if code == Methods.CLOSED_FORM and self.attitude is not None and not self.by_moments:
             raise InputError(

@@ -154,8 +154,8 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
     rows = [from_scene(each) for each in scenes]
     if len({row["by_moments"] for row in rows}) > 1:
         raise InputError(
-            "the scenes give their bodies differently; allowed: moments, coefficients or "
-            "inertia, the same for all"
+            "some bodies are given by coefficients and others are not; allowed: "
+            "coefficients for all, or for none"
         )
     return _stacked(rows)
 

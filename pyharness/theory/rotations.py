@@ -29,6 +29,10 @@ Places = list[tuple[str, Triple]]  # steady rotations: a description, and omega 
 
 # The points shown of a hyperbola of steady rotations: the ratio of one component of omega to the
 # same component at the vertex.
+_OVERFLOWS = (
+    "rotations: a steady rotation or its rates overflow; use a smaller omega or torque, or moments "
+    "nearer to each other"
+)
 _ALONG = (0.25, 0.5, 1.0, 2.0, 4.0)
 _SHOWN = "shown, of one branch, the vertex and points of 1/4, 1/2, 2 and 4 times its"
 # Error at which the linear approximation is regarded as invalid: relative to the perturbation, or
@@ -97,10 +101,7 @@ def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
         )
     told, places = _places(scene)
     if not np.isfinite([omega for _, omega in places]).all():
-        raise InputError(
-            "rotations: the omega of a steady rotation overflows; use moments nearer to "
-            "each other, or a smaller torque"
-        )
+        raise InputError(_OVERFLOWS)
     found = tuple(_rotation(scene, place, omega, disturbance) for place, omega in places)
     return SteadyRotations(told, disturbance, found)
 
@@ -159,10 +160,7 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
         matrix = jacobians(scene, np.array([omega]))[0]
     found = rates(scene.euler_coefficients, omega)
     if not np.isfinite([*matrix.flat, *found]).all():
-        raise InputError(
-            "rotations: the rates of a steady rotation overflow; use moments nearer to each "
-            "other, or a smaller torque"
-        )
+        raise InputError(_OVERFLOWS)
     # The rates add up to 0. If all are 0, but the Jacobian is not, a perturbation grows like t.
     stable = found[0].real <= 0.0 and (any(found) or not matrix.any())
     flips: float | None = None
@@ -354,10 +352,7 @@ def _points(products: Sequence[float]) -> tuple[str, Places]:
         return "none: the square of a component would be below 0, for ABC M1 M2 M3 > 0", []
     roots = [math.sqrt(abs(each)) for each in products]
     if not all(roots):
-        raise InputError(
-            "rotations: the omega of a steady rotation overflows; use moments nearer to "
-            "each other, or a smaller torque"
-        )
+        raise InputError(_OVERFLOWS)
     signs = [1.0, math.copysign(1.0, products[2]), math.copysign(1.0, products[1])]
     x, y, z = (signs[axis] * roots[axis - 2] * roots[axis - 1] / roots[axis] for axis in range(3))
     told = (

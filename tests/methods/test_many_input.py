@@ -117,7 +117,7 @@ def test_scenes_that_do_not_go_side_by_side() -> None:
     body = Scene("coefficients", (1.0, 1.0, 1.0), coefficients=(0.25, -0.5, 0.3))
     for scenes, said in (
         ([], "the sequence of scenes is empty"),
-        ([TOP, body], "the scenes give their bodies differently"),
+        ([TOP, body], "some bodies are given by coefficients"),
         ([TOP, replace(TOP, step_size=0.5)], "the scenes have different step sizes"),
         ([TOP, replace(TOP, attitude=(1.0, 0.0, 0.0, 0.0))], "some of the scenes have an attitude"),
         (space, "the torque is about the axes of space"),

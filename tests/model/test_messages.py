@@ -1,5 +1,7 @@
 """The catalogue of error messages: complete, and each message in the words of the others."""
 
+import re
+
 from tests.messages import CATALOGUE, catalogue
 from tests.style import PATTERNS
 
@@ -14,3 +16,4 @@ def test_catalogue_is_up_to_date() -> None:
 def test_messages_have_no_expression_that_our_prose_avoids() -> None:
     assert [each for each in MESSAGES if each.endswith(".")] == []
     assert [each for each in MESSAGES for pattern, _ in PATTERNS if pattern.search(each)] == []
+    assert [each for each in MESSAGES if re.search(r"\ballowed \{", each)] == []

@@ -299,16 +299,16 @@ def kept(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @cache
-def _contenders() -> dict[str, length.LongRun]:
+def _contenders() -> dict[str, length.Integrator]:
     return {
         name: replace(each, run=kept(each.run), noise=kept(each.noise), revolutions=1e3, others=1e3)
-        for name, each in length.LONG_RUNS.items()
+        for name, each in length.INTEGRATORS.items()
     }
 
 
 def shorter() -> AbstractContextManager[Any]:
     """Follow only two starts, through a thousand revolutions."""
-    return patch.multiple(length, LONG_RUNS=_contenders(), STARTS=2)
+    return patch.multiple(length, INTEGRATORS=_contenders(), STARTS=2)
 
 
 def watched(error: Callable[[float, float], float]) -> Plant:

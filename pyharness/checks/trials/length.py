@@ -57,7 +57,7 @@ Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
-class LongRun:
+class Integrator:
     """A method whose growth of errors is measured, with bounds on the errors of its steps.
 
     Attributes
@@ -113,11 +113,11 @@ def _rate(scene: Scene) -> float:
     return speed(scene, max(map(abs, scene.omega)))
 
 
-LONG_RUNS = {
+INTEGRATORS = {
     # The truncation error of a series keeps its sign. Its steps also lock to the periodic motion,
     # so that the rounding of a step recurs in every revolution. The last two terms are at most
     # SLACK times the local tolerance. Each later term is at most half of the term before it.
-    "taylor": LongRun(
+    "taylor": Integrator(
         _taylor,
         partial(brouwer.taylor_noise, order=Series.MOST_ORDER, left_out=_LEFT_OUT),
         1e6,
@@ -126,17 +126,17 @@ LONG_RUNS = {
     ),
     # Equal steps of at most one radian of the fastest rate. A step takes ten times as long as a
     # Taylor step.
-    "gauss-8": LongRun(_gauss(8), partial(brouwer.gauss_noise, stages=8), 1e6, 1e5),
-    "gauss-4": LongRun(_gauss(4), partial(brouwer.gauss_noise, stages=4), 1e5, 10**4.5),
+    "gauss-8": Integrator(_gauss(8), partial(brouwer.gauss_noise, stages=8), 1e6, 1e5),
+    "gauss-4": Integrator(_gauss(4), partial(brouwer.gauss_noise, stages=4), 1e5, 10**4.5),
 }
 
 
 def _attempts() -> Iterator[Attempt]:
     for motion, scene in MOTIONS.items():
         name = named("length", "", motion, scene=scene)
-        for method, long_run in LONG_RUNS.items():
+        for method, integrator in INTEGRATORS.items():
             own = replace(name, subject=method)
-            yield Attempt(own, partial(hold, long_run))
+            yield Attempt(own, partial(check_growth, integrator))
             if method != "gauss-4":
                 yield Attempt(replace(own, setting="prepared"), _prepared)
         yield Attempt(replace(name, subject="closed-form"), _closed_form)
@@ -150,18 +150,18 @@ def _attempts() -> Iterator[Attempt]:
             yield Attempt(own, partial(_program, listing))
 
 
-def hold(long_run: LongRun, name: Name) -> Iterator[Check]:
+def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
     """Yield the checks of the growth of a method's errors, against Brouwer's law.
 
     By this law, rounding errors of energy and momentum grow like the power 1/2 of the number of
     steps. Rounding errors of the phase (the position along the closed curve of omega) grow like the
     power 3/2. If the errors of a step are biased, the powers are 1 and 2. The power that is fitted
     to the errors is compared with the power of this law. The errors after each number of
-    revolutions are also compared with their bounds. `long_run` is the method, and `name` names the
-    motion.
+    revolutions are also compared with their bounds. `integrator` is the method, and `name` names
+    the motion.
     """
     motion = name.circumstance
-    for what, found, steps, limits in measured(long_run, MOTIONS[motion], orbit_of(motion)):
+    for what, found, steps, limits in measured(integrator, MOTIONS[motion], orbit_of(motion)):
         horizons = np.array(REVOLUTIONS[: len(steps)])
         for k, revolutions in enumerate(horizons):
             value = float(np.nanmax(np.abs(found[:, k])))
@@ -169,7 +169,7 @@ def hold(long_run: LongRun, name: Name) -> Iterator[Check]:
             yield name.of(f"{what}/{revolutions:.0f}").bounded(value, limits[k], note)
         fitted = (horizons >= 0.99 * _FIT_FROM) & ~np.isnan(found).any(axis=0)
         power = brouwer.exponent(steps[fitted], found[:, fitted])
-        due = LAWS[what] + (0.5 if long_run.preference else 0.0)
+        due = LAWS[what] + (0.5 if integrator.preference else 0.0)
         yield name.of(f"{what}/power").bounded(power, due + _HALFWAY, f"due {due}")
 
 
@@ -200,37 +200,37 @@ def curves() -> Iterator[Drift]:
     along the closed curve of omega.
     """
     for motion, scene in MOTIONS.items():
-        for method, long_run in LONG_RUNS.items():
-            for what, found, steps, limits in measured(long_run, scene, orbit_of(motion)):
+        for method, integrator in INTEGRATORS.items():
+            for what, found, steps, limits in measured(integrator, scene, orbit_of(motion)):
                 starts = (~np.isnan(found)).sum(axis=0)
                 error = brouwer.root_mean_square(found)
                 yield Drift(motion, method, what, steps, error, np.array(limits), starts)
 
 
 def measured(
-    long_run: LongRun, scene: Scene, body: Orbit
+    integrator: Integrator, scene: Scene, body: Orbit
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
     """Yield the name, errors, numbers of steps and error bounds of energy, momentum and phase.
 
-    `long_run` is the method, and `body` has the factors of the scene for the errors. The method
+    `integrator` is the method, and `body` has the factors of the scene for the errors. The method
     runs from several initial conditions to several horizons, which are numbers of revolutions. The
     errors have a row for each initial condition of `starts` and a column for each horizon. They are
     NaN for a horizon after the end of the run. The numbers of steps and the bounds have an element
     for each horizon. The phase is the position along the closed curve of omega.
     """
     turn = 2.0 * math.pi / body.largest
-    reached = [r for r in REVOLUTIONS if r <= 1.01 * long_run.revolutions]
+    reached = [r for r in REVOLUTIONS if r <= 1.01 * integrator.revolutions]
     found = {what: np.full((STARTS, len(reached)), math.nan) for what in LAWS}
     steps = np.zeros(len(reached))
     for number, start in enumerate(starts(scene, body)):
-        most = long_run.others if number else long_run.revolutions
+        most = integrator.others if number else integrator.revolutions
         times = [r * turn for r in reached if r <= 1.01 * most]
-        rows, counted = long_run.run(start, times)
+        rows, counted = integrator.run(start, times)
         steps[: len(times)] = np.maximum(steps[: len(times)], counted)
         for k, (time, row) in enumerate(zip(times, rows, strict=True)):
             for what, error in brouwer.errors(start, body, time, row).items():
                 found[what][number, k] = error
-    noise = long_run.noise(body, scene, reached[-1] * turn / steps[-1])
+    noise = integrator.noise(body, scene, reached[-1] * turn / steps[-1])
     limits = [body.limits(noise, count) for count in steps]
     for what in LAWS:
         yield what, found[what], steps, [each[what] for each in limits]
@@ -265,7 +265,7 @@ def _prepared(name: Name) -> Check:
     """
     method, scene = name.subject, MOTIONS[name.circumstance]
     time = 1e4 * 2.0 * math.pi / orbit_of(name.circumstance).largest
-    rows, _ = LONG_RUNS[method].run(scene, [time])
+    rows, _ = INTEGRATORS[method].run(scene, [time])
     stepped = replace(scene, step_size=_PARTS[8] / _rate(scene))
     found = prepared_candidate(method, METHODS[method].finest).end(stepped, time).omega
     return name.bounded(float(np.count_nonzero(rows[-1] != found)), 0.0)

@@ -8,7 +8,7 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import REFUSED, Attempt, Check, Name
-from pyharness.checks.hold import ALL, check_all, hold, run_method, scene_of, truth_of
+from pyharness.checks.hold import ALL, check_all, check_methods, run_method, scene_of, truth_of
 from pyharness.checks.judge import Truth
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.tolerances import MIDDLING
@@ -87,7 +87,7 @@ def _truth(scene: Scene, time: float) -> Truth:
 
 
 def _attempts() -> Iterator[Attempt]:
-    yield from check_all("scales", partial(hold, truth=_truth))
+    yield from check_all("scales", partial(check_methods, truth=_truth))
     free, driven = in_steps(ORDINARY, ORDINARY_TIME), in_steps(_DRIVEN, 3.0)
     for method in ALL:
         if method not in SCIPY_METHODS:

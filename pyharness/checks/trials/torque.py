@@ -13,8 +13,8 @@ import numpy as np
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.hold import (
     apart,
+    check_methods,
     describe_programs,
-    hold,
     refusable,
     scene_of,
     truth_of,
@@ -185,7 +185,7 @@ POLICY = replace(AMPLIFIED, may_refuse=refusable)
 def _attempts() -> Iterator[Attempt]:
     for circumstance, each in CIRCUMSTANCES.items():
         name = named("torque", "", circumstance, scene=each.scene)
-        yield from hold(name, each.time, each.methods, each.truth, _tolerances, _judged)
+        yield from check_methods(name, each.time, each.methods, each.truth, _tolerances, _judged)
         if each.programs and each.truth is axial:
             yield from _describe_axial(name)
         elif each.programs:

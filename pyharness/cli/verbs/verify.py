@@ -83,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
         if not chosen.record.is_dir() and chosen.may_ask("golden"):
             raise InputError("there is no golden record here; give --record DIR, or a checkout")
         asked = f"--only {options.only}" if options.only else "--draws 0"
-        raise InputError(f"{asked}: there is no such check; allowed {', '.join(KINDS)}")
+        raise InputError(f"{asked}: there is no such check; allowed: {', '.join(KINDS)}")
     more = samples(checks, ROUNDING) if options.draws is not None else []
     text = summary([*_title(chosen), *_unjudged(chosen, checks)], checks, more=more)
     shared.show(checks_report("verify", checks, text, seed=chosen.seed), options)

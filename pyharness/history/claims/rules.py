@@ -209,7 +209,7 @@ def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
     other pairs improve.
     `bench` supplies the runs and the reference solutions of all `cases`.
     """
-    numbers, improved, excepted = {}, [], np.asarray(False)
+    numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:
         for case in cases:
             before = np.asarray(bench.error(program, case))

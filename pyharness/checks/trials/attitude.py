@@ -329,9 +329,10 @@ def _from_left(by: Quaternion, q: Array) -> Array:
 
 TRIAL = Trial(
     "attitude",
-    "attitude without torque: separatrix, symmetry, 1e6 revolutions, axes turned, poles of angles",
-    "closed form: some twenty roundings of each component at any time, 4.4e-15 rad. Others: the "
-    "tolerance and rounding, amplified by the flow and turned all the way. Montgomery: 2 E T/L "
-    "less the solid angle, to the rounding of its terms. Angles: of three, rounded thrice.",
+    "attitude without torque: separatrix, symmetry, 1e6 revolutions, rotated axes, angle poles",
+    "Closed form: 20 rounding errors of each component at any time, 4.4e-15 rad. Other methods: "
+    "tolerance and rounding errors, amplified by the motion, plus the growth of an error of "
+    "omega with the angle of rotation. Rotation per period: the rounding errors of Montgomery's "
+    "formula. Euler angles: the rounding errors of three angles, added.",
     lambda only: _attempts(),
 )

@@ -231,9 +231,9 @@ def _program(listing: Listing, symmetry: Symmetry, name: Name) -> Check:
 
 TRIAL = Trial(
     "invariance",
-    "forth and back, in pieces, axes turned, two signs changed, omega scaled against time",
-    "no bit where rounding can't tell the two apart: the same operations in another order of "
-    "axes, with other signs, with other exponents; else the tolerance and rounding of each "
-    "solution, amplified by the flow that follows it",
+    "motions forward and back, in four pieces, with axes permuted, signs changed, time rescaled",
+    "No bit may differ where the same operations are done with other axes, signs or exponents. "
+    "Elsewhere: the tolerance and rounding errors of each solution, amplified by the rest of the "
+    "motion.",
     lambda only: _attempts(),
 )

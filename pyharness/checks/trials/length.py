@@ -313,10 +313,11 @@ def _described(name: Name, scene: Scene, time: float, row: Array) -> Iterator[Ch
 
 TRIAL = Trial(
     "length",
-    "a million revolutions of torque-free bodies; energy, momentum and phase",
-    "Brouwer's law: independent roundings of mean 0, each within a running error analysis of "
-    "the step, add up to 4 sqrt(n) of one (Hoeffding), phase to the shear of the motion times "
-    "n**1.5; truncation adds n times its bound. The power of the growth must be nearer to what is "
-    "due, to chance (1/2, 3/2) or to a known preference (1, 2), than to the next",
+    "a million revolutions without torque: errors of energy, momentum and phase",
+    "Brouwer's law: n independent rounding errors of mean 0 and at most c add up to 4 c sqrt(n) "
+    "(Hoeffding 1963), where c is from a running error analysis of a step. The phase error grows "
+    "like n**1.5. Truncation errors add n times their bound. The fitted power of n must be "
+    "nearer to the expected one (1/2 and 3/2 for random errors, 1 and 2 for biased errors) than "
+    "to the other.",
     lambda only: _attempts(),
 )

@@ -99,10 +99,10 @@ def _counted(listing: Listing, name: Name) -> Check:
 
 TRIAL = Trial(
     "matrices",
-    "collocation matrices at steps from 1e-10 to 10 s",
-    "componentwise, 3n u |L||U||x| for residuals and that times abs(inverse) for solutions "
-    "(Higham 2002, theorem 9.4), both in exact fractions; pivots may miss the largest candidate "
-    "by the rounding of two sums; IER = 129 exactly where the exact last pivot is half a unit in "
-    "the last place of n",
+    "solution of the collocation matrices at steps from 1e-10 to 10 s",
+    "3 n u |L||U||x| for each component of a residual, times |inverse| for a solution (Higham "
+    "2002, theorem 9.4), computed in exact fractions. A pivot may be smaller than the largest "
+    "candidate by the rounding errors of two sums. IER must be 129 exactly where the exact last "
+    "pivot is at most half a unit in the last place of n.",
     lambda only: _attempts(),
 )

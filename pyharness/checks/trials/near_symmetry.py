@@ -22,7 +22,8 @@ def _checks_at(name: Name, time: float) -> Iterator[Attempt]:
 
 TRIAL = Trial(
     "near-symmetry",
-    "two moments, or all, that differ by 1e-1 to 1e-16 of their size, and equal ones",
-    "as of the separatrix. The difference of two moments is exact, and so is no loss of digits.",
+    "moments that differ by 1e-1 to 1e-16 of their size, two equal moments, and the sphere",
+    "As in the trial separatrix. The difference of two nearly equal moments is exact, so that no "
+    "digits are lost.",
     lambda only: check_all("near-symmetry", _checks_at, lambda each: each.time != LONG),
 )

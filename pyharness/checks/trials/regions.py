@@ -134,9 +134,10 @@ def _spin(listing: Listing, name: Name) -> Check:
 
 TRIAL = Trial(
     "regions",
-    "linear stability of each program, from its own amplification matrix",
-    "rounding alone: the derived matrix is exact, differences of a step, a polynomial of known "
-    "degree, are exact, and every rounding is one of a term no larger than with all signs "
-    "positive (Higham 2002, theorem 9.4, for the systems)",
+    "linear stability of each program, compared with its derived amplification matrix",
+    "Rounding errors alone, since the derived matrix is exact and the result of a step is a "
+    "polynomial of known degree, whose differences have no truncation error. Each rounding error "
+    "is at most that of the same sum with all signs positive; for linear systems Higham 2002, "
+    "theorem 9.4.",
     lambda only: _attempts(),
 )

@@ -104,8 +104,9 @@ def _attempts() -> Iterator[Attempt]:
 
 TRIAL = Trial(
     "scales",
-    "omega from 1e-300 to 1e300 rad/s, time scaled to match",
-    "as of the separatrix, relative to omega; ours scaled by a power of two: the same bits. "
-    "Where omega leaves the range of numbers: a status that says so.",
+    "omega from 1e-300 to 1e300 rad/s, with time rescaled by the inverse factor",
+    "As in the trial separatrix, relative to omega. If omega is multiplied by a power of two, "
+    "the methods of this package must return the same bits. If omega overflows, the status must "
+    "say so.",
     lambda only: _attempts(),
 )

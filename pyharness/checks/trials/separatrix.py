@@ -48,9 +48,10 @@ def _attempts() -> Iterator[Attempt]:
 
 TRIAL = Trial(
     "separatrix",
-    "spin about the middle axis, disturbed by 1e-1 to 1e-15 and by 0, over several flips",
-    "closed form: 1e-14 and what the rounding of A, B, C changes. Others: tolerance, or order "
-    "times steps, and rounding, amplified by the flow; where that leaves less than two digits, "
-    "energy and momentum, which the flow does not amplify. Undisturbed: exact.",
+    "spin about the middle axis, with perturbations of 1e-1 to 1e-15 and 0, over up to five flips",
+    "Closed form: 1e-14 plus the effect of rounding A, B, C. Other methods: the tolerance, or "
+    "the local error times the number of steps, plus rounding errors, all amplified by the "
+    "motion. If fewer than two digits are left, energy and momentum, whose errors the motion "
+    "does not amplify. Without a perturbation: no error.",
     lambda only: _attempts(),
 )

@@ -5,8 +5,8 @@ from pyharness.checks.stress import Trial
 
 TRIAL = Trial(
     "shapes",
-    "moments in the ratio 1 : 1 : 1e-12 and 1 : 1e12 : 1e12, flat plates, impossible bodies",
-    "as of the separatrix; energy and momentum weigh omega by moments, and are read as the "
-    "error of omega that would change them so.",
+    "needles with ratios of moments up to 1e12, flat plates, and moments that no body can have",
+    "As in the trial separatrix. A change of energy or momentum counts as the smallest error of "
+    "omega that causes it.",
     lambda only: check_all("shapes"),
 )

@@ -205,9 +205,9 @@ def _forecaster(case: int, name: str) -> Forecaster:
 TRIAL = Trial(
     "step-size",
     "steps from 1 to 1e-6 s over 1 s, and from 2e-3 s over 100 s until runs diverge",
-    "what each step misses, as a power series of the step worked out from the scheme alone, "
-    "carried to the end by the linearised flow, twice that for what it changes itself; a few "
-    "roundings of each step carried likewise; divergence where the amplification matrix doubles "
-    "a wobble",
+    "Twice the local error of each step (because the equations are nonlinear), a power series in "
+    "the step derived from the scheme alone, plus a few rounding errors of each step, both "
+    "propagated to the end by the linearised equations. Divergence is expected where the "
+    "amplification matrix doubles a perturbation.",
     lambda only: _attempts(),
 )

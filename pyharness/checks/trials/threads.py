@@ -174,7 +174,7 @@ def _linear(seed: int) -> bytes:
 
 TRIAL = Trial(
     "threads",
-    "the same calls from eight threads at once",
-    "no call shares state with another, so that no bit may differ",
+    "the same calls from eight threads",
+    "No bit may differ, since calls share no state.",
     _run,
 )

@@ -236,7 +236,8 @@ def _describe_axial(name: Name) -> Iterator[Attempt]:
 
 TRIAL = Trial(
     "torque",
-    "waves of 1e4 rad/s and more, torques of 1e12 and of 5e-324, resonance with the precession",
-    "tolerance and rounding, amplified by the flow; a wave's rounding counts with its angle",
+    "torque waves of 1e4 rad/s and more, torques from 5e-324 to 1e12 N m, resonance",
+    "The tolerance and rounding errors, amplified by the motion. The rounding error of a torque "
+    "wave grows with its phase.",
     lambda only: _attempts(),
 )

@@ -194,10 +194,15 @@ def test_command_line_says_so_in_a_line() -> None:
     pressed = time.perf_counter()
     for each in running:
         each.send_signal(signal.SIGINT)
-    for command, each in zip(commands, running, strict=True):
-        _, said = each.communicate(timeout=60)
-        assert (each.returncode, said) == (130, "pyharness: interrupted\n"), command
-        assert time.perf_counter() - pressed < 2.0 * PATIENCE, command
+    try:
+        for command, each in zip(commands, running, strict=True):
+            _, said = each.communicate(timeout=60)
+            assert (each.returncode, said) == (130, "pyharness: interrupted\n"), command
+            assert time.perf_counter() - pressed < 2.0 * PATIENCE, command
+    finally:
+        for each in running:
+            each.kill()
+            each.communicate()
 
 
 def test_interrupted_while_the_command_line_is_read_in() -> None:

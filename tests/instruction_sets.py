@@ -14,7 +14,7 @@ _NAMES = ({"X86_V3", "AVX2"}, {"X86_V4", "AVX512_SKX"})
 
 def level_here() -> int:
     """Return the highest level that is due here, according to NumPy and not to levels.c."""
-    if _build.COMPILER != "gcc" or platform.machine().lower() not in ("x86_64", "amd64"):
+    if len(_build.INSTRUCTION_SETS) == 1:
         return 0
     simd = np.show_config(mode="dicts")["SIMD Extensions"]
     found = {*simd["baseline"], *simd["found"]}

@@ -5,7 +5,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -13,9 +13,10 @@ from pathlib import Path
 from pyharness.checks.check import Check, Name
 from pyharness.checks.report import checks_report, summary
 from pyharness.model.facts import facts
+from pyharness.original.compiled_in_word import compiled_words
 from pyharness.views.render import render
 from tests.cross.builds import ROOT, Build, environment, false_claims, make, native_flag
-from tests.cross.comparison import compared, inside
+from tests.cross.comparison import CHECKOUT, compared, inside
 from tests.instruction_sets import fuses_here
 
 FOLDER = ROOT / "build" / "cross"
@@ -70,9 +71,10 @@ FAULTS = {
 def main() -> int:
     """Run the builds named on the command line, or all of them."""
     builds, skipped = _builds()
-    chosen = sys.argv[1:] or [build.name for build in builds]
+    names = [CHECKOUT, *(build.name for build in builds)]
+    chosen = sys.argv[1:] or names
     for name in chosen:
-        if name not in {build.name for build in builds}:
+        if name not in names:
             print(f"cross-check: no build '{name}'; skipped: {skipped}", file=sys.stderr)
             return 2
     FOLDER.mkdir(parents=True, exist_ok=True)
@@ -80,9 +82,13 @@ def main() -> int:
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         wanted = [build for build in builds if build.name in chosen]
         wanted.sort(key=lambda build: not build.checked)  # the slowest first
-        twin = pool.submit(_twin)
+        twin = pool.submit(_digests_here, "python")
         found = pool.map(lambda build: list(_checked(build, twin.result())), wanted)
         checks = [check for each in found for check in each]
+    if CHECKOUT in chosen:
+        checks += compared(
+            CHECKOUT, _digests_here("fortran"), _due(twin.result(), compiled_words())
+        )
     report = checks_report("cross", checks, summary(skipped, checks, 2))
     print(render(report, "table"), end="")
     return 0 if all(check.passed for check in checks) else 1
@@ -92,13 +98,13 @@ def _builds() -> tuple[list[Build], list[str]]:
     """Return the builds that can be made here, and the reasons for those that can't."""
     gfortran = os.environ.get("FC", "gfortran")
     faults = tuple((ORIGINAL + file, old, new) for _, (file, old, new), _ in FAULTS.values())
-    debug = Build("debug", gfortran, "gcc", "0", CHECKED, checked=True, tests=CALLING)
-    builds = [
-        debug,
-        replace(debug, name="faulty", plants=faults, faulty=True, tests=()),
-        Build("gfortran-O0", gfortran, "gcc", "0", tests=MODERN),
-        Build("gfortran-O2", gfortran, "gcc", "2", tests=MODERN),
-    ]
+    debug = Build(
+        "debug", gfortran, "gcc", "0", CHECKED, checked=True, tests=CALLING, instruction_sets=True
+    )
+    faulty = replace(
+        debug, name="faulty", plants=faults, faulty=True, tests=(), instruction_sets=False
+    )
+    builds = [debug, faulty]
     skipped = []
     native = native_flag(gfortran)
     if native is None:
@@ -110,7 +116,7 @@ def _builds() -> tuple[list[Build], list[str]]:
             "'-nostdinc', '-ffp-contract=off'",
             "'-nostdinc', '-ffp-contract=fast'",
         )
-        contracted = Build("contracted", gfortran, "gcc", "3", (native,), "fast", plants=(fused,))
+        contracted = Build("contracted", gfortran, "gcc", "2", (native,), "fast", plants=(fused,))
         if fuses_here():
             builds.append(contracted)
         else:
@@ -125,13 +131,22 @@ def _builds() -> tuple[list[Build], list[str]]:
     return builds, skipped
 
 
-def _twin() -> dict[str, str]:
-    """Return the digests of the Python twin, computed in this checkout."""
-    file = FOLDER / "twin.json"
-    command = [sys.executable, "-m", "tests.cross.digests", "python", str(file)]
+def _digests_here(language: str) -> dict[str, str]:
+    """Return the digests of the programs in Python or in Fortran, computed in this checkout."""
+    file = FOLDER / f"{language}.json"
+    command = [sys.executable, "-m", "tests.cross.digests", language, str(file)]
     subprocess.run(command, cwd=ROOT, check=True)
     digests: dict[str, str] = json.loads(file.read_text())["digests"]
     return digests
+
+
+def _due(twin: dict[str, str], words: Collection[str]) -> dict[str, str]:
+    """Return the digests that a build must have whose compiler supports these formats."""
+    return {
+        cell: each
+        for cell, each in twin.items()
+        if not cell.startswith("words/") or cell.split("/")[1] in words
+    }
 
 
 def _checked(build: Build, twin: dict[str, str]) -> Iterator[Check]:
@@ -158,12 +173,7 @@ def _checked(build: Build, twin: dict[str, str]) -> Iterator[Check]:
     yield Check(Name("build", name), not wrong, None, None, "; ".join(wrong), replay)
     entries = facts("divergences")["divergence"]
     listed = {(each["build"], each["cell"]) for each in entries if each["kind"] == "cross-build"}
-    # A compiler may support fewer floating-point formats.
-    due = {
-        cell: each
-        for cell, each in twin.items()
-        if not cell.startswith("words/") or cell.split("/")[1] in record["words"]
-    }
+    due = _due(twin, record["words"])
     bits = list(compared(name, record["digests"], due, listed))
     if build.contract != "off":
         seen = sum(not check.passed for check in bits)

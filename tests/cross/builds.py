@@ -28,6 +28,8 @@ class Build:
     checked: bool = False  # with run-time checks, which need the compiler's library
     plants: tuple[tuple[str, str, str], ...] = ()  # file, passage, faulty passage
     faulty: bool = False  # made only to check that its faults are caught
+    # Kernels for each instruction set have flags of their own, which override those of the build.
+    instruction_sets: bool = False
     tests: tuple[str, ...] = ()
 
 
@@ -51,7 +53,11 @@ def make(build: Build, folder: Path) -> Path:
         "FC": build.compiler,
         "FFLAGS": " ".join(build.flags),
     }
-    options = [f"-Doptimization={build.optimization}", f"-Ddebug={str(build.checked).lower()}"]
+    options = [
+        f"-Doptimization={build.optimization}",
+        f"-Ddebug={str(build.checked).lower()}",
+        f"-Dinstruction_sets={str(build.instruction_sets).lower()}",
+    ]
     for command in (["meson", "setup", "build", *options], ["meson", "compile", "-C", "build"]):
         done = subprocess.run(
             command, cwd=tree, env=environment, check=False,

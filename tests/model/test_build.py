@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -9,8 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from pyharness import _build  # noqa: PLC2701
 from pyharness.model import extension
 from pyharness.model.build import build
+from tests.instruction_sets import LEVELS
 
 ROOT = Path(__file__).parent.parent.parent
 LIBRARIES = ("gfortran", "quadmath", "flang", "FortranRuntime", "ifcore", "imf")
@@ -28,6 +31,12 @@ def test_extension_needs_no_fortran_library_at_run_time() -> None:
     assert "lib" in needed
     for library in LIBRARIES:
         assert library not in needed
+
+
+def test_hot_kernels_are_built_for_every_instruction_set() -> None:
+    on_x86 = platform.machine().lower() in ("x86_64", "amd64")
+    wanted = LEVELS if on_x86 and _build.COMPILER == "gcc" else LEVELS[:1]
+    assert sorted(_build.INSTRUCTION_SETS) == sorted(wanted)
 
 
 def test_flags_are_the_ones_that_keep_the_bits() -> None:

@@ -34,9 +34,11 @@ mutate: .venv/ready-to-test
 cross-check: .venv/ready-to-test
 	@FC=$(FC) $(BIN)/python -m tests.cross $(ARGS)
 
+# The editable build has the same options, so that nothing is compiled again.
 wheel: .venv/ready
 	@PATH="$(CURDIR)/$(BIN):$$PATH" FC=$(FC) $(BIN)/python -m pip wheel --quiet \
-	  --disable-pip-version-check --no-build-isolation --no-deps --wheel-dir dist .
+	  --disable-pip-version-check --no-build-isolation --no-deps \
+	  -Cbuild-dir="$$(echo build/cp*)" --wheel-dir dist .
 	@ls dist/*.whl
 
 edition: .venv/ready-to-test

@@ -35,26 +35,28 @@ def test_a_module_has_the_tests_that_import_it() -> None:
     assert nearest(["fortran/modern/taylor_march.f90"], sources())
 
 
-@pytest.mark.parametrize(
-    ("seconds", "body", "code", "said"),
-    [
+def test_it_ends_when_the_time_is_up(tmp_path: Path) -> None:
+    cases = [
         (60.0, "pass", 0, "2 tests passed, of 2"),
         (60.0, "assert False", 1, "1 tests passed, of 2"),
         (5.0, "time.sleep(90)", 0, "1 tests passed, of 2"),
-    ],
-)
-def test_it_ends_when_the_time_is_up(
-    tmp_path: Path, seconds: float, body: str, code: int, said: str
-) -> None:
-    (tmp_path / "test_b.py").write_text("def test_b(): pass\n")
-    (tmp_path / "test_a.py").write_text(f"import time\ndef test_a(): {body}\n")
-    command = f"import sys; from tests.quick import run; sys.exit(run(FILES, {seconds}))"
+    ]
+    (tmp_path / "test_z.py").write_text("def test_z(): pass\n")
+    runs = []
+    for number, (seconds, body, _, _) in enumerate(cases):
+        (tmp_path / f"test_{number}.py").write_text(f"import time\ndef test_a(): {body}\n")
+        runs.append((["test_z.py", f"test_{number}.py"], seconds))
+    command = f"from tests.quick import run; print([run(*each) for each in {runs}])"
     done = subprocess.run(
-        [sys.executable, "-c", command.replace("FILES", "['test_b.py', 'test_a.py']")],
+        [sys.executable, "-c", command],
         cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True, text=True, check=False,
     )  # fmt: skip
-    assert (done.returncode, said in done.stdout) == (code, True), done.stdout + done.stderr
+    *_, codes = done.stdout.splitlines()
+    assert codes == str([code for _, _, code, _ in cases]), done.stdout + done.stderr
+    said = [line for line in done.stdout.splitlines() if line.startswith("quick: ")]
+    for line, (_, _, _, wanted) in zip(said, cases, strict=True):
+        assert line.startswith(f"quick: {wanted};")
 
 
 def test_a_commit_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,6 +7,7 @@ exists.
 
 from collections.abc import Iterable, Set
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from pyharness.model.errors import InputError, kind_of, unknown
@@ -158,6 +159,7 @@ def flagged() -> list[dict[str, Any]]:
     return [entry for entry in facts("apparatus")["entry"] if "flag" in entry]
 
 
+@cache
 def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
     """Return the names of all defects, of all readings or of all conjectures.
 
@@ -184,6 +186,7 @@ def switchable(program: str | None = None) -> tuple[str, ...]:
     return tuple(name for kind in _FIELDS for name in names_of(kind, program))
 
 
+@cache
 def switches(program: str) -> tuple[str, ...]:
     """Return the names of the defects and conjectures that are active in the original program.
 

@@ -37,11 +37,12 @@ def all_cells() -> Iterator[tuple[Listing, int]]:
     doubtful cards) and conjectures (assumptions). The cases are those of Table 1. For a case with
     an initial torque, each listing is also yielded with the conjecture `initial-torque`.
     """
+    cases = {case: initial_torque(case_scene(case)) is not None for case in case_numbers()}
     for program in PROGRAMS:
         for listing in all_listings(program):
-            for case in case_numbers():
+            for case, has_torque in cases.items():
                 yield listing, case
-                if initial_torque(case_scene(case)) is not None:
+                if has_torque:
                     conjectures = listing.conjectures | {"initial-torque"}
                     yield replace(listing, conjectures=conjectures), case
 

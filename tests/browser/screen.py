@@ -10,13 +10,23 @@ WIDTHS = (360, 800, 1440)
 WIDEST_FONT = "* { letter-spacing: 1em !important; }"
 
 
+def set_width(browser: Chrome, width: int) -> None:
+    """Set the width of the browser's screen (pixels)."""
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+
+def set_scheme(browser: Chrome, scheme: str) -> None:
+    """Set the browser's preferred colour scheme, light or dark."""
+    features = [{"name": "prefers-color-scheme", "value": scheme}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+
+
 @contextmanager
 def screen(browser: Chrome, width: int, scheme: str = "light") -> Iterator[None]:
     """Set the browser's width (pixels) and its preferred colour scheme."""
-    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-    features = [{"name": "prefers-color-scheme", "value": scheme}]
-    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+    set_width(browser, width)
+    set_scheme(browser, scheme)
     try:
         yield
     finally:

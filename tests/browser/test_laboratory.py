@@ -128,14 +128,13 @@ def test_what_has_the_focus_is_in_sight(browser: Chrome, laboratory: Open) -> No
     browser.find_element(By.ID, "case").click()
     in_sight = (
         "const r = document.activeElement.getBoundingClientRect();"
-        "return r.bottom > 0 && r.top < innerHeight"
+        "return r.bottom > 0 && r.top < innerHeight && [document.activeElement.id]"
     )
     seen = set()
     for _ in range(60):
-        browser.switch_to.active_element.send_keys(Keys.TAB)
+        ActionChains(browser, 0).send_keys(Keys.TAB).perform()
         # A page may still be scrolling.
-        WebDriverWait(browser, 3.0).until(lambda _: browser.execute_script(in_sight))
-        seen.add(browser.execute_script("return document.activeElement.id"))
+        seen.update(WebDriverWait(browser, 3.0).until(lambda _: browser.execute_script(in_sight)))
     assert {"omega0", "lipschitz", "address", "printer-page"} <= seen
 
 
@@ -254,17 +253,17 @@ def test_how_long_a_change_takes(
         box.click();
         await null;  // the charts draw at the end of the task
         taken.push(performance.now() - begin);
-        if (taken.length < 20) requestAnimationFrame(again); else done(taken);
+        if (taken.length < 7) requestAnimationFrame(again); else done(taken);
       };
       requestAnimationFrame(again);"""
     lines = []
     for program in PROGRAMS:
         laboratory(f"#case=7&program={program}&listing=original&steps=300")
         taken = browser.execute_async_script(change)
-        assert len(taken) == 20
+        assert len(taken) == 7
         ordered = sorted(taken)
         lines.append(
-            f"{program}: first {taken[0]:.1f} ms, median {ordered[10]:.1f} ms, "
+            f"{program}: first {taken[0]:.1f} ms, median {ordered[3]:.1f} ms, "
             f"longest {ordered[-1]:.1f} ms"
         )
     with capsys.disabled():

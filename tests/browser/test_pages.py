@@ -11,7 +11,16 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
-from tests.browser.screen import WIDEST_FONT, WIDTHS, add_style, errors, screen, too_wide
+from tests.browser.screen import (
+    WIDEST_FONT,
+    WIDTHS,
+    add_style,
+    errors,
+    screen,
+    set_scheme,
+    set_width,
+    too_wide,
+)
 
 
 def addresses(site: Path) -> list[str]:
@@ -19,39 +28,106 @@ def addresses(site: Path) -> list[str]:
 
 
 STYLES = Path(__file__).parents[2] / "web" / "site"
+_CONTRAST = "color-contrast"
 # Mark one element with text for each path of tags, classes and other attributes by which a style
-# may select. Cells of a column have the same colours in every row, so that one of them suffices.
+# may select, and return the paths. Elements of one path have the same colours, in every row of a
+# table and on every page, so that one of them suffices.
 _MARK_ONE_OF_EACH = """
-const [attributes, ids] = arguments;
-const paths = new Map([[document.documentElement, ""]]);
-const seen = new Set();
+const [attributes, ids, seen] = arguments;
+const sheets = [...document.styleSheets].map((each) => each.href?.replace(/.*\\//, ""));
+const paths = new Map([[document.documentElement, sheets.join()]]);
+const old = new Set(seen), found = new Set();
 for (const each of document.querySelectorAll("body, body *")) {
   const own = attributes.map((name) => each.getAttribute(name) ?? "").join("|")
     + (ids.includes(each.id) ? each.id : "");
   const path = `${paths.get(each.parentElement) ?? ""}>${each.tagName}|${own}`;
   paths.set(each, path);
   const text = [...each.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
-  if (text && !seen.has(path) && each.checkVisibility()) {
-    seen.add(path);
+  if (text && !old.has(path) && !found.has(path) && each.checkVisibility()) {
+    found.add(path);
     each.dataset.sample = "";
   }
 }
+return [...found];
+"""
+# Remove from the main part what has the shape of something before it, on this page or an earlier
+# one, except for what is marked, and return the shapes that are left. A shape has the tags, the
+# attributes and whether there is text, of an element and of all in it. Headings stay, and a table
+# keeps a row of each shape.
+_THIN = """
+const known = new Set(arguments[0]), found = [];
+const telling = /^(class|role|type|scope|tabindex|lang|aria-(?!label|describedby|controls).*)$/;
+const shapes = new Map();
+const shape = (each) => {
+  if (!shapes.has(each)) {
+    const own = [...each.attributes].filter(({ name }) => name !== "data-sample")
+      .map(({ name, value }) =>
+        telling.test(name) ? `${name}=${value}` : name + (value.trim() ? "" : "!"));
+    const text = [...each.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
+    const inside = each.tagName === "math" ? [] : new Set([...each.children].map(shape));
+    shapes.set(each, `${each.tagName} ${own.sort()}${text ? "T" : ""}(${[...inside].sort()})`);
+  }
+  return shapes.get(each);
+};
+const thin = (whole, path, old, note) => {
+  for (const each of [...whole.children]) {
+    const here = `${path}>${shape(each)}`;
+    if (/^H[1-6]$/.test(each.tagName)) continue;
+    const marked = each.matches("[data-sample]") || each.querySelector("[data-sample]");
+    if (old.has(here) && !marked) { each.remove(); continue; }
+    old.add(here);
+    note(here);
+    const below = `${path}>${each.tagName}`;
+    if (/^(DIV|SECTION|ARTICLE|UL|OL|LI|FIGURE)$/.test(each.tagName)) thin(each, below, old, note);
+    else if (/^(TABLE|TBODY)$/.test(each.tagName)) thin(each, below, new Set(), () => {});
+  }
+};
+shape(document.body);
+const main = document.querySelector("main");
+if (main) thin(main, "", known, (each) => found.push(each));
+return found;
 """
 
 
-def barriers(browser: Chrome, *only: str) -> list[dict[str, Any]]:
-    """Return axe-core's findings in a page (rule, impact, place), by all rules or by `only` these.
+class Examined:
+    """Finds the barriers of pages with axe-core: of what differs from all that it has examined.
 
-    Contrast is measured for one element of each style, because thousands of cells take a minute.
+    Thousands of cells and cards take a minute, and all documents are of the same few structures.
     """
-    browser.execute_script(files("axe_core_python").joinpath("axe.min.js").read_text())
-    browser.execute_script(_MARK_ONE_OF_EACH, *selected_by())
-    found = []
-    contrast = "color-contrast"
-    if contrast not in only:
-        rules = {contrast: {"enabled": False}}
-        found = _violations(browser, "document", {"rules": rules})
-    return found + _violations(browser, "{include: [['[data-sample]']]}", {"runOnly": [contrast]})
+
+    def __init__(self) -> None:
+        self.paths: list[str] = []  # from the root to an element whose contrast was measured
+        self.shapes: list[str] = []  # of parts to which all other rules were applied
+
+    def contrast(self, browser: Chrome) -> list[dict[str, Any]]:
+        """Return what can hardly be read in a light and in a dark scheme."""
+        return self._contrast(browser, self._mark(browser))
+
+    def barriers(self, browser: Chrome) -> list[dict[str, Any]]:
+        """Return the findings by all rules (rule, impact, place). The page is thinner afterwards.
+
+        A dark scheme changes only colours.
+        """
+        new = self._mark(browser)
+        self.shapes += browser.execute_script(_THIN, self.shapes)
+        found = self._contrast(browser, new)
+        return found + _violations(browser, "document", {"rules": {_CONTRAST: {"enabled": False}}})
+
+    def _mark(self, browser: Chrome) -> bool:
+        """Mark the new samples, and load axe-core. Return whether there are new samples."""
+        axe = files("axe_core_python").joinpath("axe.min.js").read_text()
+        new = browser.execute_script(axe + _MARK_ONE_OF_EACH, *selected_by(), self.paths)
+        self.paths += new
+        return bool(new)
+
+    def _contrast(self, browser: Chrome, is_new: bool) -> list[dict[str, Any]]:
+        found = []
+        for scheme in ("dark", "light") if is_new else ():
+            set_scheme(browser, scheme)
+            found += _violations(
+                browser, "{include: [['[data-sample]']]}", {"runOnly": [_CONTRAST]}
+            )
+        return found
 
 
 def selected_by() -> tuple[list[str], list[str]]:
@@ -76,20 +152,24 @@ def _violations(browser: Chrome, context: str, options: dict[str, Any]) -> list[
 def test_no_page_has_an_error_or_is_wider_than_the_screen_whatever_the_font(
     browser: Chrome, site: Path
 ) -> None:
-    """Load each page once, at the width of a phone, and then change the width of the screen."""
+    """Each layout is tried in the narrowest screen that has it: it fits into a wider one too."""
+    text = "".join(path.read_text() for path in STYLES.glob("*.css"))
+    steps = {int(16 * float(each)) for each in re.findall(r"\(min-width: ([\d.]+)rem\)", text)}
+    assert steps == {640, 960, 1024}
     errors(browser)
     found: dict[str, Any] = {}
     for address in addresses(site):
         with screen(browser, WIDTHS[0]):
             browser.get(address)
-        for style, widths in (("", WIDTHS), (WIDEST_FONT, (320, *WIDTHS))):
-            add_style(browser, style)
-            for width in widths:
-                with screen(browser, width):
-                    if (beyond := too_wide(browser)) > 0:
-                        found[f"{address} {width} {style}"] = beyond
+            if (beyond := too_wide(browser)) > 0:
+                found[address] = beyond
+            add_style(browser, WIDEST_FONT)
+            for width in (320, *sorted(steps)):
+                set_width(browser, width)
+                if (beyond := too_wide(browser)) > 0:
+                    found[f"{address} {width} {WIDEST_FONT}"] = beyond
         if said := errors(browser):
-            found[address] = said
+            found[f"{address} says"] = said
     assert found == {}
 
 
@@ -115,13 +195,46 @@ def test_what_a_font_makes_too_wide_is_found(browser: Chrome, tmp_path: Path, bo
 def test_no_page_has_a_barrier(browser: Chrome, site: Path) -> None:
     errors(browser)
     found: dict[str, list[Any]] = {}
-    for scheme, only in (("light", ()), ("dark", ("color-contrast",))):
-        with screen(browser, 1000, scheme):
-            for address in addresses(site):
-                browser.get(address)
-                if there := barriers(browser, *only) or errors(browser):
-                    found[f"{address} {scheme}"] = there
+    examined = Examined()
+    with screen(browser, 1000):
+        for address in addresses(site):
+            browser.get(address)
+            if there := examined.barriers(browser) or errors(browser):
+                found[address] = there
     assert found == {}, json.dumps(found, indent=1)
+
+
+@pytest.mark.parametrize(
+    ("bad", "rule"),
+    [
+        ("<ul><li><a href='x'>a</a></li><li><a href='x'></a></li></ul>", "link-name"),
+        ("<ul><li><a href='x'>a</a></li><p>b</p></ul>", "list"),
+        ("<div><div><img src='x' alt=''><img src='x'></div></div>", "image-alt"),
+        (
+            "<table><tr><td>a</td><td>b</td></tr><tr><td>a</td><td><input></td></tr></table>",
+            "label",
+        ),
+        ("<section><p>a</p><p role='nonsense'>b</p></section>", "aria-roles"),
+        ("<h2>t</h2><p>a</p><h5>u</h5>", "heading-order"),
+    ],
+)
+def test_a_barrier_is_found_amid_what_was_examined(
+    browser: Chrome, tmp_path: Path, bad: str, rule: str
+) -> None:
+    examined = Examined()
+    good = (
+        "<ul><li><a href='x'>a</a></li></ul><section><p>a</p></section><h2>t</h2><p>a</p>"
+        "<div><div><img src='x' alt='t'></div></div><table><tr><td>a</td><td>b</td></tr></table>"
+    )
+    page = tmp_path / "page.html"
+    rules = []
+    for more in ("", "", bad):
+        page.write_text(
+            f"<!doctype html><html lang=en><title>t</title><main><h1>t</h1>{good * 3}{more}</main>"
+        )
+        browser.get(page.as_uri())
+        rules.append({each["rule"] for each in examined.barriers(browser)})
+    assert rules == [set(), set(), {rule}]
 
 
 def test_styles_select_by_nothing_that_the_samples_leave_out() -> None:
@@ -136,14 +249,27 @@ def test_styles_select_by_nothing_that_the_samples_leave_out() -> None:
 def test_contrast_is_measured_of_one_element_of_each_style(browser: Chrome, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     rows = "<tr><td>first<td class=pale>second</tr>" * 20
-    page.write_text(
-        "<!doctype html><html lang=en><title>t</title><style>.pale { color: #ddd }</style><body>"
-        f"<main><h1>t</h1><table>{rows}</table>"
+    style = (
+        ":root {{ color-scheme: light dark }} body {{ background: light-dark(#fff, #000) }}"
+        ".pale {{ color: light-dark({}, {}) }}"
     )
-    browser.get(page.as_uri())
-    assert [each["rule"] for each in barriers(browser, "color-contrast")] == ["color-contrast"]
-    samples = browser.find_elements(By.CSS_SELECTOR, "[data-sample]")
-    assert [each.text for each in samples] == ["t", "first", "second"]
+
+    def contrast(examined: Examined, *colours: str) -> int:
+        page.write_text(
+            f"<!doctype html><html lang=en><title>t</title><style>{style.format(*colours)}</style>"
+            f"<body><main><h1>t</h1><table>{rows}</table>"
+        )
+        browser.get(page.as_uri())
+        return len(examined.contrast(browser))
+
+    with screen(browser, 800):
+        assert contrast(Examined(), "#000", "#fff") == 0
+        samples = browser.find_elements(By.CSS_SELECTOR, "[data-sample]")
+        assert [each.text for each in samples] == ["t", "first", "second"]
+        examined = Examined()
+        assert contrast(examined, "#ddd", "#fff") == 1
+        assert contrast(Examined(), "#000", "#222") == 1
+        assert contrast(examined, "#ddd", "#fff") == 0  # each path is examined once
 
 
 def test_what_is_wrong_is_found(browser: Chrome, tmp_path: Path) -> None:
@@ -158,7 +284,7 @@ def test_what_is_wrong_is_found(browser: Chrome, tmp_path: Path) -> None:
         browser.get(page.as_uri())
         assert too_wide(browser) > 2000
         assert "nothing is not defined" in errors(browser)[0]
-        rules = {each["rule"] for each in barriers(browser)}
+        rules = {each["rule"] for each in Examined().barriers(browser)}
     assert {"label", "color-contrast", "html-has-lang"} <= rules
 
 
@@ -212,8 +338,8 @@ def test_a_filter_leaves_the_cards_of_a_kind(browser: Chrome, site: Path) -> Non
     browser.get((site / "listing/two-term.html").as_uri())
 
     def shown() -> set[str]:
-        cards = browser.find_elements(By.CSS_SELECTOR, ".card")
-        return {str(each.get_dom_attribute("id")) for each in cards if each.is_displayed()}
+        cards = "[...document.querySelectorAll('.card')].filter((each) => each.checkVisibility())"
+        return set(browser.execute_script(f"return {cards}.map((each) => each.id)"))
 
     every = shown()
     browser.find_element(By.ID, "kind-defect").click()

@@ -42,7 +42,11 @@ def _on_a_terminal(*arguments: str) -> tuple[str, str]:
 
 @pytest.mark.parametrize(
     "command",
-    ["words --case 2 --program two-term", "verify --only orders,schemes", "stress --only regions"],
+    [
+        "words --case 2 --program runge-kutta",
+        "verify --only orders,schemes",
+        "stress --only regions",
+    ],
 )
 def test_bar_is_within_the_terminal_and_removed(command: str) -> None:
     out, seen = _on_a_terminal(*command.split())

@@ -18,7 +18,7 @@ from pyharness.model.trajectory import Stop
 from pyharness.original import compiled
 from tests import traps
 from tests.cross.builds import ROOT, Build, false_claims
-from tests.cross.comparison import compared
+from tests.cross.comparison import CHECKOUT, compared
 from tests.cross.digests import count_of_runs, digest, replay
 from tests.traps import DIVIDE, INVALID, TOO_LARGE, UntoldException, guarded
 
@@ -72,6 +72,10 @@ def test_comparison_names_build_cell_and_replay() -> None:
     assert first.id == f"bits/flang-O2/{CELL}"
     assert first.replay.startswith("cd build/cross/flang-O2 && ")
     assert first.replay.endswith(f"verify --only {CELL}")
+    assert "PYHARNESS_ALL_LISTINGS=1 " in second.replay
+    assert "PYHARNESS_ALL_LISTINGS" not in first.replay
+    here, _ = compared(CHECKOUT, {CELL: "x"}, twin)
+    assert here.replay == f"python -m pyharness verify --only {CELL}"
     assert replay(NASTY).endswith("[two-term-at rest]'")
 
 

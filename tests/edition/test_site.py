@@ -4,17 +4,22 @@ import hashlib
 import json
 import re
 import tomllib
+from itertools import pairwise
 
 import pytest
 
-from pyharness.edition import api, decks, documents, site
+from pyharness.edition import api, decks, documents, figures, site
 from pyharness.edition.markdown import document
 from pyharness.history.ablation import entries
-from pyharness.history.claims.ledger import claims
+from pyharness.history.claims.ledger import claims, judgements
+from pyharness.history.claims.report import kinds_table
 from pyharness.history.claims.sentences import sentences
+from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
+from pyharness.model.report import Picture
 from pyharness.original.cards import deck, tight
+from pyharness.views import html, pictures
 from tests.edition.pages import dead, pages
 
 
@@ -72,6 +77,9 @@ def test_pages_have_landmarks_and_one_title(built_site: dict[str, bytes]) -> Non
         for tag, each in page.elements:
             if tag == "img":
                 assert each.get("alt"), (name, each)
+        # A heading is at most one level below the one before it. (The browser sees fewer of them.)
+        levels = [int(tag[1]) for tag in tags if re.fullmatch("h[1-6]", tag)]
+        assert all(below <= above + 1 for above, below in pairwise(levels)), name
 
 
 def test_the_site_is_small(built_site: dict[str, bytes]) -> None:
@@ -137,6 +145,25 @@ def test_the_ledger_has_the_verdicts(built_site: dict[str, bytes]) -> None:
     assert verdicts == ["reproduced", "false"]
 
 
+def test_counts_by_kind_are_on_the_home_page(built_site: dict[str, bytes]) -> None:
+    table = kinds_table([*judgements().values()])
+    home = built_site["index.html"].decode()
+    assert html.table(table, "verdicts by kind of claim") in home
+    results = next(row for row in table.rows if row[0] == "result")
+    before, after = results[2].split(" / ")
+    told = f"Of {results[1]} statements about results {before} are reproduced by the programs"
+    assert told in " ".join(home.split())
+    assert f"as printed and {after} by the corrected ones" in " ".join(home.split())
+
+
+def test_the_listing_is_cited_by_the_digest_of_its_text(built_site: dict[str, bytes]) -> None:
+    told = f"text {text_digest()}"
+    assert told in built_site["listing/index.html"].decode()
+    for program in PROGRAMS:
+        page = built_site[f"listing/{program}.html"].decode()
+        assert set(re.findall(r"text [0-9a-f]{12}\b", page)) == {told}
+
+
 def test_the_search_knows_cards_entries_claims_documents_and_names(
     built_site: dict[str, bytes],
 ) -> None:
@@ -164,7 +191,18 @@ def test_what_others_wrote_is_what_its_checksum_says() -> None:
             assert hashlib.sha256(files[name].read_bytes()).hexdigest() == digest
 
 
-def test_two_builds_have_the_same_bytes(built_site: dict[str, bytes]) -> None:
+def test_two_builds_have_the_same_bytes(
+    built_site: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A few figures are drawn again; tests/history/test_figures.py has more about their bytes."""
+
+    def saved(picture: Picture, name: str) -> dict[str, bytes]:
+        if name in ("figure-07-together.svg", "figure-10b-corrected.svg"):
+            return pictures.saved(picture, name)
+        names = (name, name.replace(".svg", ".csv"))
+        return {each: built_site[f"figures/{each}"] for each in names}
+
+    monkeypatch.setattr(figures, "saved", saved)
     again = site.build_site()
     assert [name for name in again if again[name] != built_site[name]] == []
     assert again.keys() == built_site.keys()

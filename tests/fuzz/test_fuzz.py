@@ -24,8 +24,8 @@ from tests.fuzz.checks import KINDS, tried
 
 # The campaign (`python -m tests.fuzz`) tries more.
 EXAMPLES = {
-    "scene-file": 150, "program": 150, "method": 0, "prepared": 60, "listing": 150, "command": 60,
-    "process": 2,
+    "scene-file": 50, "program": 50, "method": 0, "prepared": 20, "listing": 50, "command": 20,
+    "process": 1,
 }  # fmt: skip
 BODY = "[body]\nmoments=[3,2,1]\n[initial]\nomega=[1,2,3]\n"
 

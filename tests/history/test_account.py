@@ -166,13 +166,6 @@ def test_findings_have_the_numbers_of_the_claims() -> None:
     shares = [x for name, x in ratios.items() if name.startswith("case ")]
     told = f"Runge-Kutta is {min(shares):.0f} to {max(shares):,.0f} times more accurate"
     assert told in _document("docs/explanation/findings.md")
-    errors = outcome(claim("iv2-computer-error"), Laboratory(False)).numbers
-    ours = max(x for name, x in errors.items() if "rounding error" in name)
-    apart = max(x for name, x in errors.items() if "apart from binary64" in name)
-    assert f"their error is at most {ours:.0e} rad/s" in _document("docs/explanation/findings.md")
-    assert f"differ from ours by at most {apart:.0e} rad/s" in _document(
-        "docs/explanation/findings.md"
-    )
     run = run_program(case_scene(2), Listing.original("runge-kutta"))
     away = np.abs(run.omega[:, 0] - 2.0 * np.sin(2.5 * run.time)).max()
     assert f"its omega1 is within {away:.4f} rad/s" in _document("docs/explanation/findings.md")

@@ -32,12 +32,20 @@ TEXT = tei_document().decode()
 
 @pytest.fixture(scope="module")
 def schema() -> Any:
-    """Return the schema; reading it takes some seconds."""
+    """Return the schema without the elements that the document does not use.
+
+    On this document both schemas have the same verdict, but the whole takes 16 s to read.
+    """
     text = lzma.decompress((HERE / "tei_all.rng.xz").read_bytes())
     assert sha256(text).hexdigest() == SOURCE["sha256"]
     begin = " ".join(text[:1000].decode().split())
     assert f"TEI Edition: P5 Version {SOURCE['version']}." in begin
-    return etree.RelaxNG(etree.fromstring(text))
+    whole, relax = etree.fromstring(text), "{http://relaxng.org/ns/structure/1.0}"
+    used = {each.tag.removeprefix(TEI) for each in xml.fromstring(TEXT).iter()}
+    for each in list(whole.iter(relax + "element")):
+        if each.get("name") not in {*used, None}:
+            each.getparent().replace(each, etree.Element(relax + "notAllowed"))
+    return etree.RelaxNG(whole)
 
 
 @pytest.fixture(scope="module")

@@ -66,7 +66,7 @@ def _random_top(source: random.Random, kind: str) -> tuple[Triple, Triple, float
 )
 def test_any_top_at_any_time(kind: str) -> None:
     source = random.Random(kind)
-    for _ in range(200):
+    for _ in range(60):
         coefficients, omega, time = _random_top(source, kind)
         exact = exact_top(coefficients, omega, time)
         assert _error(_at(coefficients, omega, time), exact, omega) <= _BOUND, (

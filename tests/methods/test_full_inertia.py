@@ -96,9 +96,9 @@ def test_a_faint_torque_about_the_thin_axis_is_what_it_is() -> None:
 def test_attitude_of_a_nearly_round_body() -> None:
     tilted, bare = _scenes("nearly round")
     about_principal, axes = principal(replace(tilted, attitude=(0.5, 0.5, -0.5, 0.5)))
-    found = solve(replace(tilted, attitude=(0.5, 0.5, -0.5, 0.5)), [300.0], attitude=True)
+    found = solve(replace(tilted, attitude=(0.5, 0.5, -0.5, 0.5)), [40.0], attitude=True)
     # `principal` may order the axes in any way: the truth uses this order.
-    exact = reference(replace(about_principal), [300.0])
+    exact = reference(about_principal, [40.0])
     assert found.attitude is not None
     assert exact.attitude is not None
     back = found.rotation().as_matrix()[0] @ axes

@@ -4,6 +4,7 @@ import math
 import runpy
 from dataclasses import replace
 from decimal import Decimal, localcontext
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,12 +19,17 @@ from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
-from pyharness.truth.reference import reference
+from pyharness.truth.reference import Reference, reference
 from tests.random_scenes import NASTY
 
 _MAKER = Path(__file__).parent.parent.parent / "fortran/make_gauss.py"
 _STAGES = range(1, 9)
 _SPHERE = Scene("", (1.0, 1.0, 1.0), moments=(1.0, 1.0, 1.0), torque=TorqueLaw((1.0, 2.0, 3.0)))
+
+
+@cache
+def _truth(scene: Scene, *times: float) -> Reference:
+    return reference(scene, times)
 
 
 def _run(scene: Scene, times: list[float], stages: int, step: float, effort: float = 1.0) -> Any:
@@ -91,7 +97,7 @@ def test_order_is_twice_the_stages(case: int, stages: int, steps: tuple[int, int
 def test_tolerance_is_met(stages: int, case: int) -> None:
     scene = case_scene(case)
     times = [-0.1, -0.55, -1.0] if case == 5 else [0.1, 0.55, 1.0]
-    truth = reference(scene, times)
+    truth = _truth(scene, *times)
     finest = METHODS[f"gauss-{stages}"].finest
     for tolerance in (1e-3, 1e-6, finest):
         found = solve(scene, times, f"gauss-{stages}", tolerance)

@@ -2,13 +2,13 @@
 
 import tracemalloc
 from dataclasses import replace
-from pathlib import Path
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pyharness import Ensemble, Scene, TorqueLaw, case_scene, prepare, solve, solve_many
+from pyharness import Scene, TorqueLaw, case_scene, prepare, solve, solve_many
 from pyharness.model.codes import Methods, Statuses
 from pyharness.model.trajectory import Array
 from tests.as_written import compiler_here, many_as_written
@@ -22,15 +22,16 @@ def only(drawn: dict[str, Any], rows: Any) -> dict[str, Any]:
     return {name: values[rows] for name, values in drawn.items()}
 
 
-def errors(drawn: dict[str, Any], found: Ensemble) -> Array:
-    """Return errors relative to the largest omega of start and end; NaN where growth is large."""
-    relative = np.full(len(found.omega), np.nan)
-    for row, omega in enumerate(found.omega):
+@cache
+def truths(kind: str, n: int, seed: int) -> Array:
+    """Return omega of the bodies at the end; NaN where the error amplification is large."""
+    drawn = bodies(kind, n, seed)
+    ends = np.full((n, 3), np.nan)
+    for row in range(n):
         truth = solve(scene_of(drawn, row), [drawn["t_end"][row]], "taylor", 1e-15)
         if truth.has_all_rows and (truth.growth or np.inf) < 1e3:
-            scale = max(np.abs(truth.omega).max(), np.abs(drawn["omega0"][row]).max())
-            relative[row] = np.abs(omega - truth.omega[-1]).max() / scale
-    return relative
+            ends[row] = truth.omega[-1]
+    return ends
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
@@ -38,17 +39,19 @@ def errors(drawn: dict[str, Any], found: Ensemble) -> Array:
 def test_the_tolerance_holds(kind: str, tolerance: float, level: int) -> None:
     drawn = bodies(kind, 60, 1982)
     found = solve_many(TOP, tolerance=tolerance, **drawn)
-    off = errors(drawn, found)
+    truth = truths(kind, 60, 1982)
+    scale = np.maximum(np.abs(truth).max(axis=1), np.abs(drawn["omega0"]).max(axis=1))
+    off = np.abs(found.omega - truth).max(axis=1) / scale
     assert np.count_nonzero(np.isfinite(off)) > 50
     assert np.nanmax(off) <= tolerance + 4e-12
     assert found.has_result.all()
     # The results come from lanes: one by one they would have the single solver's bits.
-    alone = [prepare(scene_of(drawn, row), tolerance=tolerance) for row in range(60)]
+    alone = [prepare(scene_of(drawn, row), tolerance=tolerance) for row in range(20)]
     same = [
         np.array_equal(solver(drawn["omega0"][row], drawn["t_end"][row]), found.omega[row])
         for row, solver in enumerate(alone)
     ]
-    assert np.count_nonzero(same) < 30
+    assert np.count_nonzero(same) < 10
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-6, 1e-8, 1e-10])
@@ -81,24 +84,24 @@ def test_the_tolerance_holds_where_the_motion_magnifies_errors(tolerance: float)
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_body_does_not_depend_on_the_others(kind: str, level: int) -> None:
-    n = 200
+    n = 130
     drawn = bodies(kind, n, 7)
     whole = solve_many(TOP, **drawn).omega
     order = np.random.default_rng(3).permutation(n)
     assert np.array_equal(solve_many(TOP, **only(drawn, order)).omega, whole[order])
-    for count in (2, 7, 8, 9, 63, 64, 65, 129):
+    for count in (2, 7, 9, 63, 65):
         assert np.array_equal(solve_many(TOP, **only(drawn, slice(count))).omega, whole[:count])
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("threads", [2, 3, 7])
-def test_threads_change_no_bit(kind: str, threads: int) -> None:
-    for n in (9, 1801):
+def test_threads_change_no_bit(kind: str) -> None:
+    for n, counts in ((9, (2, 7)), (601, (2, 3, 7))):
         drawn = bodies(kind, n, 11)
         whole = solve_many(TOP, **drawn)
-        dealt = solve_many(TOP, threads=threads, **drawn)
-        assert np.array_equal(whole.omega, dealt.omega)
-        assert np.array_equal(whole.status, dealt.status)
+        for threads in counts:
+            dealt = solve_many(TOP, threads=threads, **drawn)
+            assert np.array_equal(whole.omega, dealt.omega)
+            assert np.array_equal(whole.status, dealt.status)
 
 
 @pytest.mark.parametrize("case", range(1, 8))
@@ -316,11 +319,11 @@ def test_any_array_will_do() -> None:
     assert np.array_equal(solver.many(starts, 1.0, threads=2)[0], found)
 
 
-@pytest.mark.external
-@pytest.mark.skipif(not compiler_here(), reason="no compiler")
-def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path, level: int) -> None:
-    """The loops as written take the same steps as those of unroll.py, with other roundings."""
-    loops = many_as_written(tmp_path)
+@pytest.fixture(scope="module")
+def by_loops(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Any, ...]]:
+    """Return name, tolerance, bodies, omega and status of what the loops as written solve."""
+    loops = many_as_written(tmp_path_factory.mktemp("loops"))
+    solved = []
     for kind, method, tolerance in (
         ("constant", 0, 1e-12), ("waves", 0, 1e-9), ("waves", 0, 1e-6), ("ramp", 0, 1e-3),
         ("constant", Methods.RK4, 1.0),
@@ -335,9 +338,19 @@ def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path, level: int
             drawn["omega0"], drawn["t_end"],
         )  # fmt: skip
         drawn.pop("cosines", None)
-        name = "rk4" if method else "taylor"
         if method:
             drawn["t_end"] = 0.02
+        solved.append(("rk4" if method else "taylor", tolerance, drawn, omega, status))
+    return solved
+
+
+@pytest.mark.external
+@pytest.mark.skipif(not compiler_here(), reason="no compiler")
+def test_loops_as_written_do_what_they_do_written_out(
+    by_loops: list[tuple[Any, ...]], level: int
+) -> None:
+    """The loops as written take the same steps as those of unroll.py, with other roundings."""
+    for name, tolerance, drawn, omega, status in by_loops:
         found = solve_many(TOP, method=name, tolerance=tolerance, step=0.001, **drawn)
         solved = status == Statuses.COMPLETE
         assert np.count_nonzero(solved) > 20

@@ -17,6 +17,7 @@ from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive, mo
 from pyharness.model.codes import Statuses
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
 from pyharness.scenes.rescaled import scaled, unscaled
+from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
 
 BESIDE = Scene("beside the middle axis", (1e-4, 2.0, 1e-4), moments=(3.0, 2.0, 1.2))
@@ -67,11 +68,14 @@ def test_growth_is_one_where_nothing_grows_and_unknown_where_no_method_tells() -
 
 
 @pytest.mark.parametrize("time", [1.0, 30.0, 300.0, -1000.0])
-# Case 3 at a tenth of its speed: its reference takes a tenth of the time.
-@pytest.mark.parametrize("scene", [scaled(case_scene(3), 0.1), BESIDE, SPHERE])
+@pytest.mark.parametrize("scene", [case_scene(3), BESIDE, SPHERE])
 def test_error_of_a_closed_form_is_what_it_may_be(scene: Scene, time: float) -> None:
     """The error is within a few units of rounding A, B and C, which grow like any perturbation."""
-    found, truth = solve(scene, [time], "closed-form", 1e-9), reference(scene, [time]).omega[-1]
+    found = solve(scene, [time], "closed-form", 1e-9)
+    if scene is SPHERE:
+        truth = reference(scene, [time]).omega[-1]
+    else:
+        truth = np.array(torque_free(scene, time), dtype=float)
     scale = max(np.abs(truth).max(), max(map(abs, scene.omega)))
     assert found.error is not None
     assert np.abs(found.omega[-1] - truth).max() / scale <= 4.0 * found.error

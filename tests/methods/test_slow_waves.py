@@ -1,5 +1,6 @@
 """Small waves, starts at rest, waves of any speed: the scale is the largest omega reached."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from pyharness import InputError, Scene, TorqueLaw, prepare, solve
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.methods.solve import finest
 from pyharness.model.scene import Triple
-from pyharness.truth.integer_series import integer_series
+from pyharness.truth.integer_series import Path, integer_series
 from pyharness.truth.reference import reference
 
 BODY = (40.0, 30.0, 20.0)
@@ -20,8 +21,13 @@ def _driven(omega: Triple = REST, **law: Any) -> Scene:
     return Scene("driven", omega, BODY, torque=TorqueLaw(**law))
 
 
+@cache
+def _path(scene: Scene, time: float) -> Path:
+    return integer_series(scene, [time])
+
+
 def _errs(found: np.ndarray, scene: Scene, time: float) -> float:
-    path = integer_series(scene, [time])
+    path = _path(scene, time)
     return float(np.abs(found - path.omega[-1]).max() / np.abs(path.way).max())
 
 

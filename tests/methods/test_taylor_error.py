@@ -40,7 +40,7 @@ def untaken(tmp_path_factory: pytest.TempPathFactory) -> as_written.Solve:
 def _draws() -> list[tuple[Draw, Trajectory]]:
     draws = [
         drawn("error", number, (1e-3, 1e-5, 1e-7, 1e-9, 1e-11), dressed=False)
-        for number in range(200)
+        for number in range(120)
     ]
     return [(each, solve(each.scene, [each.time], "taylor", each.tolerance)) for each in draws]
 
@@ -58,7 +58,7 @@ def test_error_is_known_and_taken_off(untaken: as_written.Solve) -> None:
         measured.append(before.error / error)
         left.append(of.truth.error(found.omega[-1]) / error)
         held.append(of.truth.error(found.omega[-1]) / of.tolerance)
-    assert len(measured) > 100
+    assert len(measured) > 60
     assert np.quantile(measured, [0.05, 0.5]) == pytest.approx([0.65, 1.05], rel=0.15)
     assert np.quantile(measured, 0.75) < 2.0
     assert np.quantile(left, 0.5) < 0.3
@@ -105,23 +105,23 @@ def test_is_made_again_where_much_grows_and_hardly_else() -> None:
             assert is_again
         if of.truth.growth < 1e3:
             calm.append(is_again)
-    assert len(calm) > 100
+    assert len(calm) > 60
     assert np.mean(calm) < 0.1
 
 
 def test_says_where_no_digit_is_left() -> None:
     lost = []
-    for number in range(200):
-        of = drawn("lost", number, (1e-9, 1e-11, 1e-13), dressed=False)
+    for of, _ in _draws():
         if of.truth.growth < 100.0:
             continue
-        ended = solve(of.scene, [of.time], "taylor", of.tolerance).ended
-        lost.append(of.truth.growth * ROUNDING / of.tolerance)
-        if lost[-1] > 1.0:
-            assert ended == "sensitive"
-        if lost[-1] < 0.15:
-            assert ended == "complete"
-    assert sum(each > 1.0 for each in lost) > 5
+        for tolerance in (1e-9, 1e-11, 1e-13):
+            ended = solve(of.scene, [of.time], "taylor", tolerance).ended
+            lost.append(of.truth.growth * ROUNDING / tolerance)
+            if lost[-1] > 1.0:
+                assert ended == "sensitive"
+            if lost[-1] < 0.15:
+                assert ended == "complete"
+    assert sum(each > 1.0 for each in lost) > 20
 
 
 @pytest.mark.parametrize(

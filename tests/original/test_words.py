@@ -31,15 +31,15 @@ CDC, ROUNDED = WORDS["cdc48"], WORDS["cdc48-rounded"]
 @pytest.mark.bitwise
 @pytest.mark.parametrize("name", FLOATS)
 def test_bits_are_those_of_numpy(name: str) -> None:
-    """Test 20 000 operations; `python -m tests.original.words_campaign` draws a million."""
-    assert differing(name, 20_000, "test") == []
+    """Test 8000 operations; `python -m tests.original.words_campaign` draws a million."""
+    assert differing(name, 8_000, "test") == []
 
 
 @pytest.mark.bitwise
 @pytest.mark.parametrize("p", [11, 24, 48])
 @pytest.mark.parametrize("rule", RULES)
 def test_every_rule_agrees_with_exact_rationals(rule: str, p: int) -> None:
-    assert disagreements(p, rule, 3000, "test") == []
+    assert disagreements(p, rule, 1000, "test") == []
 
 
 def test_vectors_agree() -> None:
@@ -152,7 +152,6 @@ def test_roots_and_waves_are_rounded_to_nearest() -> None:
 
 
 SCENES = {
-    "case 3": case_scene(3),
     "case 7": case_scene(7),
     "huge": Scene("", (1e150, 1e160, 1.0), (3.0, 2.0, 1.0)),
     "tiny": Scene("", (1e-300, 1e-310, 5e-324), (3.0, 2.0, 1.0)),

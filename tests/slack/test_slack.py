@@ -66,7 +66,10 @@ def _is_between(code: CodeType) -> bool:
 
 
 # Modules that compute limits, and that plants do not change.
-_KEPT = ("checks.judge", "checks.hold", "checks.trials.torque", "checks.trials.scales")
+_KEPT = (
+    "checks.judge", "checks.hold", "checks.trials.torque", "checks.trials.scales",
+    "checks.trials.attitude",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -74,7 +77,7 @@ def _once() -> Iterator[None]:
     """Compute each truth and each conditioning only once."""
     with pytest.MonkeyPatch.context() as patched:
         for room in _KEPT:
-            for name in ("conditioning", "reference"):
+            for name in ("conditioning", "reference", "free_attitude"):
                 target = f"pyharness.{room}.{name}"
                 if hasattr(pkgutil.resolve_name(f"pyharness.{room}"), name):
                     patched.setattr(target, kept(pkgutil.resolve_name(target)))

@@ -26,31 +26,23 @@ _SCENES = {
 }
 
 
-def _propagator(scene: Scene, start: Array, time: float) -> Array:
-    """Return the derivatives of the end with respect to the start."""
-
-    def end(moved: Array) -> Array:
-        first, second, third = moved.tolist()
-        found = reference(replace(scene, omega=(first, second, third)), [time])
-        assert found.remainder is not None
-        return np.asarray(found.omega[0] + found.remainder[0])
-
-    shifts = _CHANGE * np.eye(3)
-    columns = [(end(start + shift) - end(start - shift)) / (2.0 * _CHANGE) for shift in shifts]
-    return np.array(columns).T
-
-
 @cache
 def _sampled(name: str, count: int = 32) -> tuple[Array, Array, Array]:
-    """Return times, omega and propagators to the end; the torque must be constant."""
+    """Return times, omega and propagators from each time to the end."""
     scene, time = _SCENES[name]
     times = np.linspace(0.0, time, count + 1)
-    omega = np.vstack([scene.omega, reference(scene, times[1:].tolist()).omega])
-    rest = [
-        _propagator(scene, w, time - t) if t != time else np.eye(3)
-        for t, w in zip(times, omega, strict=True)
-    ]
-    return times, omega, np.array(rest)
+
+    def omega(shift: Array) -> Array:
+        first, second, third = (scene.omega + shift).tolist()
+        found = reference(replace(scene, omega=(first, second, third)), times[1:].tolist())
+        return np.vstack([[first, second, third], found.omega])
+
+    shifts = _CHANGE * np.eye(3)
+    columns = [(omega(shift) - omega(-shift)) / (2.0 * _CHANGE) for shift in shifts]
+    # The derivatives of each row with respect to the start; the last is the product of the
+    # propagator from a row to the end with the derivatives of that row.
+    made = np.array(columns).transpose(1, 2, 0)
+    return times, omega(np.zeros(3)), made[-1] @ np.linalg.inv(made)
 
 
 @pytest.mark.parametrize("name", _SCENES)

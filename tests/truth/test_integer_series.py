@@ -15,8 +15,9 @@ BODY = (40.0, 30.0, 20.0)
 REST = (0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("case", range(1, 8))
-@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("case", "sign"), [*zip(range(1, 8), [1.0, -1.0] * 4, strict=False), (5, -1.0)]
+)
 def test_both_references_agree_to_the_last_bit_but_one(case: int, sign: float) -> None:
     """The references share no code, and differ in arithmetic, steps and treatment of waves."""
     scene, times = case_scene(case), [sign * t for t in (0.3, 1.0, 1.7)]

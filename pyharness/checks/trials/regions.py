@@ -55,7 +55,7 @@ def _attempts() -> Iterator[Attempt]:
     halves = [subset("runge-kutta", keep=[name]) for name in ("stage-base", "base-not-restored")]
     for listing in (*LISTINGS, *halves):
         label = "-".join(sorted(listing.defects)) if listing in halves else listing.label
-        yield from _parts(listing, named("regions", listing.program, label))
+        yield Attempt(named("regions", listing.program, label), partial(_parts, listing))
 
 
 def _parts(listing: Listing, name: Name) -> Iterator[Attempt]:

@@ -42,20 +42,22 @@ def _attempts() -> Iterator[Attempt]:
         listings: list[Listing | None] = [each for each in LISTINGS if each.program == name]
         for case in CASES:
             for listing in listings or [None]:
-                yield from _of_case(name, case, listing)
+                label = listing.label if listing else ""
+                place = named("step-size", name, f"case-{case}", label)
+                yield Attempt(place, partial(_of_case, case, listing))
 
 
-def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attempt]:
+def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attempt]:
     """Yield deferred checks of a method's errors and divergence in a case of Table 1 of the thesis.
 
     For every step size, the error at the end is compared with its predicted bound. The errors of
     the original programs are only reported. The step size at which truncation and rounding errors
-    are equal is checked too. `listing` is the version of a program of the thesis, or None for any
-    other method. A deferred check is computed only if it is requested.
+    are equal is checked too. `place` is the beginning of the names of the checks, with the method
+    as subject. `listing` is the version of a program of the thesis, or None for any other method. A
+    deferred check is computed only if it is requested.
     """
     before = listing is not None and listing.label == "original"
-    label = listing.label if listing else ""
-    place = named("step-size", method, f"case-{case}", label, scene=case_scene(case))
+    method, place = place.subject, replace(place, scene=case_scene(case))
     scenes = {n: replace(case_scene(case), step_size=TIME / n, steps=n) for n in COUNTS}
     error = cache(lambda count: _error(scenes[count], method, case, listing))
 

@@ -142,7 +142,7 @@ def test_lower_bounds_are_what_the_landing_script_installs() -> None:
     extras = PROJECT["optional-dependencies"]
     bounds = list(dict.fromkeys([*PROJECT["dependencies"], *extras["plots"], *extras["edition"]]))
     script = (ROOT / ".ci/run").read_text()
-    lowest = script[script.index("lowest() {") : script.index("# run_wheel")]
+    lowest = script[script.index("lowest() {") : script.index("# install_wheel")]
     python = sys.executable if sys.version_info[:2] == (3, 11) else "python3.11"
     if PROJECT["requires-python"] != ">=3.11" or shutil.which(python) is None:
         pytest.skip("no Python of the lowest version here")

@@ -155,7 +155,7 @@ def test_reference_lists_every_method_with_its_tolerances() -> None:
         "defects stage-base", "defects 1660", "cards runge-kutta:860",
         "deck --program two-term --dialect ftn", "limits --case 6",
         "family --case 5 --terms 1 --weighting galerkin", "rotations --case 6", "doctor",
-        "words --case 2 --program runge-kutta", "verify --only orders",
+        "verify --only orders",
         "verify --only random --draws 3", "stress --only matrices",
     ],
 )  # fmt: skip

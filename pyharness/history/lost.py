@@ -218,16 +218,31 @@ def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
     The weights are the two weight functions of the weighted residual method `weighting`. `residual`
     has the coefficients of the polynomial, from the constant on; `length` is in s.
     """
+    # Plain numbers, because NumPy's polynomials of machine words take several times as long.
+    coefficients = residual.tolist()
     found = []
     for k in range(TERMS):
+        low, high, power, factor = 0.0, length, 0, 1.0
         if weighting == "subdomain":
-            low, high, weight = length * k / TERMS, length * (k + 1) / TERMS, _power(0)
+            low, high = length * k / TERMS, length * (k + 1) / TERMS
+        elif weighting == "galerkin":
+            power = k + 1
         else:
-            low, high = 0.0, length
-            weight = _power(k + 1) if weighting == "galerkin" else (k + 1) * _power(k)
-        integral = polynomial.polyint(polynomial.polymul(weight, residual))
-        found.append(polynomial.polyval(high, integral) - polynomial.polyval(low, integral))
+            power, factor = k, k + 1.0
+        integral = [0.0] * (power + 1)
+        integral += [factor * x / (i + power + 1) for i, x in enumerate(coefficients)]
+        value = _value(integral, high)
+        # Every integral from 0 is 0 there.
+        found.append(value if low == 0.0 else value - _value(integral, low))
     return found
+
+
+def _value(coefficients: list[Any], at: Any) -> Any:
+    """Return the value of a polynomial, from its coefficients of 1, t, t**2, ..., by Horner."""
+    *others, value = coefficients
+    for x in reversed(others):
+        value = x + value * at
+    return value
 
 
 def _factors(matrix: Array) -> Array:

@@ -8,6 +8,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from pyharness.cli.main import main
 from pyharness.history.words import WordCell, cells
@@ -17,6 +18,7 @@ from pyharness.original.vectors import OURS
 from pyharness.original.word import RULES
 from pyharness.views.csv import csv_text
 from tests.conftest import Printed
+from tests.json_reference import schema_of
 
 LENGTHS = (16, 20, 24, 28, 48, 53)
 
@@ -112,7 +114,9 @@ def test_verb(printed: Printed, tmp_path: Path) -> None:
     picture = tmp_path / "words.png"
     with few_steps(10):
         text = printed(f"words --case 1 --program runge-kutta --format json --plot {picture}")
-    runs = json.loads(text)["runs"]
+    record = json.loads(text)
+    Draft202012Validator(schema_of("words")).validate(record)
+    runs = record["runs"]
     assert len(runs) == 2 * 16 * 4
     assert {run["p"] for run in runs} >= {16, 48, 113}
     assert picture.stat().st_size > 1000

@@ -50,7 +50,7 @@ def test_tolerance_holds_on_random_scenes() -> None:
 
 @pytest.mark.parametrize("kind", NASTY)
 def test_tolerance_holds_on_nasty_scenes(kind: str) -> None:
-    """Compare with the series too."""
+    """Compare with the series at 1e-14, which is an independent method."""
     generator = np.random.default_rng([1982, list(NASTY).index(kind)])
     complete = runs = 0
     for number in range(40):

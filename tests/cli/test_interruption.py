@@ -121,7 +121,7 @@ def test_what_is_left_to_the_resource_tracker_is_removed_without_a_word() -> Non
 
 def test_commands_interrupted_at_random_moments_end_in_a_line() -> None:
     verbs = ["compare", "verify", "here", "processes", "dask"]
-    for each in trials(10, 4.0, 2, signal.SIGINT, verbs):
+    for each in trials(5, 4.0, 2, signal.SIGINT, verbs):
         assert each.outcome in ("interrupted", "interpreter's", "had ended"), each
 
 

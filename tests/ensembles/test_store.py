@@ -32,8 +32,8 @@ from tests.ensembles.sweeps import PROGRAM, SQUARE, TILT, files, text, written
 def test_killed_at_half_way_it_resumes_and_does_nothing_twice(
     executor: str, tmp_path: Path
 ) -> None:
-    found = kill_and_resume(tmp_path, 20_000, 200, t_end=3.0, executor=executor)
-    assert found.n_chunks == 100
+    found = kill_and_resume(tmp_path, 8_000, 200, t_end=3.0, executor=executor)
+    assert found.n_chunks == 40
     assert found.n_chunks // 2 <= found.n_done < found.n_chunks
     assert found.written_again == []
     assert found.different == []

@@ -134,7 +134,7 @@ class Number:
         if not self.m:
             return float(self.e)
         try:
-            return float(self.fraction())
+            return float(self.m << self.e) if self.e >= 0 else self.m / (1 << -self.e)
         except OverflowError:
             return math.copysign(math.inf, self.m)
 

@@ -43,10 +43,13 @@ CALLING = (
     "--deselect=tests/original/test_programs.py::test_nasty_scenes_agree",
     # These tests call the same kernels with many more bodies, and are the slowest with checks.
     "--ignore=tests/methods/test_many_alone.py",
-    # The test with seven threads covers two and three, and Python's warnings do not depend on the
-    # build.
-    "--deselect=tests/methods/test_many.py::test_threads_change_no_bit[2-",
-    "--deselect=tests/methods/test_many.py::test_threads_change_no_bit[3-",
+    # Slow with run-time checks; other tests reach the same code.
+    "--deselect=tests/methods/test_many.py::test_threads_change_no_bit[ramp",
+    "--deselect=tests/methods/test_many.py::test_threads_change_no_bit[waves",
+    "--deselect=tests/checks/test_motions.py::test_bounds_hold[torque/taylor",
+    "--deselect=tests/checks/test_stress.py::test_bounds_hold[near-symmetry",
+    "--deselect=tests/checks/test_stress.py::test_bounds_hold[separatrix",
+    # Python's warnings do not depend on the build.
     "--deselect=tests/model/test_impossible.py",
     # These tests do not depend on bits: how soon a kernel ends, and how pip builds the package.
     "--deselect=tests/methods/test_interruption.py::test_kernel_ends_at_once",

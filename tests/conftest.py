@@ -2,7 +2,6 @@
 
 import os
 import shlex
-import signal
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -12,10 +11,6 @@ from pyharness.model.extension import extension
 from tests.instruction_sets import BEST, LEVELS, level_here
 from tests.traps import guard
 
-# A shell lets its background jobs ignore Ctrl-C, and they pass this on to processes that tests
-# interrupt.
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    signal.signal(signal.SIGINT, signal.default_int_handler)
 # `make cross-check` sets this variable; each call of a kernel then takes some microseconds longer.
 if os.environ.get("PYHARNESS_TRAPS"):
     assert guard(extension()) > 0

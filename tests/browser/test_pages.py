@@ -50,10 +50,11 @@ for (const each of document.querySelectorAll("body, body *")) {
 }
 return [...found];
 """
-# Remove from the main part what has the shape of something before it, on this page or an earlier
-# one, except for what is marked, and return the shapes that are left. A shape has the tags, the
-# attributes and whether there is text, of an element and of all in it. Headings stay, and a table
-# keeps a row of each shape.
+# Remove the elements of <main> whose structure has occurred before, on this page or on an earlier
+# one, and return the structures that are new. A structure is a text: for an element and for all
+# within it the tag, the names of the attributes, the values of those that rules of accessibility
+# read, such as `role`, and whether there is text. The script keeps headings, elements that
+# _MARK_ONE_OF_EACH has marked, and in every table a row of each structure.
 _THIN = """
 const known = new Set(arguments[0]), found = [];
 const telling = /^(class|role|type|scope|tabindex|lang|aria-(?!label|describedby|controls).*)$/;
@@ -90,9 +91,11 @@ return found;
 
 
 class Examined:
-    """Finds the barriers of pages with axe-core: of what differs from all that it has examined.
+    """Searches pages for faults of accessibility with axe-core, and remembers what it has examined.
 
-    Thousands of cells and cards take a minute, and all documents are of the same few structures.
+    Of a page it examines only the elements whose structure or style is new. The pages repeat few
+    structures in thousands of table cells and cards, and axe-core takes a minute for all of them. A
+    fault that depends on the wording, or on two equal ids far apart, is not found.
     """
 
     def __init__(self) -> None:
@@ -100,13 +103,13 @@ class Examined:
         self.shapes: list[str] = []  # of parts to which all other rules were applied
 
     def contrast(self, browser: Chrome) -> list[dict[str, Any]]:
-        """Return what can hardly be read in a light and in a dark scheme."""
+        """Return the elements whose text has too little contrast, in a light or a dark scheme."""
         return self._contrast(browser, self._mark(browser))
 
     def barriers(self, browser: Chrome) -> list[dict[str, Any]]:
-        """Return the findings by all rules (rule, impact, place). The page is thinner afterwards.
+        """Return rule, impact and place of each fault; repeated elements are removed from the page.
 
-        A dark scheme changes only colours.
+        Only the contrast is measured in a dark scheme too, because a scheme changes only colours.
         """
         new = self._mark(browser)
         self.shapes += browser.execute_script(_THIN, self.shapes)
@@ -114,7 +117,7 @@ class Examined:
         return found + _violations(browser, "document", {"rules": {_CONTRAST: {"enabled": False}}})
 
     def _mark(self, browser: Chrome) -> bool:
-        """Mark the new samples, and load axe-core. Return whether there are new samples."""
+        """Load axe-core, mark an element of each new style, and return whether there is any."""
         axe = files("axe_core_python").joinpath("axe.min.js").read_text()
         new = browser.execute_script(axe + _MARK_ONE_OF_EACH, *selected_by(), self.paths)
         self.paths += new

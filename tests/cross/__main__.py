@@ -89,9 +89,8 @@ def main() -> int:
         found = pool.map(lambda build: list(_checked(build, twin.result())), wanted)
         checks = [check for each in found for check in each]
     if CHECKOUT in chosen:
-        checks += compared(
-            CHECKOUT, _digests_here("fortran"), _due(twin.result(), compiled_words())
-        )
+        due = _due(twin.result(), compiled_words())
+        checks += compared(CHECKOUT, _digests_here("fortran"), due, _listed())
     report = checks_report("cross", checks, summary(skipped, checks, 2))
     print(render(report, "table"), end="")
     return 0 if all(check.passed for check in checks) else 1
@@ -143,6 +142,12 @@ def _digests_here(language: str) -> dict[str, str]:
     return digests
 
 
+def _listed() -> set[tuple[str, str]]:
+    """Return build and cell of each known divergence from the twin."""
+    entries = facts("divergences")["divergence"]
+    return {(each["build"], each["cell"]) for each in entries if each["kind"] == "cross-build"}
+
+
 def _due(twin: dict[str, str], words: Collection[str]) -> dict[str, str]:
     """Return the digests that a build must have whose compiler supports these formats."""
     return {
@@ -174,10 +179,8 @@ def _checked(build: Build, twin: dict[str, str]) -> Iterator[Check]:
     record = json.loads((tree / "digests.json").read_text())
     wrong = false_claims(build, tree, record)
     yield Check(Name("build", name), not wrong, None, None, "; ".join(wrong), replay)
-    entries = facts("divergences")["divergence"]
-    listed = {(each["build"], each["cell"]) for each in entries if each["kind"] == "cross-build"}
     due = _due(twin, record["words"])
-    bits = list(compared(name, record["digests"], due, listed))
+    bits = list(compared(name, record["digests"], due, _listed()))
     if build.contract != "off":
         seen = sum(not check.passed for check in bits)
         note = f"{seen} of {len(bits)} cells differ" if seen else "the comparison sees no fault"

@@ -75,6 +75,7 @@ def test_comparison_names_build_cell_and_replay() -> None:
     assert "PYHARNESS_ALL_LISTINGS=1 " in second.replay
     assert "PYHARNESS_ALL_LISTINGS" not in first.replay
     here, _ = compared(CHECKOUT, {CELL: "x"}, twin)
+    assert not here.passed
     assert here.replay == f"python -m pyharness verify --only {CELL}"
     assert replay(NASTY).endswith("[two-term-at rest]'")
 

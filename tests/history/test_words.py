@@ -10,6 +10,7 @@ from unittest.mock import patch
 import pytest
 from jsonschema import Draft202012Validator
 
+from pyharness.cli import options
 from pyharness.cli.main import main
 from pyharness.history.words import WordCell, cells
 from pyharness.history.words_report import words_report
@@ -112,8 +113,9 @@ def test_report_has_every_run(found: Found) -> None:
 
 def test_verb(printed: Printed, tmp_path: Path) -> None:
     picture = tmp_path / "words.png"
-    with few_steps(10):
+    with few_steps(10), patch.object(options, "progress") as progress:
         text = printed(f"words --case 1 --program runge-kutta --format json --plot {picture}")
+    assert progress.call_count > 1
     record = json.loads(text)
     Draft202012Validator(schema_of("words")).validate(record)
     runs = record["runs"]

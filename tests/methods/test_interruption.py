@@ -23,6 +23,7 @@ from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene, TorqueLaw, Wave
 from pyharness.original.compiled import run
 from pyharness.original.many import run_many
+from tests.cli.interrupts import hearing
 
 # An idle machine needs some hundredths of a second; uninterrupted, each call takes many seconds.
 PATIENCE = 1.5
@@ -181,12 +182,13 @@ def test_command_line_says_so_in_a_line() -> None:
     )
     start = "print(flush=True); from pyharness.__main__ import start; start()"
     pipe = subprocess.PIPE
-    running = [
-        subprocess.Popen(
-            [sys.executable, "-c", start, *each.split()], stdout=pipe, stderr=pipe, text=True
-        )
-        for each in commands
-    ]
+    with hearing():
+        running = [
+            subprocess.Popen(
+                [sys.executable, "-c", start, *each.split()], stdout=pipe, stderr=pipe, text=True
+            )
+            for each in commands
+        ]
     for each in running:
         assert each.stdout is not None
         each.stdout.readline()

@@ -20,10 +20,13 @@ from pyharness.truth.reference import reference
 
 
 def is_chosen(listing: Listing) -> bool:
-    """Whether the tests here run a listing, in which few defects are active, or few are fixed.
+    """Return whether the tests of this file run a listing.
 
-    Each defect is tried alone and fixed alone, each reading with all defects and with none.
-    `verify --only cells` and `make cross-check`, whose replay sets the variable, run all listings.
+    They run the original and the corrected program, each with all its defects but one, with a
+    single defect, and with a single reading (an interpretation of a doubtful card). They run all
+    listings if the environment variable PYHARNESS_ALL_LISTINGS is set, as in the commands with
+    which `make cross-check` repeats a failed comparison. `verify --only cells` and `make
+    cross-check` compare all listings anyway.
     """
     if os.environ.get("PYHARNESS_ALL_LISTINGS"):
         return True

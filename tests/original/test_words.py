@@ -131,6 +131,14 @@ def test_unordered_compares_with_nothing() -> None:
         assert not word(0)
 
 
+def test_float_of_a_number_is_the_nearest() -> None:
+    """Just above the middle between two subnormal floats, a number must not be rounded twice."""
+    for bits in range(1, 52):
+        m, e = 2**112 + 2 ** (112 - bits) + 1, bits - 1187
+        for number in (Word(113)(Fraction(sign * m) * Fraction(2) ** e) for sign in (1, -1)):
+            assert float(number) == float(number.fraction()) != 0.0
+
+
 def test_roots_and_waves_are_rounded_to_nearest() -> None:
     for word in (*WORDS.values(), Word(20, "chop")):
         for x in (2.0, 3.0, 1e-3, 0.25, 7e10):

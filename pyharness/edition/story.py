@@ -195,7 +195,7 @@ def _distances() -> dict[str, float]:
 
 
 def _span(case: int) -> tuple[float, float]:
-    """Return a range that holds the true omega1 of a case and what lies near it."""
+    """Return a range that holds the true omega1 of a case and a margin."""
     values = [case_scene(case).omega[0], *_truth(case).omega[:, 0]]
     low, high = min(values), max(values)
     margin = 0.25 * (high - low)

@@ -182,7 +182,8 @@ def test_the_story_can_be_read_in_four_minutes(browser: Chrome) -> None:
         _click(browser, selector)
     script = """
       const words = ".scene :is(p, h2, legend, label, figcaption, button)";
-      return [...document.querySelectorAll(words)].filter((each) => each.checkVisibility()).map((each) => each.textContent);
+      const shown = [...document.querySelectorAll(words)].filter((each) => each.checkVisibility());
+      return shown.map((each) => each.textContent);
     """
     words = " ".join(browser.execute_script(script)).split()
     assert 600 < len(words) < 1000, len(words)

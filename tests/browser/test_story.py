@@ -64,7 +64,7 @@ def _largest(case: int, program: str, listing: Listing, components: slice = slic
     return float(np.abs(run.omega - truth)[:, components].max())
 
 
-@pytest.mark.parametrize(("letter", "has"), [("A", "two collocation"), ("B", "Runge-Kutta")])
+@pytest.mark.parametrize(("letter", "has"), [("A", "two terms"), ("B", "Runge-Kutta")])
 def test_a_reader_chooses_a_program_to_trust(browser: Chrome, letter: str, has: str) -> None:
     assert _text(browser, "claim") == ""
     _click(browser, f"input[name=trust][value={letter}]")

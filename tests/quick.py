@@ -17,6 +17,12 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 SECONDS = 28.0
+# Tests of a file that no test names, by the beginning of its path. Those of a package follow.
+USERS = {
+    "fortran/original": "tests/original", "fortran/many/lanes": "tests/original",
+    "fortran": "tests/methods", "web": "tests/edition", "pyharness/edition": "tests/edition",
+    "pyharness/data": "tests/history", "pyharness/__main__": "tests/cli",
+}  # fmt: skip
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -61,27 +67,60 @@ def sources() -> dict[str, str]:
 
 
 def nearest(paths: Sequence[str], tests: dict[str, str]) -> list[str]:
-    """Return the test files to run: changed ones, those of a changed file's name, those naming it.
+    """Return the test files to run, the nearest first.
 
-    A test names a module of Python that it imports, and any other file by its name.
+    The nearest are the changed test files, then those of a changed file's name. Tests of a module
+    of Python follow by the number of imports from the test to the module. Tests of any other file
+    name it; if none does, they are those of the folder that uses it.
     """
-    ranks: dict[str, int] = {}
+    ranks: dict[str, tuple[int, bool]] = {}
     for path in paths:
         stem = Path(path).stem
-        module = path.removesuffix(".py").replace("/", ".") if path.endswith(".py") else None
+        folder = Path(path).parent.name
+        near = importers(path) if path.endswith(".py") else {}
+        found = {}
         for test, text in tests.items():
             if path == test:
-                rank = 0
+                found[test] = 0
             elif Path(test).stem == f"test_{stem}":
-                rank = 1
-            elif module and module in imported(text):
-                rank = 2
-            elif module is None and re.search(rf"\b{re.escape(stem)}\b", text):
-                rank = 3
-            else:
-                continue
+                found[test] = 1
+            elif between := [near[name] for name in imported(text) if name in near]:
+                found[test] = 2 + min(between)
+            elif not path.endswith(".py") and re.search(rf"\b{re.escape(stem)}\b", text):
+                found[test] = 2
+        if not found:
+            of_package = {f"pyharness/{each}": f"tests/{each}" for each in Path(path).parts[1:2]}
+            users = [
+                user for begin, user in {**USERS, **of_package}.items() if path.startswith(begin)
+            ]
+            found = {test: 2 for test in tests for user in users[:1] if test.startswith(user)}
+        for test, steps in found.items():
+            rank = (steps, Path(test).parent.name != folder)
             ranks[test] = min(rank, ranks.get(test, rank))
     return sorted(ranks, key=lambda test: (ranks[test], test))
+
+
+def importers(path: str) -> dict[str, int]:
+    """Return the modules that import a module, by the number of imports between them."""
+    found = {_module(path): 0}
+    last = set(found)
+    while last:
+        next_ones = {name for name, names in imports().items() if names & last} - set(found)
+        found |= dict.fromkeys(next_ones, max(found.values()) + 1)
+        last = next_ones
+    return found
+
+
+@cache
+def imports() -> dict[str, set[str]]:
+    """Return what every module of the package and of the tests imports, by its name."""
+    paths = [*(ROOT / "pyharness").rglob("*.py"), *(ROOT / "tests").rglob("*.py")]
+    # What a package's own file imports, its users have from the package.
+    return {_module(str(each.relative_to(ROOT))): imported(each.read_text()) for each in paths}
+
+
+def _module(path: str) -> str:
+    return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
 
 
 @cache

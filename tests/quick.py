@@ -90,10 +90,9 @@ def nearest(paths: Sequence[str], tests: dict[str, str]) -> list[str]:
                 found[test] = 2
         if not found:
             of_package = {f"pyharness/{each}": f"tests/{each}" for each in Path(path).parts[1:2]}
-            users = [
-                user for begin, user in {**USERS, **of_package}.items() if path.startswith(begin)
-            ]
-            found = {test: 2 for test in tests for user in users[:1] if test.startswith(user)}
+            every = [*USERS.items(), *of_package.items()]
+            users = [user for begin, user in every if path.startswith(begin)][:1]
+            found = {test: 2 for test in tests for user in users if test.startswith(user)}
         for test, steps in found.items():
             rank = (steps, Path(test).parent.name != folder)
             ranks[test] = min(rank, ranks.get(test, rank))
@@ -103,20 +102,22 @@ def nearest(paths: Sequence[str], tests: dict[str, str]) -> list[str]:
 def importers(path: str) -> dict[str, int]:
     """Return the modules that import a module, by the number of imports between them."""
     found = {_module(path): 0}
-    last = set(found)
+    last = list(found)
     while last:
-        next_ones = {name for name, names in imports().items() if names & last} - set(found)
-        found |= dict.fromkeys(next_ones, max(found.values()) + 1)
-        last = next_ones
+        distance = found[last[0]] + 1
+        last = sorted({user for name in last for user in users_of().get(name, ())} - set(found))
+        found |= dict.fromkeys(last, distance)
     return found
 
 
 @cache
-def imports() -> dict[str, set[str]]:
-    """Return what every module of the package and of the tests imports, by its name."""
-    paths = [*(ROOT / "pyharness").rglob("*.py"), *(ROOT / "tests").rglob("*.py")]
-    # What a package's own file imports, its users have from the package.
-    return {_module(str(each.relative_to(ROOT))): imported(each.read_text()) for each in paths}
+def users_of() -> dict[str, set[str]]:
+    """Return the modules of the package and of the tests that import a module, by its name."""
+    found: dict[str, set[str]] = {}
+    for path in [*(ROOT / "pyharness").rglob("*.py"), *(ROOT / "tests").rglob("*.py")]:
+        for name in imported(path.read_text()):
+            found.setdefault(name, set()).add(_module(str(path.relative_to(ROOT))))
+    return found
 
 
 def _module(path: str) -> str:

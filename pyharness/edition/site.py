@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pyharness.edition import api, decks, documents, figures, laboratory, ledger
+from pyharness.edition import api, decks, documents, figures, laboratory, ledger, parallel_decks
 from pyharness.edition.bundle import bundle
 from pyharness.edition.markdown import inline
 from pyharness.edition.report import MARK, listed
@@ -159,16 +159,23 @@ def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -
 
 def _listing() -> Iterator[Page]:
     for program in PROGRAMS:
-        views = decks.card_views(program)
+        pages = decks.sheets(program)
+        views = [each for page in pages for each in page.cards]
         path = f"listing/{program}.html"
-        context = {"program": program, "cards": views, "kinds": decks.kinds_of(views)}
+        context = {
+            "program": program, "programs": _DECKS, "sheets": pages, "cards": views,
+            "kinds": decks.kinds_of(views), "notes": decks.notes(program),
+        }  # fmt: skip
         found = [
             Found(f"{path}#{each.number}", f"{program} {each.number}", "card",
                   "".join(run.text for run in each.card).strip())
             for each in views
         ]  # fmt: skip
-        yield Page(path, f"{_DECKS[program]}: the deck", "deck.html", context, found,
+        yield Page(path, f"{_DECKS[program]}: the program as printed", "deck.html", context, found,
                    menu="listing/index.html")  # fmt: skip
+    yield Page("listing/collation.html", "The three decks compared", "collation.html",
+               {"programs": _DECKS, "operations": parallel_decks.operations()},
+               menu="listing/index.html")  # fmt: skip
     context = {"programs": _DECKS, "scan": facts("cards/scan")}
     yield Page("listing/index.html", "The listing", "listing.html", context)
 

@@ -22,6 +22,11 @@ def facts(name: str) -> dict[str, Any]:
         return tomllib.load(file)
 
 
+def data_text(name: str) -> str:
+    """Return the content of the text file ``data/<name>`` of this package."""
+    return (_FOLDER / name).read_text(encoding="utf-8")
+
+
 def shipped(name: str) -> Path:
     """Return the path of a project folder that a checkout has beside the Python package.
 

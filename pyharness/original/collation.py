@@ -5,10 +5,11 @@ The critical apparatus (`data/apparatus.toml`) lists, among others, the deviatio
 
 import difflib
 import re
+from functools import cache
 from typing import Any
 
 from pyharness.model.errors import InputError
-from pyharness.model.facts import facts
+from pyharness.model.facts import data_text, facts
 from pyharness.original.cards import chosen, find, numbers, tight
 
 HEADING = "APPENDIX AND PROGRAMS"
@@ -32,6 +33,18 @@ def expected_lines() -> list[tuple[str, str]]:
                 kind = "furniture" if "furniture" in item else "phantom"
                 found.append((tight(item[kind]), kind))
     return found
+
+
+@cache
+def witness_lines() -> dict[str, str]:
+    """Return the line of the scan for each card that the scan has, with the blanks of the scan.
+
+    The keys are names of cards (lines of the printed programs), as in ``two-term:1660``. The lines
+    are those of `data/cards/witness.txt`. Callers must not change the dictionary.
+    """
+    lines = data_text("cards/witness.txt").splitlines()
+    pairs = zip(lines, expected_lines(), strict=True)
+    return {name: line for line, (_, name) in pairs if ":" in name}
 
 
 def unexplained(scan: str) -> list[str]:

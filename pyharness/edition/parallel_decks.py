@@ -162,11 +162,15 @@ def _kind(text: str) -> str:
 
 
 def _runs(text: str, parts: Sequence[_Part], marks: dict[int, str]) -> list[Run]:
-    """Return a card's text as runs; `marks` has the kind of each part that differs, by column."""
+    """Return a card's text as runs, without the blanks before it.
+
+    `marks` has the kind of each part that differs, by column.
+    """
     found, done = [], 0
     for part in parts:
         if part.column in marks:
             found += [Run(text[done : part.column])] if done < part.column else []
             found.append(Run(part.text, part.kind))
             done = part.column + len(part.text)
-    return [*found, Run(text[done:])] if text[done:] else found
+    found += [Run(text[done:])] if text[done:] else []
+    return [found[0]._replace(text=found[0].text.lstrip()), *found[1:]]

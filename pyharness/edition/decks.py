@@ -86,10 +86,11 @@ class CardView(NamedTuple):
     text of the card. It is in brackets if the scan lacks the card. `scan` is its line in the scan,
     with the blanks of the scan, or None. `corrected` is the card in the corrected program. `port`
     and `twin` are the lines of the Fortran port and of the Python port that correspond to the card.
-    `notes` are the notes on the card, the most important kind first. `begins` are those whose range of cards begins with this
-    card; their `cards` is this range alone. `absent` is the reason why the Fortran port has no
-    statement for the card, or None. `otherwise` is the reason why the port's statement is
-    different, or None. `parallels` are the cards of the other programs with the same text.
+    `notes` are the notes on the card, the most important kind first. `begins` are those whose range
+    of cards begins with this card; their `cards` is this range alone. `absent` is the reason why
+    the Fortran port has no statement for the card, or None. `otherwise` is the reason why the
+    port's statement is different, or None. `parallels` are the cards of the other programs with the
+    same text.
     """
 
     number: int

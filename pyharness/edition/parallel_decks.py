@@ -121,8 +121,8 @@ def _merged(rows: Sequence[dict[str, Card]], cards: Sequence[Card]) -> list[dict
 
 
 def _likeness(one: Card, other: Card) -> float:
-    parts = (_PART.findall(one.text[6:]), _PART.findall(other.text[6:]))
-    return difflib.SequenceMatcher(None, *parts, autojunk=False).ratio()
+    mine, theirs = (_PART.findall(card.text, 6) for card in (one, other))
+    return difflib.SequenceMatcher(None, mine, theirs, autojunk=False).ratio()
 
 
 def _compared(row: dict[str, Card]) -> AlignedRow:
@@ -130,10 +130,11 @@ def _compared(row: dict[str, Card]) -> AlignedRow:
     marks: dict[str, dict[int, str]] = {program: {} for program in row}
     parts = {program: _parts(card) for program, card in row.items()}
     for one, other in combinations(row, 2):
-        texts = (
+        mine, theirs = (
             [(each.kind == _LABEL, each.text) for each in parts[name]] for name in (one, other)
         )
-        for what, i, j, k, m in difflib.SequenceMatcher(None, *texts, autojunk=False).get_opcodes():
+        matcher = difflib.SequenceMatcher(None, mine, theirs, autojunk=False)
+        for what, i, j, k, m in matcher.get_opcodes():
             if what != "equal":
                 marks[one] |= {each.column: each.kind for each in parts[one][i:j]}
                 marks[other] |= {each.column: each.kind for each in parts[other][k:m]}

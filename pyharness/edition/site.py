@@ -24,6 +24,7 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record
 from pyharness.model.schema import SCHEMAS
+from pyharness.original.cards import deck
 from pyharness.views.json import json_text
 
 if TYPE_CHECKING:
@@ -176,8 +177,12 @@ def _listing() -> Iterator[Page]:
     yield Page("listing/collation.html", "The three decks compared", "collation.html",
                {"programs": _DECKS, "operations": parallel_decks.operations()},
                menu="listing/index.html")  # fmt: skip
-    context = {"programs": _DECKS, "scan": facts("cards/scan")}
-    yield Page("listing/index.html", "The listing", "listing.html", context)
+    counts = {
+        program: (title, len(deck(program).cards), len(decks.sheets(program)))
+        for program, title in _DECKS.items()
+    }
+    context = {"decks": counts, "scan": facts("cards/scan")}
+    yield Page("listing/index.html", "The three programs", "listing.html", context)
 
 
 def _documents(docs: Path) -> Iterator[Page]:

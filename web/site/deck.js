@@ -33,7 +33,8 @@
     event.preventDefault();
     const numbers = [...document.querySelectorAll(".line")].map((each) => Number(each.id));
     const told = document.getElementById("jumped");
-    const number = Number(document.getElementById("card").value);
+    const given = document.getElementById("card").value.trim();
+    const number = Number(given);
     if (numbers.includes(number)) {
       told.textContent = "";
       location.hash = `#${number}`;
@@ -42,7 +43,7 @@
       card.querySelector(".number").focus({ preventScroll: true });
     } else {
       const near = numbers.reduce((a, b) => (Math.abs(b - number) < Math.abs(a - number) ? b : a));
-      told.textContent = Number.isFinite(number)
+      told.textContent = /^\d+$/.test(given)
         ? `There is no card ${number}; the nearest is ${near}.`
         : `Give the number of a card, from ${numbers[0]} to ${numbers.at(-1)}.`;
     }

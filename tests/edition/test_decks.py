@@ -203,6 +203,13 @@ def test_every_card_but_comments_is_compared_once() -> None:
     assert set(found.values()) == {1}
 
 
+def test_the_apparatus_explains_its_kinds(built_site: dict[str, bytes]) -> None:
+    page = built_site["apparatus.html"].decode()
+    told = re.findall(r'<dt class="kind ([\w-]+)">([\w ]+)</dt>', page)
+    assert {name for _, name in told} == {each["kind"] for each in facts("apparatus")["entry"]}
+    assert all(name.replace(" ", "-") == style for style, name in told)
+
+
 def compared(program: str, number: int) -> tuple[dict[str, list[str]], list[str]]:
     """Return the marked parts of each deck in the row of a card, and the kinds of differences."""
     for operation in parallel_decks.operations():

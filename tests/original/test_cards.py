@@ -8,7 +8,7 @@ import pytest
 
 from pyharness.cli.main import main
 from pyharness.model.errors import InputError
-from pyharness.model.facts import facts
+from pyharness.model.facts import data_text, facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.original import collation
 from pyharness.original.cards import Difference, chosen, deck, numbers, passages
@@ -115,7 +115,11 @@ def test_a_line_out_of_place_is_found(scan: str, change: str) -> None:
 
 @pytest.mark.skipif(not SCAN.exists(), reason="the text of the thesis is not beside the project")
 def test_scan_of_the_thesis_is_explained() -> None:
-    assert unexplained(SCAN.read_text()) == []
+    text = SCAN.read_text()
+    assert unexplained(text) == []
+    lines = [line.rstrip() for line in text.rpartition(HEADING)[2].splitlines()]
+    kept = [line for line in lines if line.strip() not in ("", "```")]
+    assert data_text("cards/witness.txt").splitlines() == kept
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

@@ -50,7 +50,7 @@ def test_the_program_comes_first_and_the_apparatus_on_demand(browser: Chrome, si
             assert not within(browser, 890, hidden).is_displayed()
         # The cards have their columns, and the numbers of notes are below each other after them.
         for name in (".ours", ".refs"):
-            assert box(browser, 860, name)["left"] == box(browser, 1260, name)["left"]
+            assert box(browser, 860, name)["left"] == box(browser, 1270, name)["left"]
         browser.find_element(By.ID, "view-apparatus").click()
         assert within(browser, 890, ".scan").text == "630-      U1(I)=U1(J)+.5*DT*KX(I)"
         assert "Cards 890\u2013910: 7 redundant" in within(browser, 890, ".ranges").text
@@ -179,12 +179,17 @@ def test_print_keeps_marks_numbers_of_notes_and_the_citation(
     try:
         set_width(browser, 718)
         go(browser, site, f"four-term.html?view={view}")
+        citation = browser.find_element(By.CSS_SELECTOR, ".citation")
+        is_shown = "return arguments[0].checkVisibility()"
+        assert not browser.execute_script(is_shown, citation)
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
         assert within(browser, 970, ".ours").text.strip() == "[A(4,1)=1.]"
         mark = within(browser, 780, ".ours mark")
         assert "underline" in mark.value_of_css_property("text-decoration-line")
         assert within(browser, 780, ".refs").is_displayed()
-        assert "in: pyharness" in browser.find_element(By.CSS_SELECTOR, ".citation").text
+        # What is folded away on the screen is printed.
+        assert "in: pyharness" in str(citation.get_property("textContent"))
+        assert browser.execute_script(is_shown, citation)
         assert browser.find_element(By.ID, "note-1").is_displayed()
         assert not browser.find_element(By.CSS_SELECTOR, ".tools").is_displayed()
         assert within(browser, 780, ".scan").is_displayed() == (view == "apparatus")

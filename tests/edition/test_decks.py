@@ -107,6 +107,9 @@ def test_the_scan_has_one_three_or_six_blanks_before_a_statement() -> None:
                 and (line := witness_lines().get(f"{program}:{view.number}"))
                 and (match := re.search(r"-( *)\S", line))
             )
+            if found.total() < 5:  # one page has only cards with statement numbers, and END
+                assert (program, sheet.number) == ("runge-kutta", 4)
+                continue
             usual, count = found.most_common(1)[0]
             assert usual in (1, 3, 6), (program, sheet.number)
             assert count > 0.8 * found.total(), (program, sheet.number, found)
@@ -185,7 +188,7 @@ def test_a_page_says_how_to_cite_a_card(built_site: dict[str, bytes], program: s
     assert cited.format("N") in text
     for number in deck(program).cards:
         assert cited.format(number) in text
-        assert f"text {text_digest()}, listing/{program}.html#{number}." in f"{text}."
+        assert f"text {text_digest()}, listing/{program}.html#{number}</p>" in text
 
 
 def test_every_card_but_comments_is_compared_once() -> None:

@@ -2,14 +2,18 @@
 
 A card has one line of a program. The port is the program in modern Fortran, and the twin is the
 program in Python. An entry of the critical apparatus explains, for example, a defect, or a
-difference between a card and the scan.
+difference between a card and the scan. A note is such an entry with a number, as a page of a deck
+shows it.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 from pyharness.history.ablation import entries
-from pyharness.original.cards import Card, Place, deck, parallels, tight
+from pyharness.model.facts import facts
+from pyharness.original.cards import Card, Place, deck, numbers, parallels, switch_at, tight
+from pyharness.original.collation import witness_lines
+from pyharness.original.decks import corrected_cards, corrections
 
 # Kinds of apparatus entries in order of precedence. A card with entries of several kinds has the
 # colour of the first of these kinds.
@@ -30,52 +34,169 @@ class Run(NamedTuple):
     entry: str | None = None
 
 
-class CardView(NamedTuple):
-    """A card as a page shows it, with its line of the scan and its apparatus entries.
+class Note(NamedTuple):
+    """A numbered entry of the critical apparatus, and the cards of a program that it is about.
 
-    An apparatus entry records, for example, a defect, or a difference between card and scan. `card`
-    is the text of the card. `scan` is its line in the scan, or None if the scan lacks the card.
-    `port` and `twin` are the lines of the Fortran port and of the Python port that correspond to
-    the card. `absent` is the reason why the Fortran port has no statement for the card, or None.
-    `otherwise` is the reason why the port's statement is different, or None. `parallels` are the
-    cards of the other programs with the same text.
+    The entries of a program are numbered from 1 in the order of their first cards. `cards` has the
+    numbers of the cards as text, as in ``860-910, 1040-1090``.
+    """
+
+    number: int
+    entry: dict[str, Any]
+    cards: str
+
+    @property
+    def kind(self) -> str:
+        """Return the kind of the entry, for example ``defect``."""
+        return str(self.entry["kind"])
+
+
+class PortLine(NamedTuple):
+    """A line of the Fortran port, and the defect or reading with which it is executed.
+
+    `switch` is the identifier of the apparatus entry of the defect or reading; None if the line
+    does not depend on one. `active` is whether the line is executed with the defect or reading, or
+    with its correction.
+    """
+
+    place: Place
+    switch: str | None
+    active: bool
+
+
+class Corrected(NamedTuple):
+    """The corrected form of a card.
+
+    `text` is the card in the corrected program, and None if the correction deletes the card.
+    `changes` is whether the correction deletes or replaces the card. `inserted` are the number and
+    text of the cards that the correction inserts after the card. `defects` are the identifiers of
+    the defects that are corrected.
+    """
+
+    text: str | None
+    changes: bool
+    inserted: list[tuple[int, str]]
+    defects: list[str]
+
+
+class CardView(NamedTuple):
+    """A card as a page shows it, with its line of the scan and its notes.
+
+    A note explains, for example, a defect, or a difference between card and scan. `card` is the
+    text of the card. It is in brackets if the scan lacks the card. `scan` is its line in the scan,
+    with the blanks of the scan, or None. `corrected` is the card in the corrected program. `port`
+    and `twin` are the lines of the Fortran port and of the Python port that correspond to the card.
+    `notes` are the notes on the card, the most important kind first. `begins` are those whose range
+    of cards begins with this card; their `cards` is this range alone. `absent` is the reason why
+    the Fortran port has no statement for the card, or None. `otherwise` is the reason why the
+    port's statement is different, or None. `parallels` are the cards of the other programs with the
+    same text.
     """
 
     number: int
     card: list[Run]
     scan: list[Run] | None
-    port: list[Place]
+    corrected: Corrected
+    port: list[PortLine]
     twin: list[Place]
-    entries: list[dict[str, Any]]
-    kinds: list[str]  # kinds of the entries by precedence; the first determines the colour
+    notes: list[Note]
+    begins: list[Note]
+    kinds: list[str]  # kinds of the notes by precedence; the first determines the colour
     absent: str | None
     otherwise: str | None
     parallels: list[Card]
 
 
+class Sheet(NamedTuple):
+    """A page of a printed program: its number from 1, its cards, and its place in the scan.
+
+    `moved` is the identifier of the apparatus entry that explains why the page has another place in
+    the scan. It is None for a page in its place.
+    """
+
+    number: int
+    cards: list[CardView]
+    moved: str | None
+
+
+def sheets(program: str) -> list[Sheet]:
+    """Return the pages of a program, in the order of their cards.
+
+    A page begins with the lowest card of its page in the scan, and ends before the next page.
+    """
+    found = []
+    for page in facts("cards/scan")["page"]:
+        if page["program"] == program:
+            first = min(n for each in page["lines"] if isinstance(each, str) for n in numbers(each))
+            found.append((first, page.get("moved")))
+    found.sort()
+    ends = [*(first for first, _ in found[1:]), max(deck(program).cards) + 1]
+    views = card_views(program)
+    return [
+        Sheet(number, [each for each in views if first <= each.number < end], moved)
+        for number, ((first, moved), end) in enumerate(zip(found, ends, strict=True), 1)
+    ]
+
+
+def notes(program: str) -> list[Note]:
+    """Return the notes on the cards of a program: its apparatus entries, numbered from 1."""
+    having = [each for each in entries() if each["cards"].get(program)]
+    having.sort(key=lambda each: numbers(each["cards"][program])[0])
+    return [Note(n, each, each["cards"][program]) for n, each in enumerate(having, 1)]
+
+
 def card_views(program: str) -> list[CardView]:
     """Return a view of each card of a program, in the order of the cards.
 
-    A view has the card, its line of the scan, and the corresponding lines of the ports, as a page
-    shows them. `program` is the name of the program.
+    A view has the card, its line of the scan, its corrected form, the corresponding lines of the
+    ports, and its notes, as a page shows them. `program` is the name of the program.
     """
-    by_name = {each["id"]: each for each in entries()}
-    found = deck(program)
-    return [
-        CardView(
-            card.number,
-            [Run(text, each and each.entry) for text, each in card.passages()],
-            _scan(card),
-            found.port.get(card.number, []),
-            found.twin.get(card.number, []),
-            [by_name[name] for name in card.entries],
-            _kinds([by_name[name]["kind"] for name in card.entries]),
-            found.absent.get(card.number),
-            found.otherwise.get(card.number),
-            parallels(card),
-        )
-        for card in found.cards.values()
-    ]
+    found, every = deck(program), notes(program)
+    corrected, changed = corrected_cards(program), corrections(program)
+    cards = list(found.cards.values())
+    views = []
+    for card, after in zip(cards, [*cards[1:], None], strict=True):
+        about = [each for each in every if card.number in numbers(each.cards)]
+        about.sort(key=lambda each: _ORDER.index(each.kind))
+        inserted = [
+            (number, text)
+            for number, text in corrected.items()
+            if card.number < number and (after is None or number < after.number)
+            and number not in found.cards
+        ]  # fmt: skip
+        text = corrected.get(card.number)
+        views.append(
+            CardView(
+                card.number,
+                _card(card),
+                _scan(card),
+                Corrected(
+                    text,
+                    text != card.text.rstrip(),
+                    inserted,
+                    # By the names' first occurrence, each once.
+                    list(dict.fromkeys(
+                        name
+                        for number in (card.number, *(number for number, _ in inserted))
+                        for name in changed.get(number, ())
+                    )),
+                ),
+                [_port_line(each) for each in found.port.get(card.number, ())],
+                found.twin.get(card.number, []),
+                about,
+                [
+                    each._replace(cards=cards_range)
+                    for each in about
+                    for cards_range in each.cards.split(", ")
+                    if numbers(cards_range)[0] == card.number
+                ],
+                _kinds([each.kind for each in about]),
+                found.absent.get(card.number),
+                found.otherwise.get(card.number),
+                parallels(card),
+            )
+        )  # fmt: skip
+    return views
 
 
 def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
@@ -92,11 +213,21 @@ def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
     return {kind: count for kind, count in counts.items() if count}
 
 
+def _card(card: Card) -> list[Run]:
+    """Return the text of a card as runs of characters; in brackets if the scan lacks the card."""
+    if card.lost:
+        statement = card.text.lstrip()
+        # The bracket takes the place of a blank, so that the statement keeps its columns.
+        blanks = card.text[: max(len(card.text) - len(statement) - 1, 0)]
+        return [Run(f"{blanks}[{statement}]")]
+    return [Run(text, each and each.entry) for text, each in card.passages()]
+
+
 def _scan(card: Card) -> list[Run] | None:
     """Return the line of the scan that shows a card, as runs of characters.
 
-    The runs are the card number, a dash, and one or more runs for the text without blanks. Return
-    None if the scan lacks the card.
+    The runs are the card number, a dash, and one or more runs for the text. Return None if the scan
+    lacks the card.
     """
     if card.lost:
         return None
@@ -104,7 +235,27 @@ def _scan(card: Card) -> list[Run] | None:
     shown = (
         Run(each.scans, each.entry) if each else Run(tight(text)) for text, each in card.passages()
     )
-    return [number, Run("-"), *shown]
+    return _with_blanks([number, Run("-"), *shown], witness_lines()[card.name])
+
+
+def _with_blanks(runs: Sequence[Run], line: str) -> list[Run]:
+    """Return runs of characters with the blanks of a line that has the same characters."""
+    found, at = [], 0
+    for run in runs:
+        begin, missing = at, len(run.text)
+        while missing:
+            missing -= not line[at].isspace()
+            at += 1
+        blanks = len(line[begin:at]) - len(line[begin:at].lstrip())
+        # Blanks before a marked passage are not marked.
+        found += [Run(line[begin : begin + blanks])] if blanks else []
+        found.append(Run(line[begin + blanks : at], run.entry))
+    return found
+
+
+def _port_line(place: Place) -> PortLine:
+    name, active = switch_at(place) or (None, True)
+    return PortLine(place, name, active)
 
 
 def _kinds(found: Iterable[str]) -> list[str]:

@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pyharness.edition import api, decks, documents, figures, laboratory, ledger, story
+from pyharness.edition import api, decks, documents, figures, laboratory, ledger, parallel_decks
 from pyharness.edition.bundle import bundle
 from pyharness.edition.markdown import inline
 from pyharness.edition.report import MARK, listed
@@ -24,6 +24,7 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record
 from pyharness.model.schema import SCHEMAS
+from pyharness.original.cards import deck
 from pyharness.views.json import json_text
 
 if TYPE_CHECKING:
@@ -34,10 +35,11 @@ if TYPE_CHECKING:
 MENU = {
     "Story": (("Story", "index.html"),),
     "Programs": (
-        ("Three decks", "listing/index.html"),
+        ("Overview", "listing/index.html"),
         ("Two-term", "listing/two-term.html"),
         ("Four-term", "listing/four-term.html"),
         ("Runge-Kutta", "listing/runge-kutta.html"),
+        ("Comparison", "listing/collation.html"),
         ("Apparatus", "apparatus.html"),
     ),
     "Laboratory": (("Laboratory", "laboratory.html"),),
@@ -173,18 +175,36 @@ def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -
 
 def _listing() -> Iterator[Page]:
     for program in PROGRAMS:
-        views = decks.card_views(program)
+        pages = decks.sheets(program)
+        views = [each for page in pages for each in page.cards]
         path = f"listing/{program}.html"
-        context = {"program": program, "cards": views, "kinds": decks.kinds_of(views)}
+        context = {
+            "program": program, "programs": _DECKS, "sheets": pages, "cards": views,
+            "kinds": decks.kinds_of(views), "notes": decks.notes(program),
+        }  # fmt: skip
         found = [
             Found(f"{path}#{each.number}", f"{program} {each.number}", "card",
                   "".join(run.text for run in each.card).strip())
             for each in views
         ]  # fmt: skip
+<<<<<<< HEAD
         yield Page(path, f"{_DECKS[program]}: the deck", "deck.html", context, found,
                    )  # fmt: skip
     context = {"programs": _DECKS, "scan": facts("cards/scan")}
     yield Page("listing/index.html", "The listing", "listing.html", context)
+=======
+        yield Page(path, f"{_DECKS[program]}: the program as printed", "deck.html", context, found,
+                   menu="listing/index.html")  # fmt: skip
+    yield Page("listing/collation.html", "The three decks compared", "collation.html",
+               {"programs": _DECKS, "operations": parallel_decks.operations()},
+               menu="listing/index.html")  # fmt: skip
+    counts = {
+        program: (title, len(deck(program).cards), len(decks.sheets(program)))
+        for program, title in _DECKS.items()
+    }
+    context = {"decks": counts, "scan": facts("cards/scan")}
+    yield Page("listing/index.html", "The three programs", "listing.html", context)
+>>>>>>> deck
 
 
 def _documents(docs: Path) -> Iterator[Page]:

@@ -330,6 +330,26 @@ def margin(program: str) -> Iterator[tuple[Place, str]]:
             yield Place(file, number, match[1].strip()), match[2]
 
 
+def switch_at(place: Place) -> tuple[str, bool] | None:
+    """Return the switch of the Fortran port that decides whether a line of the port is executed.
+
+    A switch selects between a defect, or a reading, of the printed program and its correction. The
+    result is the name of the defect or reading, and whether it is active where the line is
+    executed. It is None for a line that does not depend on a single switch.
+    """
+    lines = _lines(shipped(_PORT) / place.file)
+    depth = _indentation(lines[place.line - 1])
+    beyond_else = False
+    for line in filter(str.strip, reversed(lines[: place.line - 1])):
+        text, here = line.strip(), _indentation(line)
+        # The line opens a block around the place, or the branch before the `else` around it.
+        if here < depth or (beyond_else and here == depth and text.startswith(("if ", "else if "))):
+            if match := re.fullmatch(r"if \(listing%(\w+)\) then", text):
+                return match[1].replace("_", "-"), not beyond_else
+            depth, beyond_else = here, text == "else"
+    return None
+
+
 def passages(
     text: str, differences: Iterable[Difference]
 ) -> Iterator[tuple[str, Difference | None]]:
@@ -376,6 +396,10 @@ def _line_of(file: str, text: str) -> Place:
 @cache
 def _lines(path: Path) -> list[str]:
     return path.read_text(encoding="utf-8").splitlines()
+
+
+def _indentation(line: str) -> int:
+    return len(line) - len(line.lstrip())
 
 
 def tight(text: str) -> str:

@@ -5,6 +5,8 @@ The critical apparatus (`data/apparatus.toml`) lists, among others, the deviatio
 
 import difflib
 import re
+from functools import cache
+from itertools import pairwise
 from typing import Any
 
 from pyharness.model.errors import InputError
@@ -31,6 +33,23 @@ def expected_lines() -> list[tuple[str, str]]:
             else:
                 kind = "furniture" if "furniture" in item else "phantom"
                 found.append((tight(item[kind]), kind))
+    return found
+
+
+@cache
+def witness_lines() -> dict[str, str]:
+    """Return the line of the scan for each card that the scan has, with the blanks of the scan.
+
+    The keys are names of cards (lines of the printed programs), as in ``two-term:1660``. The blanks
+    are those in `data/cards/blanks.toml`. Callers must not change the dictionary.
+    """
+    blanks = facts("cards/blanks")
+    found = {}
+    for text, name in expected_lines():
+        program, _, number = name.partition(":")
+        if number:
+            places = [0, *blanks[program][number], len(text)]
+            found[name] = " ".join(text[begin:end] for begin, end in pairwise(places))
     return found
 
 

@@ -111,6 +111,32 @@ def deck_text(
     return "".join(f"{cards[n]:72}{_MARK if n in marked else '':1}{n:7d}\n" for n in sorted(cards))
 
 
+def corrected_cards(program: str) -> dict[int, str]:
+    """Return the text of each card of the corrected program, by card number.
+
+    Cards that the correction inserts have numbers between those of their neighbours. Cards that it
+    deletes are missing from the result. The text has no blanks at its end.
+    """
+    lines = deck_text(Listing.corrected(program)).splitlines()
+    return {int(line[73:]): line[:72].rstrip() for line in lines}
+
+
+def corrections(program: str) -> dict[int, list[str]]:
+    """Return, by card number, the defects whose correction changes the card.
+
+    To change a card is to replace, delete or insert it. A card that no correction changes is not a
+    key of the result.
+    """
+    found: dict[int, list[str]] = {}
+    for each in facts("cards/alterations")["alteration"]:
+        if each["program"] == program and "corrects" in each and "case" not in each:
+            new = [number for number, _ in each.get("replace", []) + each.get("insert", [])]
+            for number in {*numbers(each.get("delete", "")), *new}:
+                if each["corrects"] not in (names := found.setdefault(number, [])):
+                    names.append(each["corrects"])
+    return found
+
+
 def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
     """Return the text of a batch job that compiles and runs a deck with FTN, CDC's compiler.
 

@@ -341,16 +341,23 @@ def test_a_filter_leaves_the_cards_of_a_kind(browser: Chrome, site: Path) -> Non
     browser.get((site / "listing/two-term.html").as_uri())
 
     def shown() -> set[str]:
-        cards = "[...document.querySelectorAll('.card')].filter((each) => each.checkVisibility())"
+        cards = "[...document.querySelectorAll('.line')].filter((each) => each.checkVisibility())"
         return set(browser.execute_script(f"return {cards}.map((each) => each.id)"))
 
     every = shown()
+    browser.find_element(By.ID, "view-apparatus").click()
+    assert shown() == every
     browser.find_element(By.ID, "kind-defect").click()
     defects = shown()
     assert "1660" in defects < every
     assert "160" not in defects
     # The card that the address names is shown even if the filter hides it.
     browser.execute_script("location.hash = '#160'")
+    assert shown() == defects | {"160"}
+    # The program is shown whole.
+    browser.find_element(By.ID, "view-program").click()
+    assert shown() == every
+    browser.find_element(By.ID, "view-apparatus").click()
     assert shown() == defects | {"160"}
     browser.execute_script("document.getElementById('kind-all').click()")
     assert shown() == every

@@ -12,7 +12,13 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.original import collation
 from pyharness.original.cards import Difference, chosen, deck, numbers, passages
-from pyharness.original.collation import HEADING, expected_lines, undeclared, unexplained
+from pyharness.original.collation import (
+    HEADING,
+    expected_lines,
+    undeclared,
+    unexplained,
+    witness_lines,
+)
 
 SCAN = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
 # Forms that the port writes otherwise in every statement: kinds, spaces, powers, torques by point.
@@ -115,7 +121,12 @@ def test_a_line_out_of_place_is_found(scan: str, change: str) -> None:
 
 @pytest.mark.skipif(not SCAN.exists(), reason="the text of the thesis is not beside the project")
 def test_scan_of_the_thesis_is_explained() -> None:
-    assert unexplained(SCAN.read_text()) == []
+    text = SCAN.read_text()
+    assert unexplained(text) == []
+    lines = [line.rstrip() for line in text.rpartition(HEADING)[2].splitlines()]
+    kept = [line for line in lines if line.strip() not in ("", "```")]
+    cards = [line for line, (_, name) in zip(kept, expected_lines(), strict=True) if ":" in name]
+    assert list(witness_lines().values()) == cards
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

@@ -1,0 +1,177 @@
+"""The data of the page that compares the cards of the three decks, line by line.
+
+A deck consists of the cards (lines) of a program. The table `data/cards/collation.toml` lists the
+operations of the programs with their cards. Within an operation, cards of different decks are
+aligned by the similarity of their statements.
+"""
+
+import difflib
+import re
+from collections.abc import Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+from pyharness.edition.decks import Run
+from pyharness.model.listing import PROGRAMS
+from pyharness.original import deck_collation
+from pyharness.original.cards import Card, deck, numbers
+
+# Parts of a statement: a relation such as .GT., a power, a name, a number, or any other character.
+_PART = re.compile(r"\.[A-Z]+\.|\*\*|[A-Z][A-Z0-9]*|\d+\.?\d*|\.\d+|\S")
+# Cards with a smaller share of equal parts are not aligned.
+_ALIKE = 0.5
+
+
+_LABEL = "statement number"
+KINDS = (_LABEL, "name", "number", "operator", "punctuation")
+"""The kinds of differences between two statements, in the order in which a row names them."""
+
+
+class _Part(NamedTuple):
+    """A part of a card: the column in which it begins, counted from 0, its text and its kind."""
+
+    column: int
+    text: str
+    kind: str
+
+
+class Cell(NamedTuple):
+    """A card of a deck in an aligned row; the marked runs of characters differ between decks.
+
+    A marked run has a kind of difference, for example ``name``, as its `entry`.
+    """
+
+    card: Card
+    runs: list[Run]
+
+
+class AlignedRow(NamedTuple):
+    """Cards of different decks that correspond to each other, and the kinds of their differences.
+
+    `cells` has a cell for each program, or None if the deck of the program has no such card. The
+    kinds are ``statement number``, ``name``, ``number``, ``operator`` and ``punctuation``.
+    """
+
+    cells: dict[str, Cell | None]
+    differences: list[str]
+
+    @property
+    def is_alone(self) -> bool:
+        """Return whether only one deck has such a card."""
+        return sum(each is not None for each in self.cells.values()) == 1
+
+
+class Operation(NamedTuple):
+    """An operation of the programs, with the aligned cards of the decks.
+
+    `row` has what the operation does, what the thesis states about it, and why decks differ.
+    """
+
+    row: deck_collation.Row
+    aligned: list[AlignedRow]
+
+
+def operations() -> list[Operation]:
+    """Return all operations that are on cards, with the aligned cards of the three decks.
+
+    The operations are in the order of the table `data/cards/collation.toml`. Comments are omitted.
+    """
+    return [Operation(row, _aligned(row.cards)) for row in deck_collation.rows() if row.cards]
+
+
+def _aligned(ranges: dict[str, str]) -> list[AlignedRow]:
+    rows: list[dict[str, Card]] = []
+    for program in PROGRAMS:
+        cards = [deck(program).cards[n] for n in numbers(ranges.get(program, ""))]
+        rows = _merged(rows, [card for card in cards if not card.is_comment])
+    return [_compared(row) for row in rows]
+
+
+def _merged(rows: Sequence[dict[str, Card]], cards: Sequence[Card]) -> list[dict[str, Card]]:
+    """Return rows of aligned cards into which the cards of a further deck are inserted.
+
+    Among all alignments that keep the order of rows and cards, this is one with the largest sum of
+    similarities.
+    """
+
+    def likeness(row: dict[str, Card], card: Card) -> float:
+        return max(_likeness(each, card) for each in row.values())
+
+    # best[i][j]: the largest sum for the rows from i on and the cards from j on.
+    best = [[0.0] * (len(cards) + 1) for _ in range(len(rows) + 1)]
+    pairs = [[likeness(row, card) for card in cards] for row in rows]
+    for i in reversed(range(len(rows))):
+        for j in reversed(range(len(cards))):
+            both = pairs[i][j] + best[i + 1][j + 1] if pairs[i][j] >= _ALIKE else 0.0
+            best[i][j] = max(both, best[i + 1][j], best[i][j + 1])
+    found: list[dict[str, Card]] = []
+    i = j = 0
+    while i < len(rows) or j < len(cards):
+        both = i < len(rows) and j < len(cards) and pairs[i][j] >= _ALIKE
+        if both and best[i][j] == pairs[i][j] + best[i + 1][j + 1]:
+            found.append({**rows[i], cards[j].program: cards[j]})
+            i, j = i + 1, j + 1
+        elif j == len(cards) or (i < len(rows) and best[i][j] == best[i + 1][j]):
+            found.append(rows[i])
+            i += 1
+        else:
+            found.append({cards[j].program: cards[j]})
+            j += 1
+    return found
+
+
+def _likeness(one: Card, other: Card) -> float:
+    mine, theirs = (_PART.findall(card.text, 6) for card in (one, other))
+    return difflib.SequenceMatcher(None, mine, theirs, autojunk=False).ratio()
+
+
+def _compared(row: dict[str, Card]) -> AlignedRow:
+    """Return a row of aligned cards with the parts that differ between any two of them."""
+    marks: dict[str, dict[int, str]] = {program: {} for program in row}
+    parts = {program: _parts(card) for program, card in row.items()}
+    for one, other in combinations(row, 2):
+        mine, theirs = (
+            [(each.kind == _LABEL, each.text) for each in parts[name]] for name in (one, other)
+        )
+        matcher = difflib.SequenceMatcher(None, mine, theirs, autojunk=False)
+        for what, i, j, k, m in matcher.get_opcodes():
+            if what != "equal":
+                marks[one] |= {each.column: each.kind for each in parts[one][i:j]}
+                marks[other] |= {each.column: each.kind for each in parts[other][k:m]}
+    kinds = {kind for found in marks.values() for kind in found.values()}
+    cells: dict[str, Cell | None] = dict.fromkeys(PROGRAMS)
+    for program, card in row.items():
+        cells[program] = Cell(card, _runs(card.text, parts[program], marks[program]))
+    return AlignedRow(cells, [kind for kind in KINDS if kind in kinds])
+
+
+def _parts(card: Card) -> list[_Part]:
+    """Return the statement number and the parts of the statement, without continuation marks."""
+    found = [] if card.continues else _PART.finditer(card.text[:5])
+    labels = [_Part(each.start(), each[0], _LABEL) for each in found]
+    return labels + [
+        _Part(each.start(), each[0], _kind(each[0])) for each in _PART.finditer(card.text, 6)
+    ]
+
+
+def _kind(text: str) -> str:
+    if text[0].isalpha():
+        return "name"
+    if text[-1].isdigit() or text[0].isdigit():
+        return "number"
+    return "operator" if text[0] in "+-*/=." else "punctuation"
+
+
+def _runs(text: str, parts: Sequence[_Part], marks: dict[int, str]) -> list[Run]:
+    """Return a card's text as runs, without the blanks before it.
+
+    `marks` has the kind of each part that differs, by column.
+    """
+    found, done = [], 0
+    for part in parts:
+        if part.column in marks:
+            found += [Run(text[done : part.column])] if done < part.column else []
+            found.append(Run(part.text, part.kind))
+            done = part.column + len(part.text)
+    found += [Run(text[done:])] if text[done:] else []
+    return [found[0]._replace(text=found[0].text.lstrip()), *found[1:]]

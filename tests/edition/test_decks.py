@@ -1,0 +1,270 @@
+"""The pages of the decks: printed pages, notes, brackets, corrected cards, and the comparison."""
+
+import re
+from collections import Counter
+
+import pytest
+
+from pyharness.edition import decks, parallel_decks
+from pyharness.history.text_digest import text_digest
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS, Listing, switches
+from pyharness.original.cards import deck, find, numbers, tight
+from pyharness.original.collation import expected_lines, witness_lines
+from pyharness.original.decks import corrections
+from tests.edition.pages import pages
+
+
+def view_of(program: str, number: int) -> decks.CardView:
+    (view,) = [each for each in decks.card_views(program) if each.number == number]
+    return view
+
+
+def shown(view: decks.CardView) -> str:
+    return "".join(run.text for run in view.card)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_page_has_48_cards_but_the_last(program: str) -> None:
+    sheets = decks.sheets(program)
+    counts = [len(sheet.cards) for sheet in sheets]
+    assert counts[:-1] == [48] * (len(counts) - 1)
+    assert 0 < counts[-1] <= 48
+    assert [each.number for sheet in sheets for each in sheet.cards] == list(deck(program).cards)
+    moved = {"runge-kutta": [None, None, None, "noise-order"]}
+    assert [sheet.moved for sheet in sheets] == moved.get(program, [None] * len(sheets))
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_note_is_shown_once_for_its_range_of_cards(program: str) -> None:
+    views = decks.card_views(program)
+    shown_notes = [(each.entry["id"], each.cards) for view in views for each in view.begins]
+    wanted = [
+        (each["id"], cards)
+        for each in facts("apparatus")["entry"]
+        for cards in each["cards"].get(program, "").split(", ")
+        if cards
+    ]
+    assert sorted(shown_notes) == sorted(wanted)
+    for view in views:
+        assert {each.entry["id"] for each in view.notes} == set(find(program, view.number).entries)
+        assert [each.kind for each in view.notes] == sorted(
+            [each.kind for each in view.notes], key=decks._ORDER.index
+        )
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_notes_are_numbered_by_their_first_cards(
+    built_site: dict[str, bytes], program: str
+) -> None:
+    found = decks.notes(program)
+    assert [each.number for each in found] == list(range(1, len(found) + 1))
+    firsts = [numbers(each.cards)[0] for each in found]
+    assert firsts == sorted(firsts)
+    anchors = pages(built_site)[f"listing/{program}.html"].anchors
+    assert [each for each in anchors if each.startswith("note-")] == [
+        f"note-{each.number}" for each in found
+    ]
+
+
+def test_conjectured_cards_are_in_brackets_and_no_other() -> None:
+    bracketed = {
+        (program, view.number): shown(view)
+        for program in PROGRAMS
+        for view in decks.card_views(program)
+        if re.match(r" *\[.*\]$", shown(view))
+    }
+    lost = {
+        (program, number)
+        for program in PROGRAMS
+        for number, card in deck(program).cards.items()
+        if card.lost
+    }
+    assert set(bracketed) == lost
+    # The statement stays in column 7; the C of a comment has no blank before it.
+    assert bracketed["four-term", 970] == "     [A(4,1)=1.]"
+    assert bracketed["runge-kutta", 1010] == "[C]"
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_the_line_of_the_scan_has_its_blanks(program: str) -> None:
+    for view in decks.card_views(program):
+        line = witness_lines().get(f"{program}:{view.number}")
+        told = None if view.scan is None else "".join(run.text for run in view.scan)
+        assert told == line
+        for run in view.scan or ():
+            assert run.entry is None or run.text == run.text.strip()
+
+
+def test_the_scan_has_one_three_or_six_blanks_before_a_statement() -> None:
+    """The page says so, and that the number depends on the page."""
+    for program in PROGRAMS:
+        for sheet in decks.sheets(program):
+            found = Counter(
+                len(match[1])
+                for view in sheet.cards
+                if re.match(" {6}[A-Z]", find(program, view.number).text)
+                and (line := witness_lines().get(f"{program}:{view.number}"))
+                and (match := re.search(r"-( *)\S", line))
+            )
+            if found.total() < 5:  # one page has only cards with statement numbers, and END
+                assert (program, sheet.number) == ("runge-kutta", 4)
+                continue
+            usual, count = found.most_common(1)[0]
+            assert usual in (1, 3, 6), (program, sheet.number)
+            assert count > 0.8 * found.total(), (program, sheet.number, found)
+
+
+def test_the_witness_has_the_lines_of_the_tables() -> None:
+    named = {name: text for text, name in expected_lines() if ":" in name}
+    assert {name: tight(line) for name, line in witness_lines().items()} == named
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_corrected_cards_differ_where_a_defect_is_corrected(program: str) -> None:
+    """Each switch of a defect is named beside the cards that its correction changes."""
+    changed = {}
+    for view in decks.card_views(program):
+        corrected = view.corrected
+        assert corrected.changes == (corrected.text != find(program, view.number).text.rstrip())
+        if corrected.changes or corrected.inserted:
+            changed[view.number] = corrected
+        else:
+            assert corrected.defects == []
+    named = {name for each in changed.values() for name in each.defects}
+    assert named == set(switches(program)) & Listing.original(program).defects
+    inserted = {n for each in changed.values() for n, _ in each.inserted}
+    # 930: the corrected program does not depend on the value of I after the loop (do-variable).
+    without = {930} if program == "runge-kutta" else set()
+    assert {*changed, *inserted} - without == {
+        *(n for n in corrections(program) if n in deck(program).cards or n in inserted),
+        *(n for n, each in changed.items() if each.inserted),
+    }
+
+
+def test_side_by_side_of_three_cards() -> None:
+    found = view_of("runge-kutta", 860)
+    assert found.corrected.text == "      U1(I)=UU1+.5*DT*KF(I)"
+    assert found.corrected.defects == ["stage-base"]
+    assert [(each.place.text, each.switch, each.active) for each in found.port] == [
+        ("U1(I) = U1(J) + 0.5_wp*DT*KF(I)", "stage-base", True),
+        ("U1(I) = UU1 + 0.5_wp*DT*KF(I)", "stage-base", False),
+    ]
+    deleted = view_of("two-term", 1660)
+    assert deleted.corrected.text is None
+    assert [(each.switch, each.active) for each in deleted.port] == [("dt-accumulates", True)]
+    before = view_of("runge-kutta", 1530)
+    assert not before.corrected.changes
+    assert before.corrected.inserted[0] == (1531, "      U1(1)=U1(I)")
+    # A statement after a branch, at the depth of the branch, does not depend on it.
+    assert [each.switch for each in view_of("runge-kutta", 930).port] == [None]
+
+
+def test_the_corrected_statement_is_that_of_the_port() -> None:
+    """Where a branch of the port has a correction, it is the corrected card in today's Fortran."""
+
+    def plain(text: str) -> str:
+        return re.sub(r"_wp\b|(?<![\d.])0(?=\.\d)|(?<=\d\.)0\b", "", tight(text))
+
+    compared = 0
+    for program in PROGRAMS:
+        for view in decks.card_views(program):
+            for line in view.port:
+                if line.switch and not line.active and line.switch in view.corrected.defects:
+                    port = plain(line.place.text)
+                    wanted = tight(view.corrected.text or "")
+                    if "change_u" in port:  # FL2 to ZL2 and P1 to P6 are arrays; J is 3
+                        port = re.sub(r"change_u\(\d\)", wanted.partition("=")[0], port)
+                        port = re.sub(r"P\((\d)\)", r"P\1", port.replace("(J)", "(3)")).upper()
+                    assert port == wanted
+                    compared += 1
+    assert compared == 19
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_page_says_how_to_cite_a_card(built_site: dict[str, bytes], program: str) -> None:
+    text = " ".join(built_site[f"listing/{program}.html"].decode().split())
+    cited = f"{program} deck, card {{0}}; in: pyharness"
+    assert cited.format("N") in text
+    for number in deck(program).cards:
+        assert cited.format(number) in text
+        assert f"text {text_digest()}, listing/{program}.html#{number}</p>" in text
+
+
+def test_every_card_but_comments_is_compared_once() -> None:
+    found = Counter(
+        cell.card
+        for operation in parallel_decks.operations()
+        for row in operation.aligned
+        for cell in row.cells.values()
+        if cell
+    )
+    wanted = {
+        card for program in PROGRAMS for card in deck(program).cards.values() if not card.is_comment
+    }
+    assert set(found) == wanted
+    assert set(found.values()) == {1}
+
+
+def test_the_apparatus_explains_its_kinds(built_site: dict[str, bytes]) -> None:
+    page = built_site["apparatus.html"].decode()
+    told = re.findall(r'<dt class="kind ([\w-]+)">([\w ]+)</dt>', page)
+    assert {name for _, name in told} == {each["kind"] for each in facts("apparatus")["entry"]}
+    assert all(name.replace(" ", "-") == style for style, name in told)
+
+
+def compared(program: str, number: int) -> tuple[dict[str, list[str]], list[str]]:
+    """Return the marked parts of each deck in the row of a card, and the kinds of differences."""
+    for operation in parallel_decks.operations():
+        for row in operation.aligned:
+            cell = row.cells[program]
+            if cell and cell.card.number == number:
+                parts = {
+                    name: [run.text for run in each.runs if run.entry]
+                    for name, each in row.cells.items()
+                    if each
+                }
+                return parts, row.differences
+    raise AssertionError(number)
+
+
+@pytest.mark.parametrize(
+    ("program", "number", "parts", "kinds"),
+    [
+        ("two-term", 150, {"two-term": [], "four-term": [], "runge-kutta": []}, []),
+        (
+            "two-term",
+            400,
+            {"two-term": ["A1"], "four-term": ["A1"], "runge-kutta": ["A"]},
+            ["name"],
+        ),
+        (
+            "four-term",
+            2260,
+            {"two-term": ["100"], "four-term": ["100"], "runge-kutta": ["300"]},
+            ["statement number"],
+        ),
+        (
+            "two-term",
+            710,
+            {"two-term": ["/", "3."], "four-term": ["*", ".2"]},
+            ["number", "operator"],
+        ),
+        ("runge-kutta", 860, {"runge-kutta": []}, []),
+    ],
+)
+def test_what_differs_is_marked_and_named(
+    program: str, number: int, parts: dict[str, list[str]], kinds: list[str]
+) -> None:
+    assert compared(program, number) == (parts, kinds)
+
+
+def test_cards_with_different_text_have_a_difference() -> None:
+    """A row names no difference only if its cards agree; continuation marks are not compared."""
+    for operation in parallel_decks.operations():
+        for row in operation.aligned:
+            cells = [each for each in row.cells.values() if each]
+            texts = {(tight(each.card.text[:5]), tight(each.card.text[6:])) for each in cells}
+            assert bool(row.differences) == (len(texts) > 1), cells
+            for cell in cells:
+                assert tight("".join(run.text for run in cell.runs)) == tight(cell.card.text)

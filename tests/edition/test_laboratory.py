@@ -32,11 +32,13 @@ LABORATORY = WEB / "laboratory"
 
 def ask(body: str, given: Any) -> Any:
     """Return the value of the JavaScript `body`, which may use `given` and the laboratory."""
-    names = {"state": "S", "experiment": "E", "reference": "R", "printer-page": "P"}
+    names = {"state": "S", "experiment": "E", "reference": "R", "printer-page": "P", "cards": "K"}
     imports = [
         f"import * as {name} from {json.dumps(str(LABORATORY / f'{file}.js'))};"
         for file, name in names.items()
     ]
+    equations = json.dumps(str(WEB / "programs/equations.js"))
+    imports.append(f"import * as Q from {equations};")
     script = (
         f"{''.join(imports)} import {{ readFileSync }} from 'node:fs';"
         "const { data, given } = JSON.parse(readFileSync(0));"
@@ -346,6 +348,94 @@ def test_data_are_json_and_know_every_switch() -> None:
         names = {each["id"] for each in given["flags"] if program in each["programs"]}
         kinds = ("defect", "reading", "conjecture")
         assert names == {name for kind in kinds for name in names_of(kind, program)}
+
+
+_STEPS = [
+    ("case=2&program=runge-kutta", 25),
+    ("case=2&program=runge-kutta", 1),
+    ("case=5&program=runge-kutta&listing=corrected", 40),
+    ("case=4&program=runge-kutta&fix=stage-base,lipschitz-per-component&no-stop", 7),
+    ("case=6&program=runge-kutta&fix=base-not-restored,lipschitz-mismatched-pairs", 5),
+    ("case=3&program=two-term", 9),
+    ("case=5&program=two-term&listing=corrected&keep=x3-reads-acl2", 3),
+    ("case=5&program=four-term", 12),
+    ("case=7&program=four-term", 2),
+    ("case=7&program=runge-kutta&listing=corrected", 4),
+]
+
+
+@pytest.mark.parametrize(("words", "step"), _STEPS)
+def test_every_card_of_a_step_gives_the_value_beside_it(words: str, step: int) -> None:
+    """Compute each card, as FORTRAN, from the values that the cards before it have given."""
+    body = """const { state } = S.stateFrom(data, given.words);
+      const { run, trace } = K.traced(data, state, given.step);
+      const passes = K.passesOf(data, state, { run, trace }, given.step);
+      const scene = E.sceneOf(data, state);
+      const active = new Set(state.active);
+      const before = run.rows.length > 1 ? run.rows[given.step - 2] : null;
+      return { passes, values: trace.values, row: run.rows[given.step - 1], before,
+        rates: [Q.eulerCoefficients(scene), Q.normalizedTorque(scene, 0),
+          Q.accelerations(scene, active)] };"""
+    found = ask(body, {"words": words, "step": step})
+    known = _constants(*found["rates"])
+    for name, value in found["values"]:
+        if name.startswith("before "):
+            known[name.removeprefix("before ")] = value
+    known["TIME"] = found["before"][0] if found["before"] else 0.0
+    # Card 1660 or 2250 of the original collocation programs adds the step size in every step.
+    grows = "DT" in dict(found["values"]) and "corrected" not in words
+    known["DT"] = sum([0.01] * step) if grows else 0.01
+    computed = 0
+    for part in found["passes"]:
+        for line in part["lines"]:
+            text = _with_subscripts(line["text"].strip(), part["subscripts"])
+            if line["values"] and (formula := re.fullmatch(r"([\w(),]+?) *=(.*)", text)):
+                ((name, value),) = line["values"]
+                assert name == formula[1]
+                assert _value(formula[2], known) == value, text
+                computed += 1
+            known |= dict(line["values"])
+    assert computed > 60
+    end = max((name for name in known if name.startswith("U1(")), key=lambda name: int(name[3:-1]))
+    names = [f"{unknown}{end[2:]}" for unknown in ("U1", "U2", "U3", "V1", "V2", "V3")]
+    assert [known["TIME"], *(known[name] for name in names)] == found["row"]
+
+
+def _constants(rates: Any, torque: Any, acceleration: Any) -> dict[str, float]:
+    """Return the variables that the cards before the loop have set."""
+    names = ["A", "B", "C", "A1", "B1", "C", "R1", "R2", "R3", "M1", "M2", "M3", "ACL1", "ACL2"]
+    values = [*rates, *rates, *torque, *torque, *acceleration]
+    return dict(zip([*names, "ACL3"], values, strict=True))
+
+
+def _with_subscripts(text: str, subscripts: dict[str, int]) -> str:
+    for letter, number in subscripts.items():
+        text = re.sub(rf"(?<=[(,]){letter}(?=[),])", str(number), text)
+    return text
+
+
+def _value(formula: str, known: dict[str, float]) -> float:
+    """Return the value of a FORTRAN expression in binary64, with powers as products."""
+    text = re.sub(r"([A-Z]\w*(?:\([\d,]+\))?)", r"known['\1']", formula)
+    text = re.sub(r"known\['(ABS|SQRT)'\]", r"\1", text)
+    factor = r"(known\['[^']+'\])"
+    text = re.sub(rf"{factor}\*\*4", r"((\1*\1)*(\1*\1))", text)
+    text = re.sub(rf"{factor}\*\*3", r"(\1*\1*\1)", text)
+    text = re.sub(rf"{factor}\*\*2", r"(\1*\1)", text)
+    return float(eval(text, {"known": known, "ABS": abs, "SQRT": math.sqrt}))
+
+
+def test_a_trace_changes_no_bit_of_a_run() -> None:
+    body = """return given.map((words) => {
+      const { state } = S.stateFrom(data, words);
+      const plain = E.experiment(data, state).run;
+      const steps = plain.rows.length;
+      const { run } = K.traced(data, state, steps);
+      return [plain.rows, run.rows, plain.stop, run.stop];
+    });"""
+    for plain, traced, stop, traced_stop in ask(body, _words()[:60]):
+        assert traced == plain
+        assert traced_stop == stop
 
 
 def test_files_are_small() -> None:

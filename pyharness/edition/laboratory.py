@@ -30,9 +30,9 @@ MOST_STEPS = 3000
 They suffice for 3 s with steps of 0.001 s, a tenth of the programs' step size.
 """
 _KINDS = {
-    "defect": "Defects left in",
-    "reading": "Readings not adopted",
-    "conjecture": "Conjectures assumed",
+    "defect": "Faults left in",
+    "reading": "Other readings of doubtful cards",
+    "conjecture": "Assumed, because no card exists",
 }
 _SHOWN = 3
 
@@ -45,6 +45,7 @@ def context() -> dict[str, Any]:
     defects, readings (of doubtful cards) and conjectures (about missing cards) that a visitor can
     switch on or off, each kind with a heading. `first` has the results of the run that `DEFAULTS`
     specifies. `titles` has the names of the cases, and `programs` the names of the programs.
+    `experiments` has the guided experiments.
     """
     given = data()
     kinds = [
@@ -57,6 +58,7 @@ def context() -> dict[str, Any]:
         "programs": PROGRAMS,
         "switches": kinds,
         "first": _first(),
+        "experiments": facts("experiments")["experiment"],
     }
 
 

@@ -33,6 +33,7 @@ LABORATORY = WEB / "laboratory"
 def ask(body: str, given: Any) -> Any:
     """Return the value of the JavaScript `body`, which may use `given` and the laboratory."""
     names = {"state": "S", "experiment": "E", "reference": "R", "printer-page": "P", "cards": "K"}
+    names |= {"limit": "L", "why": "W", "idle": "I"}
     imports = [
         f"import * as {name} from {json.dumps(str(LABORATORY / f'{file}.js'))};"
         for file, name in names.items()

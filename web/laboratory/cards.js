@@ -2,19 +2,15 @@
 //
 // A run with a trace gives the values by name. The deck gives the cards, and `passes.toml` their
 // order of execution and their subscripts.
-import { PROGRAMS } from "../programs/programs.js";
 import { Trace } from "../programs/trace.js";
-import { sceneOf } from "./experiment.js";
+import { runOf, sceneOf } from "./experiment.js";
 
 const ASSIGNED = /^(?:\d+ +)?([A-Z][A-Z0-9]*(?:\([A-Z0-9,]+\))?) *=/;
 
 // Run a state up to a step, from 1, and return the run and its trace of this step.
 export function traced(data, state, step) {
-  const scene = sceneOf(data, { ...state, steps: step });
   const trace = new Trace(step);
-  const active = new Set(state.active);
-  const run = PROGRAMS[state.program].run(scene, active, state.lipschitz, state.stops, trace);
-  return { run, trace };
+  return { run: runOf(data, { ...state, steps: step }, trace), trace };
 }
 
 // Return the cards of a program, by number, with the changes that the state's switches make. A card
@@ -39,7 +35,8 @@ export function deckOf(data, state) {
 
 // Return the passes of a traced step: for each its title and its lines. A line has the `number` and
 // the `text` of a card, and `values`, the names and values that the card assigns. A torque that
-// varies with time has lines without a card, because the thesis prints none for it.
+// varies with time has lines without a card, because the thesis prints none for it. The card whose
+// test `stops` the run is the last that runs; those after it are `skipped`.
 export function passesOf(data, state, { run, trace }, step) {
   const take = taken(trace.values);
   const stops = run.stop?.step === step ? run.stop : null;
@@ -49,22 +46,25 @@ export function passesOf(data, state, { run, trace }, step) {
   const scene = sceneOf(data, state);
   const varies = scene.initial_torque || scene.torque.sines.length + scene.torque.cosines.length > 0;
   const found = [];
+  let stopped = false;
   for (const { title, from, to, set, reading } of passes) {
     const subscripts = reading && state.active.includes(reading.name) ? reading.set : set;
     const lines = [];
-    let ended = false;
     for (const [number, card] of cards) {
-      if (number < from || number > to || ended) continue;
+      if (number < from || number > to) continue;
+      if (stopped) {
+        lines.push({ ...card, number, values: [], skipped: true });
+        continue;
+      }
       const { values, test } = valuesOf(card.text, subscripts, take, tests);
       if (varies && card.text.includes(`=${torque[0]}+`)) {
         lines.push({ text: "the torque of Case 7 has no card", values: torque.flatMap(take) });
       }
       lines.push({ ...card, number, values });
-      ended = test !== null && stops !== null && test[0] === stops.variable;
-      if (ended) lines[lines.length - 1].stops = true;
+      stopped = test !== null && stops !== null && test[0] === stops.variable;
+      lines[lines.length - 1].stops = stopped;
     }
     found.push({ title, subscripts: subscripts ?? {}, lines });
-    if (ended) break;
   }
   return found;
 }

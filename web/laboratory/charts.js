@@ -58,6 +58,7 @@ export class Charts {
 
   // Redraw with the colours that apply now.
   recolour() {
+    colours.clear();
     for (const id of [...this.drawn.keys()]) this.remove(id);
     if (this.shown) this.show(this.shown.panels, this.shown.times, this.shown.mark, this.shown.end);
   }
@@ -124,9 +125,17 @@ export class Charts {
   }
 }
 
+// Colours of the style by name, as they apply now.
+const colours = new Map();
+
 // Return the current value of a colour of the style. It may depend on the colour scheme, which only
 // the computed style of an element shows.
 function colour(name) {
+  if (!colours.has(name)) colours.set(name, computed(name));
+  return colours.get(name);
+}
+
+function computed(name) {
   const probe = document.createElement("span");
   probe.style.color = `var(${name})`;
   document.body.append(probe);

@@ -78,6 +78,11 @@ def _wait(browser: Chrome, holds: Callable[[], bool]) -> None:
     WebDriverWait(browser, 5.0).until(lambda _: holds())
 
 
+def _wait_for_drawing(browser: Chrome, before: str) -> None:
+    """Wait until the first chart differs from its picture `before`."""
+    _wait(browser, lambda: browser.execute_script(_DRAWN) != before)
+
+
 def _click(browser: Chrome, selector: str) -> None:
     browser.execute_script("document.querySelector(arguments[0]).click()", selector)
 
@@ -167,7 +172,7 @@ def test_curves_can_be_hidden_and_the_pointer_tells_numbers(
     for id in ("show-solution", "show-limit"):
         before = browser.execute_script(_DRAWN)
         browser.find_element(By.ID, id).click()
-        _wait(browser, lambda before=before: browser.execute_script(_DRAWN) != before)
+        _wait_for_drawing(browser, before)
     over = browser.find_element(By.CSS_SELECTOR, "#omega1-chart .u-over")
     width = over.size["width"]
     ActionChains(browser).move_to_element_with_offset(over, -width // 2 + width // 5, 0).perform()
@@ -203,7 +208,7 @@ def test_the_step_slider_shows_numbers_and_cards(browser: Chrome, laboratory: Op
     results = {row[2].partition(" = ")[0]: row[2].partition(" = ")[2] for row in cards if row[2:]}
     assert [float(results[f"U{axis}(4)"]) for axis in (1, 2, 3)] == twin.omega[22].tolist()
     assert not any("ends the run" in row[1] for row in cards if row[1:])
-    _wait(browser, lambda: browser.execute_script(_DRAWN) != before)
+    _wait_for_drawing(browser, before)
     # A click on a chart chooses the step at the pointer.
     over = browser.find_element(By.CSS_SELECTOR, "#velocity-chart .u-over")
     width = over.size["width"]
@@ -349,7 +354,7 @@ def test_on_a_phone_the_choices_are_beside_the_chart(browser: Chrome, laboratory
         assert sheet.get_dom_attribute("aria-expanded") == "true"
         before = browser.execute_script(_DRAWN)
         box.click()
-        _wait(browser, lambda: browser.execute_script(_DRAWN) != before)
+        _wait_for_drawing(browser, before)
         where = "const r = arguments[0].getBoundingClientRect(); return [r.top, r.bottom]"
         top, bottom = browser.execute_script(where, chart)
         above, _ = browser.execute_script(where, browser.find_element(By.ID, "choices"))

@@ -19,13 +19,13 @@ const LOOKS = {
 };
 
 export class Charts {
-  // `place` returns the element that contains a panel. `tell` gets the index of the time at the
+  // `places` has the elements that contain the panels, by the panels' names. `tell` gets the index of the time at the
   // pointer or null, and `pick` that of a time that was clicked.
-  constructor(place, tell, pick) {
-    Object.assign(this, { place, tell, pick });
+  constructor(places, tell, pick) {
+    Object.assign(this, { places, tell, pick });
     this.drawn = new Map();
     this.shown = null;
-    new ResizeObserver(() => this.resize()).observe(place("omega1"));
+    new ResizeObserver(() => this.resize()).observe(places.omega1);
   }
 
   // Show panels; `mark` is the time (s) of the chosen step, `end` the time and the reason of an early
@@ -76,7 +76,7 @@ export class Charts {
   }
 
   sizeOf(id) {
-    const width = this.place(id).clientWidth;
+    const width = this.places[id].clientWidth;
     return { width, height: HEIGHTS[width < WIDE ? 0 : 1] };
   }
 
@@ -102,7 +102,7 @@ export class Charts {
       legend: { show: false },
       cursor: { drag: { x: true, y: false }, sync: { key: "laboratory" } },
     };
-    found.chart = new uPlot(options, data, this.place(panel.id));
+    found.chart = new uPlot(options, data, this.places[panel.id]);
     return found;
   }
 

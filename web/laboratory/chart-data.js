@@ -56,12 +56,12 @@ export function panelsOf(found, pinned, limit, shown) {
   ];
   panels.push({ id: "error", lines: both(errors), range: errorRange(found) });
   const rest = [0, 0, 0];
-  panels.push({ id: "velocity", lines: both((each, look) => unknowns(each, look, 4, rest)), range: plainRange });
+  panels.push({ id: "velocity", lines: both((each, look) => unknowns(each, look, 4, rest)), range: velocityRange(found) });
   if (found.tests.length > 0) {
     panels.push({ id: "quotient", lines: quotientLines(found, of, times), range: powersRange });
   }
   if (pinned !== null) {
-    panels.push({ id: "difference", lines: differenceLines(found, pinned, of), range: plainRange });
+    panels.push({ id: "difference", lines: differenceLines(found, pinned, of), range: differenceRange(found) });
   }
   return { times, panels };
 }
@@ -142,8 +142,24 @@ function componentRange(found, axis) {
   };
 }
 
+// Of a run that leaves the solution farther than the solution's size, only the velocities before that
+// determine the scale.
+function velocityRange(found) {
+  const size = sizeOf(found);
+  const near = found.run.rows.filter((row, n) => found.errors[n]?.every((error) => error < size));
+  const largest = near
+    .flatMap((row) => row.slice(4))
+    .reduce((most, each) => Math.max(most, Math.abs(each)), 0);
+  return (low, high) => plainRange(Math.max(low, -2 * largest), Math.min(high, 2 * largest));
+}
+
+function differenceRange(found) {
+  const farthest = 2 * sizeOf(found);
+  return (low, high) => plainRange(Math.max(low, -farthest), Math.min(high, farthest));
+}
+
 function plainRange(low, high) {
-  const [from, to] = [low ?? 0, high ?? 0];
+  const [from, to] = [Math.min(low, high), Math.max(low, high)];
   const margin = 0.08 * (to - from) || Math.max(1e-3 * Math.abs(to), 1e-12);
   return [from - margin, to + margin];
 }

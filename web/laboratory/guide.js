@@ -12,7 +12,9 @@ export function startGuide(run) {
     lesson.hidden = true;
     const answer = lesson.querySelector("details");
     const verdict = lesson.querySelector(".verdict-told");
-    lesson.querySelector("a.run").addEventListener("click", (event) => {
+    const link = lesson.querySelector("a.run");
+    link.hidden = false;
+    link.addEventListener("click", (event) => {
       event.preventDefault();
       const chosen = lesson.querySelector("input:checked");
       if (chosen === null) {
@@ -26,7 +28,7 @@ export function startGuide(run) {
         : `Your prediction was wrong. Right: ${answered.textContent.trim()}.`;
       answer.hidden = false;
       answer.open = true;
-      run(event.currentTarget.hash);
+      run(link.hash);
       lesson.scrollIntoView();
     });
     answer.hidden = true;

@@ -15,8 +15,8 @@ export function quotientsOf(tests) {
 }
 
 // Return two or three sentences on how an experiment ended.
-export function whyEnded({ state, scene, run, errors, tests }) {
-  if (run.ended === "overflow") return overflow(run);
+export function whyEnded({ state, scene, run, truth, errors, tests }) {
+  if (run.ended === "overflow") return overflow(run, truth);
   if (run.ended === "complete") return complete(state, tests);
   const { step, variable, quotient } = run.stop;
   const rule =
@@ -62,17 +62,15 @@ function meaning(variable, errors) {
   return error.trim();
 }
 
-function overflow(run) {
+function overflow(run, truth) {
   const sizes = run.rows.map((row) => Math.max(...row.slice(1, 4).map(Math.abs)));
   const last = sizes.length;
   const grown = sizes.findLastIndex((size, n) => n < last - 1 && size < sizes[last - 1] / 1e6);
   const during = last - 1 - grown;
   const time = during === 1 ? "In its last step alone" : `In its last ${during} steps`;
   const speed = grown < 0 ? "" : ` ${time} it grew more than a million times.`;
-  return (
-    `Omega grew until it exceeded the largest number of the computer's arithmetic, about 1.8e308.` +
-    `${speed} A rigid body does not do this: the growth is an error of the program.`
-  );
+  const finite = truth.length > last ? " The solution is finite there: the growth is an error of the program." : "";
+  return `Omega grew until it exceeded the largest number of the computer's arithmetic, about 1.8e308.${speed}${finite}`;
 }
 
 function complete(state, tests) {

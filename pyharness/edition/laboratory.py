@@ -3,6 +3,7 @@
 The data include the results of one run, for readers without JavaScript.
 """
 
+import re
 from functools import cache
 from typing import Any
 
@@ -16,6 +17,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.scene_report import ending, heading
 from pyharness.model.trajectory import Trajectory
+from pyharness.original.cards import deck, numbers
 from pyharness.original.printer import formats_of, page
 from pyharness.original.programs import run_program
 from pyharness.truth.reference import reference
@@ -28,9 +30,9 @@ MOST_STEPS = 3000
 They suffice for 3 s with steps of 0.001 s, a tenth of the programs' step size.
 """
 _KINDS = {
-    "defect": "Defects left in",
-    "reading": "Readings not adopted",
-    "conjecture": "Conjectures assumed",
+    "defect": "Faults left in",
+    "reading": "Other readings of doubtful cards",
+    "conjecture": "Assumed, because no card exists",
 }
 _SHOWN = 3
 
@@ -43,6 +45,7 @@ def context() -> dict[str, Any]:
     defects, readings (of doubtful cards) and conjectures (about missing cards) that a visitor can
     switch on or off, each kind with a heading. `first` has the results of the run that `DEFAULTS`
     specifies. `titles` has the names of the cases, and `programs` the names of the programs.
+    `experiments` has the guided experiments.
     """
     given = data()
     kinds = [
@@ -55,6 +58,7 @@ def context() -> dict[str, Any]:
         "programs": PROGRAMS,
         "switches": kinds,
         "first": _first(),
+        "experiments": facts("experiments")["experiment"],
     }
 
 
@@ -77,6 +81,7 @@ def data() -> dict[str, Any]:
             }
             for entry in flagged()
         ],
+        "deck": _deck_data(),
         "lipschitz": facts("cases")["deck"]["lipschitz"],
         "most_steps": MOST_STEPS,
         "printer": {
@@ -85,6 +90,47 @@ def data() -> dict[str, Any]:
         },
         "defaults": DEFAULTS,
     }
+
+
+def _deck_data() -> dict[str, Any]:
+    """Return the cards that run in a step of each program, and how corrections alter the cards.
+
+    A pass is a part of a step that runs once with the same subscripts. Continuation cards are
+    joined with the card that they continue. Alterations that a compiler needs are omitted.
+    """
+    order = facts("cards/passes")
+    found: dict[str, Any] = {}
+    for program in PROGRAMS:
+        passes = []
+        for each in order[program]["pass"]:
+            first, last = map(int, each["cards"].split("-"))
+            passes.append({**each, "from": first, "to": last, "set": each.get("set", {})})
+        cards = _statements(program, passes[0]["from"], passes[-1]["to"])
+        found[program] = {"torque": order[program]["torque"], "passes": passes, "cards": cards}
+    found["alterations"] = [
+        {**each, "delete": numbers(each["delete"])} if "delete" in each else each
+        for each in facts("cards/alterations")["alteration"]
+        if "dialect" not in each
+    ]
+    return found
+
+
+def _statements(program: str, first: int, last: int) -> list[tuple[int, str]]:
+    """Return the numbers and texts of a program's cards from `first` to `last`.
+
+    Comments and FORMAT, DO and CONTINUE statements are omitted.
+    """
+    found: list[tuple[int, str]] = []
+    for number, card in deck(program).cards.items():
+        text = card.text.rstrip()
+        if not first <= number <= last or text.startswith("C"):
+            continue
+        if text[5:6].strip():
+            if number - 10 == found[-1][0]:
+                found[-1] = (found[-1][0], found[-1][1] + text[6:])
+        elif not re.match(r"DO |CONTINUE|FORMAT", text[6:]):
+            found.append((number, text))
+    return found
 
 
 def _described(scene: Scene) -> list[str]:

@@ -12,7 +12,9 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pyharness.edition import api, decks, documents, figures, laboratory, ledger, parallel_decks
+from pyharness.edition import (
+    api, decks, documents, figures, laboratory, ledger, parallel_decks, story,
+)  # fmt: skip
 from pyharness.edition.bundle import bundle
 from pyharness.edition.markdown import inline
 from pyharness.edition.report import MARK, listed
@@ -187,24 +189,15 @@ def _listing() -> Iterator[Page]:
                   "".join(run.text for run in each.card).strip())
             for each in views
         ]  # fmt: skip
-<<<<<<< HEAD
-        yield Page(path, f"{_DECKS[program]}: the deck", "deck.html", context, found,
-                   )  # fmt: skip
-    context = {"programs": _DECKS, "scan": facts("cards/scan")}
-    yield Page("listing/index.html", "The listing", "listing.html", context)
-=======
-        yield Page(path, f"{_DECKS[program]}: the program as printed", "deck.html", context, found,
-                   menu="listing/index.html")  # fmt: skip
+        yield Page(path, f"{_DECKS[program]}: the program as printed", "deck.html", context, found)
     yield Page("listing/collation.html", "The three decks compared", "collation.html",
-               {"programs": _DECKS, "operations": parallel_decks.operations()},
-               menu="listing/index.html")  # fmt: skip
+               {"programs": _DECKS, "operations": parallel_decks.operations()})  # fmt: skip
     counts = {
         program: (title, len(deck(program).cards), len(decks.sheets(program)))
         for program, title in _DECKS.items()
     }
     context = {"decks": counts, "scan": facts("cards/scan")}
     yield Page("listing/index.html", "The three programs", "listing.html", context)
->>>>>>> deck
 
 
 def _documents(docs: Path) -> Iterator[Page]:

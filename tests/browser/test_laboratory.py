@@ -4,6 +4,7 @@ import re
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from selenium.webdriver import ActionChains, Chrome, Keys
@@ -12,11 +13,14 @@ from selenium.webdriver.support.select import Select
 from selenium.webdriver.support.wait import WebDriverWait
 
 from pyharness import case_scene, run_program
+from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, subset
 from pyharness.original.printer import page
 from tests.browser.screen import WIDTHS, errors, screen, too_wide
 
 Open = Callable[[str], None]
+EXPERIMENTS = facts("experiments")["experiment"]
+_DRAWN = "return document.querySelector('#omega1-chart canvas').toDataURL()"
 
 
 @pytest.fixture
@@ -59,6 +63,26 @@ def _fragment(browser: Chrome) -> str:
     return browser.current_url.partition("#")[2]
 
 
+def _table(browser: Chrome, selector: str) -> list[list[str]]:
+    """Return the text of the cells of each row that a selector finds."""
+    read = (
+        "return [...document.querySelectorAll(arguments[0])]"
+        ".map((row) => [...row.cells].map((cell) => cell.textContent))"
+    )
+    found: list[list[str]] = browser.execute_script(read, selector)
+    return found
+
+
+def _wait(browser: Chrome, holds: Callable[[], bool]) -> None:
+    """Wait until a condition holds; charts are drawn, and switches tried, after the change."""
+    WebDriverWait(browser, 5.0).until(lambda _: holds())
+
+
+def _wait_for_drawing(browser: Chrome, before: str) -> None:
+    """Wait until the first chart differs from its picture `before`."""
+    _wait(browser, lambda: browser.execute_script(_DRAWN) != before)
+
+
 def _click(browser: Chrome, selector: str) -> None:
     browser.execute_script("document.querySelector(arguments[0]).click()", selector)
 
@@ -74,7 +98,7 @@ def test_the_numbers_are_the_twins(browser: Chrome, laboratory: Open) -> None:
     assert "Stopped at step 25 of 100, at 0.25 s, by V2" in _text(browser, "status")
     assert _text(browser, "printer-page") == page(case_scene(2), "runge-kutta", twin)
     assert _text(browser, "problems") == ""
-    assert browser.execute_script("return document.querySelectorAll('canvas').length") == 2
+    assert browser.execute_script("return document.querySelectorAll('canvas').length") == 6
 
 
 def test_a_switch_draws_anew_and_is_in_the_address(browser: Chrome, laboratory: Open) -> None:
@@ -98,7 +122,10 @@ def test_an_address_restores_its_state(browser: Chrome, laboratory: Open) -> Non
     on = "return [...document.querySelectorAll('input[name=switch]:checked')].map((x) => x.value)"
     assert browser.execute_script(on) == ["x3-reads-acl2"]
     assert not browser.find_element(By.ID, "stop-test").is_displayed()
-    assert not browser.find_element(By.CSS_SELECTOR, "[value=stage-base]").is_displayed()
+    absent = browser.find_element(By.CSS_SELECTOR, "[value=stage-base]")
+    assert not absent.is_enabled()
+    label = absent.find_element(By.XPATH, "..")
+    _wait(browser, lambda: "No effect here: not in the two-term program." in label.text)
     assert len(_rows(browser)) == 30
     # Change the fragment without reloading the page.
     browser.execute_script("location.hash = 'case=2&program=runge-kutta&listing=original'")
@@ -131,27 +158,211 @@ def test_what_has_the_focus_is_in_sight(browser: Chrome, laboratory: Open) -> No
         "return r.bottom > 0 && r.top < innerHeight && [document.activeElement.id]"
     )
     seen = set()
-    for _ in range(60):
+    for _ in range(170):
         ActionChains(browser, 0).send_keys(Keys.TAB).perform()
         # A page may still be scrolling.
         seen.update(WebDriverWait(browser, 3.0).until(lambda _: browser.execute_script(in_sight)))
-    assert {"omega0", "lipschitz", "address", "printer-page"} <= seen
+    assert {"omega0", "lipschitz", "step", "address", "printer-page"} <= seen
 
 
-def test_components_can_be_hidden_and_the_pointer_tells_numbers(
+def test_curves_can_be_hidden_and_the_pointer_tells_numbers(
     browser: Chrome, laboratory: Open
 ) -> None:
     laboratory("")
-    draw = "return document.querySelector('canvas').toDataURL()"
-    before = browser.execute_script(draw)
-    _click(browser, "input[name=component]:nth-of-type(1)")
-    assert browser.execute_async_script(
-        "const done = arguments[0]; requestAnimationFrame(() => done(true))"
+    for id in ("show-solution", "show-limit"):
+        before = browser.execute_script(_DRAWN)
+        browser.find_element(By.ID, id).click()
+        _wait_for_drawing(browser, before)
+    over = browser.find_element(By.CSS_SELECTOR, "#omega1-chart .u-over")
+    width = over.size["width"]
+    ActionChains(browser).move_to_element_with_offset(over, -width // 2 + width // 5, 0).perform()
+    told = _text(browser, "readout")
+    step = round(float(told.split(" s: ")[0]) / 0.01)
+    twin = run_program(case_scene(2), subset("runge-kutta"), "python")
+    assert twin.velocity is not None
+    for name, value in (("U1", twin.omega[step - 1, 0]), ("V3", twin.velocity[step - 1, 2])):
+        assert f"{name} {value:.5g}" in told
+    assert "solution" not in told
+    assert "quotient: V1 " in told
+
+
+def test_the_step_slider_shows_numbers_and_cards(browser: Chrome, laboratory: Open) -> None:
+    laboratory("")
+    twin = run_program(case_scene(2), subset("runge-kutta"), "python")
+    assert twin.velocity is not None
+    assert twin.stop is not None
+    rows = _table(browser, "#step-numbers tr")
+    assert [float(row[1]) for row in rows] == [*twin.omega[-1], *twin.velocity[-1]]
+    assert float(rows[4][4]) == twin.stop.quotient
+    cards = _table(browser, ".cards tbody tr")
+    stopping = next(row for row in cards if row[0] == "1420")
+    assert "ends the run" in stopping[1]
+    assert stopping[2] == f"quotient of V2 = {twin.stop.quotient!r}"
+    assert "not reached" in next(row for row in cards if row[0] == "1430")[1]
+    before = browser.execute_script(_DRAWN)
+    browser.find_element(By.ID, "step").send_keys(Keys.ARROW_LEFT, Keys.ARROW_LEFT)
+    assert _text(browser, "step-told") == "23 of 25, at 0.23 s"
+    rows = _table(browser, "#step-numbers tr")
+    assert [float(row[1]) for row in rows] == [*twin.omega[22], *twin.velocity[22]]
+    cards = _table(browser, ".cards tbody tr")
+    results = {row[2].partition(" = ")[0]: row[2].partition(" = ")[2] for row in cards if row[2:]}
+    assert [float(results[f"U{axis}(4)"]) for axis in (1, 2, 3)] == twin.omega[22].tolist()
+    assert not any("ends the run" in row[1] for row in cards if row[1:])
+    _wait_for_drawing(browser, before)
+    # A click on a chart chooses the step at the pointer.
+    over = browser.find_element(By.CSS_SELECTOR, "#velocity-chart .u-over")
+    width = over.size["width"]
+    ActionChains(browser).move_to_element_with_offset(
+        over, -width // 2 + width // 10, 0
+    ).click().perform()
+    assert 8 <= int(_text(browser, "step-told").split()[0]) <= 12
+    links = browser.find_elements(By.CSS_SELECTOR, ".cards a")
+    targets = {str(link.get_dom_attribute("href")) for link in links}
+    assert "listing/runge-kutta.html#860" in targets
+    # A step that the next run has stays chosen.
+    _click(browser, "input[value=stage-base]")
+    assert 8 <= int(_text(browser, "step-told").split()[0]) <= 12
+    assert "corrected" in next(
+        row[1] for row in _table(browser, ".cards tbody tr") if row[0] == "860"
     )
-    assert browser.execute_script(draw) != before
-    over = browser.find_element(By.CSS_SELECTOR, "#omega-chart .u-over")
-    ActionChains(browser).move_to_element(over).perform()
-    assert re.match(r"0\.\d+ s: U1 .*\(solution ", _text(browser, "readout"))
+
+
+def test_every_card_of_a_step_has_its_place_in_the_listing(
+    browser: Chrome, laboratory: Open, site: Path
+) -> None:
+    for program in PROGRAMS:
+        laboratory(f"#case=5&program={program}")
+        links = browser.execute_script(
+            "return [...document.querySelectorAll('.cards a')].map((each) => each.hash.slice(1))"
+        )
+        text = (site / f"listing/{program}.html").read_text()
+        assert len(links) > 60
+        assert [each for each in links if f'id="{each}"' not in text] == []
+
+
+def test_a_pinned_run_stays_in_charts_and_address(browser: Chrome, laboratory: Open) -> None:
+    laboratory("#case=2&program=runge-kutta&listing=original&no-stop")
+    assert not browser.find_element(By.ID, "difference").is_displayed()
+    browser.find_element(By.ID, "pin").click()
+    browser.find_element(By.CSS_SELECTOR, "input[value=stage-base]").click()
+    pinned = "pin=case%3D2%26program%3Drunge-kutta%26listing%3Doriginal%26no-stop"
+    words = f"case=2&program=runge-kutta&listing=original&fix=stage-base&no-stop&{pinned}"
+    assert _fragment(browser) == words
+    for _ in range(2):
+        assert browser.find_element(By.ID, "difference").is_displayed()
+        assert _text(browser, "pinned-command") == (
+            "pyharness run --case 2 --program runge-kutta --listing original --no-stop"
+        )
+        assert "Largest error of omega: 2.98 rad/s." in _text(browser, "pinned-ending")
+        assert "Largest error of omega: 0.02 rad/s." in _text(browser, "status")
+        over = browser.find_element(By.CSS_SELECTOR, "#omega1-chart .u-over")
+        ActionChains(browser).move_to_element(over).perform()
+        told = _text(browser, "readout")
+        step = round(float(told.split(" s: ")[0]) / 0.01)
+        first, second = (
+            run_program(case_scene(2), subset("runge-kutta", fix=fix), "python", may_stop=False)
+            for fix in (["stage-base"], [])
+        )
+        own, other = (run.omega[step - 1, 0] for run in (first, second))
+        assert f"pinned {other:.5g}" in told
+        assert f"difference: U1 {own - other:.5g}" in told
+        laboratory(f"#{words}")
+    browser.find_element(By.ID, "unpin").click()
+    assert _fragment(browser) == words.removesuffix(f"&{pinned}")
+    assert not browser.find_element(By.ID, "difference").is_displayed()
+    assert browser.switch_to.active_element.get_dom_attribute("id") == "pin"
+
+
+def test_the_limit_is_told(browser: Chrome, laboratory: Open) -> None:
+    for words, told, shown in (
+        ("", "2 y(t/2) - y(0)", True),
+        ("listing=corrected", "this program converges to the solution", False),
+        ("case=1", "In this case both are the same function", False),
+        ("case=7&program=two-term", "converges to no function", False),
+        ("reading=do-variable", "We have not worked out the limit", False),
+        ("case=5&program=two-term", "to the solution of another equation", True),
+    ):
+        laboratory(f"#{words}")
+        assert told in _text(browser, "limit")
+        assert browser.find_element(By.ID, "show-limit").is_enabled() == shown
+    assert not browser.find_element(By.ID, "quotient").is_displayed()
+
+
+def test_the_end_is_explained(browser: Chrome, laboratory: Open) -> None:
+    laboratory("")
+    assert _text(browser, "why-head") == "Why did it stop?"
+    assert "V2 had just passed a turning point" in _text(browser, "why")
+    browser.find_element(By.ID, "stops").click()
+    assert _text(browser, "why-head") == "Why did it not stop early?"
+    assert "The stop test is switched off." in _text(browser, "why")
+
+
+def test_a_switch_that_does_nothing_says_so(browser: Chrome, laboratory: Open) -> None:
+    laboratory("#case=2&program=runge-kutta&listing=original")
+    box = browser.find_element(By.CSS_SELECTOR, "input[value=torque-held]")
+    label = box.find_element(By.XPATH, "..")
+    _wait(browser, lambda: "No effect here: it changes no number of this run." in label.text)
+    assert "idle" in str(label.get_dom_attribute("class"))
+    # It can still be switched, because two such switches together may do something.
+    assert box.is_enabled()
+    Select(browser.find_element(By.ID, "case")).select_by_value("7")
+    _wait(browser, lambda: "No effect here" not in label.text)
+    assert "idle" not in str(label.get_dom_attribute("class"))
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda each: each["id"])
+def test_an_experiment_is_predicted_run_and_explained(
+    browser: Chrome, laboratory: Open, experiment: dict[str, Any]
+) -> None:
+    laboratory("")
+    lesson = browser.find_element(By.ID, f"experiment-{experiment['id']}")
+    assert not lesson.is_displayed()
+    button = browser.find_element(By.CSS_SELECTOR, f"[aria-controls=experiment-{experiment['id']}]")
+    button.send_keys(Keys.ENTER)
+    assert lesson.is_displayed()
+    assert experiment["explanation"] not in lesson.text
+    run = lesson.find_element(By.CSS_SELECTOR, "a.run")
+    run.click()
+    assert "Choose a prediction first." in lesson.text
+    wrong = 1 if experiment["answer"] != 1 else 2
+    choices = lesson.find_elements(By.CSS_SELECTOR, "input")
+    choices[wrong - 1].click()
+    run.click()
+    right = experiment["choices"][experiment["answer"] - 1]
+    assert f"Your prediction was wrong. Right: {right}" in lesson.text
+    assert experiment["explanation"] in lesson.text
+    assert _fragment(browser) == experiment["state"]
+    choices[experiment["answer"] - 1].click()
+    run.send_keys(Keys.ENTER)
+    assert "Your prediction was right." in lesson.text
+    expected = experiment["expect"]
+    assert f"Largest error of omega: {expected['error']} rad/s." in _text(browser, "status")
+    if expected["ended"] == "stopped":
+        assert f"Stopped at step {expected['steps']} of" in _text(browser, "status")
+
+
+def test_on_a_phone_the_choices_are_beside_the_chart(browser: Chrome, laboratory: Open) -> None:
+    with screen(browser, 360):
+        laboratory("")
+        box = browser.find_element(By.CSS_SELECTOR, "input[value=stage-base]")
+        assert not box.is_displayed()
+        chart = browser.find_element(By.ID, "omega1-chart")
+        browser.execute_script("arguments[0].scrollIntoView()", chart)
+        sheet = browser.find_element(By.ID, "sheet")
+        assert sheet.text.startswith("Case 2, runge-kutta, original: stopped at step 25")
+        sheet.send_keys(Keys.ENTER)
+        assert sheet.get_dom_attribute("aria-expanded") == "true"
+        before = browser.execute_script(_DRAWN)
+        box.click()
+        _wait_for_drawing(browser, before)
+        where = "const r = arguments[0].getBoundingClientRect(); return [r.top, r.bottom]"
+        top, bottom = browser.execute_script(where, chart)
+        above, _ = browser.execute_script(where, browser.find_element(By.ID, "choices"))
+        assert 0 <= top < bottom <= above
+        assert "fix=stage-base" in _fragment(browser)
+        assert too_wide(browser) <= 0
+        sheet.click()
+        assert not box.is_displayed()
 
 
 def test_controls_make_the_address_that_restores_them(browser: Chrome, laboratory: Open) -> None:

@@ -7,6 +7,7 @@ import math
 import random
 import re
 import subprocess
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -17,8 +18,10 @@ from pyharness import case_scene, run_program
 from pyharness.checks.port_protocol import requested_scene
 from pyharness.cli.main import main
 from pyharness.edition.laboratory import MOST_STEPS, context, data
+from pyharness.history.limits import limit_solution
 from pyharness.methods.solve import solve
-from pyharness.model.listing import PROGRAMS, names_of, subset
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.report import short
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers
@@ -32,11 +35,14 @@ LABORATORY = WEB / "laboratory"
 
 def ask(body: str, given: Any) -> Any:
     """Return the value of the JavaScript `body`, which may use `given` and the laboratory."""
-    names = {"state": "S", "experiment": "E", "reference": "R", "printer-page": "P"}
+    names = {"state": "S", "experiment": "E", "reference": "R", "printer-page": "P", "cards": "K"}
+    names |= {"limit": "L", "why": "W", "idle": "I"}
     imports = [
         f"import * as {name} from {json.dumps(str(LABORATORY / f'{file}.js'))};"
         for file, name in names.items()
     ]
+    equations = json.dumps(str(WEB / "programs/equations.js"))
+    imports.append(f"import * as Q from {equations};")
     script = (
         f"{''.join(imports)} import {{ readFileSync }} from 'node:fs';"
         "const { data, given } = JSON.parse(readFileSync(0));"
@@ -346,6 +352,324 @@ def test_data_are_json_and_know_every_switch() -> None:
         names = {each["id"] for each in given["flags"] if program in each["programs"]}
         kinds = ("defect", "reading", "conjecture")
         assert names == {name for kind in kinds for name in names_of(kind, program)}
+
+
+_STEPS = [
+    ("case=2&program=runge-kutta", 25),
+    ("case=2&program=runge-kutta", 1),
+    ("case=5&program=runge-kutta&listing=corrected", 40),
+    ("case=4&program=runge-kutta&fix=stage-base,lipschitz-per-component&no-stop", 7),
+    ("case=6&program=runge-kutta&fix=base-not-restored,lipschitz-mismatched-pairs", 5),
+    ("case=3&program=two-term", 9),
+    ("case=5&program=two-term&listing=corrected&keep=x3-reads-acl2", 3),
+    ("case=5&program=four-term", 12),
+    ("case=7&program=four-term", 2),
+    ("case=7&program=runge-kutta&listing=corrected", 4),
+]
+
+
+@pytest.mark.parametrize(("words", "step"), _STEPS)
+def test_every_card_of_a_step_gives_the_value_beside_it(words: str, step: int) -> None:
+    """Compute each card, as FORTRAN, from the values that the cards before it have given."""
+    body = """const { state } = S.stateFrom(data, given.words);
+      const { run, trace } = K.traced(data, state, given.step);
+      const passes = K.passesOf(data, state, { run, trace }, given.step);
+      const scene = E.sceneOf(data, state);
+      const active = new Set(state.active);
+      const before = run.rows.length > 1 ? run.rows[given.step - 2] : null;
+      return { passes, values: trace.values, row: run.rows[given.step - 1], before,
+        rates: [Q.eulerCoefficients(scene), Q.normalizedTorque(scene, 0),
+          Q.accelerations(scene, active)] };"""
+    found = ask(body, {"words": words, "step": step})
+    known = _constants(*found["rates"])
+    for name, value in found["values"]:
+        if name.startswith("before "):
+            known[name.removeprefix("before ")] = value
+    known["TIME"] = found["before"][0] if found["before"] else 0.0
+    # Card 1660 or 2250 of the original collocation programs adds the step size in every step.
+    grows = "DT" in dict(found["values"]) and "corrected" not in words
+    known["DT"] = sum([0.01] * step) if grows else 0.01
+    computed = 0
+    for part in found["passes"]:
+        for line in part["lines"]:
+            text = _with_subscripts(line["text"].strip(), part["subscripts"])
+            if line["values"] and (formula := re.fullmatch(r"([\w(),]+?) *=(.*)", text)):
+                ((name, value),) = line["values"]
+                assert name == formula[1]
+                assert _value(formula[2], known) == value, text
+                computed += 1
+            known |= dict(line["values"])
+    assert computed > 60
+    end = max((name for name in known if name.startswith("U1(")), key=lambda name: int(name[3:-1]))
+    names = [f"{unknown}{end[2:]}" for unknown in ("U1", "U2", "U3", "V1", "V2", "V3")]
+    assert [known["TIME"], *(known[name] for name in names)] == found["row"]
+
+
+def _constants(rates: Any, torque: Any, acceleration: Any) -> dict[str, float]:
+    """Return the variables that the cards before the loop have set."""
+    names = ["A", "B", "C", "A1", "B1", "C", "R1", "R2", "R3", "M1", "M2", "M3", "ACL1", "ACL2"]
+    values = [*rates, *rates, *torque, *torque, *acceleration]
+    return dict(zip([*names, "ACL3"], values, strict=True))
+
+
+def _with_subscripts(text: str, subscripts: dict[str, int]) -> str:
+    for letter, number in subscripts.items():
+        text = re.sub(rf"(?<=[(,]){letter}(?=[),])", str(number), text)
+    return text
+
+
+def _value(formula: str, known: dict[str, float]) -> float:
+    """Return the value of a FORTRAN expression in binary64, with powers as products."""
+    text = re.sub(r"([A-Z]\w*(?:\([\d,]+\))?)", r"known['\1']", formula)
+    text = re.sub(r"known\['(ABS|SQRT)'\]", r"\1", text)
+    factor = r"(known\['[^']+'\])"
+    text = re.sub(rf"{factor}\*\*4", r"((\1*\1)*(\1*\1))", text)
+    text = re.sub(rf"{factor}\*\*3", r"(\1*\1*\1)", text)
+    text = re.sub(rf"{factor}\*\*2", r"(\1*\1)", text)
+    return float(eval(text, {"known": known, "ABS": abs, "SQRT": math.sqrt}))
+
+
+def test_a_trace_changes_no_bit_of_a_run() -> None:
+    body = """return given.map((words) => {
+      const { state } = S.stateFrom(data, words);
+      const plain = E.experiment(data, state).run;
+      const steps = plain.rows.length;
+      const { run } = K.traced(data, state, steps);
+      return [plain.rows, run.rows, plain.stop, run.stop];
+    });"""
+    for plain, traced, stop, traced_stop in ask(body, _words()[:60]):
+        assert traced == plain
+        assert traced_stop == stop
+
+
+def test_a_pinned_state_goes_round_through_the_address() -> None:
+    words = _words()
+    pairs = list(itertools.pairwise(words))
+    body = """return given.map(([words, other]) => {
+      const [state, pinned] = [words, other].map((each) => S.stateFrom(data, each).state);
+      const found = S.stateFrom(data, `#${S.fragmentOf(data, state, pinned)}`);
+      return [found, state, pinned, S.fragmentOf(data, state)];
+    });"""
+    for found, state, pinned, plain in ask(body, pairs):
+        assert found == {"state": state, "pinned": pinned, "problems": []}
+        assert "pin" not in plain
+
+
+@pytest.mark.parametrize(
+    ("pin", "told"),
+    [
+        ("case%3D9", "pin: case: unknown '9'; allowed: 1, 2"),
+        ("spin%3D1", "pin: unknown word 'spin'; allowed: case, program"),
+        ("case%3D1%26pin%3Dcase%253D1", "pin: unknown word 'pin'"),
+        ("program%3Dtwo-term%26no-stop", "pin: no-stop has no meaning with program=two-term"),
+    ],
+)
+def test_what_a_pin_has_wrong_is_told(pin: str, told: str) -> None:
+    body = "const f = S.stateFrom(data, given); return [f.problems, S.fragmentOf(data, f.pinned)];"
+    (problem,), fragment = ask(body, f"case=2&pin={pin}")
+    assert problem.startswith(told)
+    assert fragment.endswith("listing=original")
+
+
+def test_limits_are_those_that_python_computes() -> None:
+    cells = [(n, program) for n in case_numbers() for program in ("two-term", "runge-kutta")]
+    body = """return given.map(([number, program]) => {
+      const { state } = S.stateFrom(data, `case=${number}&program=${program}`);
+      const found = E.experiment(data, state);
+      return [L.limitOf(data, found), found.truth];
+    });"""
+    kinds = set()
+    for (number, program), (found, truth) in zip(cells, ask(body, cells), strict=True):
+        scene = case_scene(number)
+        expected = limit_solution(program, scene, scene.times(), reference(scene, scene.times()))
+        kinds.add(found["kind"])
+        if found["kind"] == "nothing":
+            assert np.isnan(expected).all()
+            continue
+        omega = np.array(found["omega"] or truth)
+        size = max(np.abs(omega[: len(omega) // 2]).max(), 1.0)
+        # Near its blow-up a limit amplifies every rounding error.
+        near = np.abs(expected[: len(omega)]).max(axis=1) < 1e3 * size
+        assert near.sum() > 25
+        assert np.abs(omega[near] - expected[: len(omega)][near]).max() < 1e-6 * size
+        same = np.abs(np.array(truth) - expected).max() < 1e-9 * size
+        assert same == (found["omega"] is None), (number, program)
+    assert kinds == {"half-speed", "equation", "nothing"}
+
+
+def _switched() -> Iterator[str]:
+    """Yield words of all combinations of the switches on which a limit depends."""
+    names = {
+        "two-term": ("dt-accumulates", "torque-held", "initial-torque", "x3-reads-acl2"),
+        "four-term": ("dt-accumulates", "torque-held", "initial-torque"),
+        "runge-kutta": ("stage-base", "base-not-restored", "torque-held", "initial-torque"),
+    }
+    for program, number in itertools.product(PROGRAMS, (4, 7)):
+        for kept in itertools.product((False, True), repeat=len(names[program])):
+            keep = ",".join(itertools.compress(names[program], kept))
+            words = f"case={number}&program={program}&listing=corrected&steps=30"
+            yield words + (f"&keep={keep}" if keep else "")
+
+
+def test_every_program_converges_to_its_limit() -> None:
+    body = """const distance = (state, parts) => {
+        const finer = { ...state, stepSize: state.stepSize / parts, steps: state.steps * parts };
+        const found = E.experiment(data, { ...finer, stops: false });
+        const { kind, omega } = L.limitOf(data, found);
+        const goal = omega ?? found.truth;
+        const apart = found.run.rows.map((row, n) =>
+          Math.max(...[0, 1, 2].map((axis) => Math.abs(row[axis + 1] - goal[n][axis]))));
+        return [kind, Math.max(...apart)];
+      };
+      return given.map((words) => {
+        const { state, problems } = S.stateFrom(data, words);
+        return [problems, distance(state, 1), distance(state, 8)];
+      });"""
+    words = list(_switched())
+    kinds: dict[str, int] = {}
+    for each, (problems, (kind, coarse), (again, fine)) in zip(
+        words, ask(body, words), strict=True
+    ):
+        assert problems == []
+        assert kind == again
+        kinds[kind] = kinds.get(kind, 0) + 1
+        if kind not in ("nothing", "unknown"):
+            assert fine < max(coarse / 6.0, 1e-11), (each, kind, coarse, fine)
+    assert min(kinds[kind] for kind in ("solution", "half-speed", "equation", "nothing")) >= 4
+    assert set(kinds) == {"solution", "half-speed", "equation", "nothing", "unknown"}
+
+
+EXPERIMENTS = facts("experiments")["experiment"]
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda each: each["id"])
+def test_guided_experiments_show_what_they_say(experiment: dict[str, Any]) -> None:
+    body = """const { state, pinned, problems } = S.stateFrom(data, given);
+      const shown = (state) => {
+        const found = E.experiment(data, state);
+        const { kind, omega } = L.limitOf(data, found);
+        const apart = omega === null ? null : found.run.rows.map((row, n) =>
+          Math.max(...[0, 1, 2].map((axis) => Math.abs(row[axis + 1] - omega[n][axis]))));
+        return { ended: found.run.ended, steps: found.run.rows.length, limit: kind,
+          variable: found.run.stop?.variable, error: E.brief(E.largestError(found)),
+          quotient: found.run.stop && String(Math.round(found.run.stop.quotient)),
+          from_limit: apart && E.brief(Math.max(...apart)) };
+      };
+      return [problems, S.fragmentOf(data, state, pinned), shown(state),
+        pinned && shown(pinned)];"""
+    problems, fragment, shown, pinned = ask(body, experiment["state"])
+    assert problems == []
+    assert fragment == experiment["state"]
+    for name, value in experiment["expect"].items():
+        of_pinned = name.startswith("pinned_")
+        assert (pinned if of_pinned else shown)[name.removeprefix("pinned_")] == value, name
+        if name in ("quotient", "error", "from_limit", "pinned_from_limit"):
+            assert value in experiment["explanation"]
+        if name == "pinned_error":
+            assert (
+                value
+                in "".join([experiment["explanation"], *experiment["choices"]])
+                + (experiment["goal"] + experiment["question"])
+                or experiment["id"] == "test-omega-alone"
+            )
+    assert 1 <= experiment["answer"] <= len(experiment["choices"])
+    assert 2 <= len(experiment["choices"]) <= 4
+    if experiment["expect"]["ended"] == "stopped":
+        assert f"step {experiment['expect']['steps']}" in experiment["explanation"]
+
+
+def test_there_are_eight_experiments_on_the_page(built_site: dict[str, bytes]) -> None:
+    text = html.unescape(built_site["laboratory.html"].decode())
+    assert len(EXPERIMENTS) == len({each["id"] for each in EXPERIMENTS}) == 8
+    for each in EXPERIMENTS:
+        for part in ("title", "goal", "question", "explanation"):
+            assert each[part] in text, part
+        assert all(choice in text for choice in each["choices"])
+        assert f"laboratory.html#{each['state']}" in text
+
+
+def test_the_reason_of_an_end_is_computed_from_the_run() -> None:
+    body = """return given.map((words) =>
+      W.whyEnded(E.experiment(data, S.stateFrom(data, words).state)));"""
+    words = [
+        "", "case=5", "no-stop", "program=two-term", "case=6&program=two-term",
+        "listing=corrected", "fix=lipschitz-per-component&lipschitz=6",
+        "fix=lipschitz-tests-velocity",
+    ]  # fmt: skip
+    velocity, omega, off, none, overflow, complete, joint, later = ask(body, words)
+    twin = run_program(case_scene(2), subset("runge-kutta"), "python")
+    assert twin.velocity is not None
+    assert twin.stop is not None
+    before, after = twin.velocity[-2:, 1]
+    assert f"V2 went from {before:#.4g} to {after:#.4g} m/s" in velocity
+    assert "V2 had just passed a turning point" in velocity
+    assert after < before > twin.velocity[-3, 1]
+    assert f"the quotient is {twin.stop.quotient:.0f}." in velocity
+    assert "V2 is a velocity, on which omega does not depend" in velocity
+    assert "In that step omega had an error of 0.271 rad/s" in velocity
+    assert "In step 92 U2 had just passed a turning point" in omega
+    assert "a velocity, on which" not in omega
+    assert "With it, the run would have ended at step 25, where the quotient of V2 is 3305" in off
+    assert none.startswith("This program has no stop test")
+    assert "In its last step alone it grew more than a million times" in overflow
+    assert complete.startswith("No quotient exceeded the limit of 500")
+    assert "the slope of omega and the velocity together changed by" in joint
+    assert "In step 62 U1 was near a turning point" in later
+
+
+def test_quotients_end_the_run_where_they_exceed_the_limit() -> None:
+    body = """return given.map((words) => {
+      const found = E.experiment(data, S.stateFrom(data, words).state);
+      return [found.run.stop, W.quotientsOf(found.tests), found.run.rows.length, found.state];
+    });"""
+    words = [each for each in _words() if "runge-kutta" in each]
+    stopped = 0
+    for stop, quotients, rows, state in ask(body, words):
+        assert len(quotients) == rows
+        limit = state["lipschitz"]
+        over = [
+            [n + 1, name, value]
+            for n, step in enumerate(quotients)
+            for name, value in step
+            if value is not None and value > limit
+        ]
+        if stop is None:
+            assert not over or not state["stops"]
+        elif stop["quotient"] is not None:  # infinity is null in JSON
+            stopped += 1
+            first = next(each for each in over if each[0] == stop["step"])
+            assert first == [stop["step"], stop["variable"], stop["quotient"]]
+            assert all(each[0] >= stop["step"] for each in over)
+    assert stopped > 20
+
+
+def test_a_switch_without_effect_is_found_by_running() -> None:
+    body = """return given.map((words) => {
+      const { state } = S.stateFrom(data, words);
+      return [state, [...I.idleSwitches(data, state)]];
+    });"""
+    words = ["", "no-stop", "case=7&program=four-term", "case=6&program=two-term"]
+    for state, reasons in ask(body, words):
+        scene, program = case_scene(state["case"]), state["program"]
+        own = {name for kind in ("defect", "reading", "conjecture")
+               for name in names_of(kind, program)}  # fmt: skip
+        active = own & set(state["active"])
+        run = run_program(scene, Listing(program, active), "python", may_stop=state["stops"])
+        for name, reason in reasons:
+            if name not in own:
+                assert reason == f"not in the {program} program"
+                continue
+            other = run_program(
+                scene, Listing(program, active ^ {name}), "python", may_stop=state["stops"]
+            )
+            assert run.velocity is not None
+            assert other.velocity is not None
+            same = (run.ended, run.stop, run.steps) == (other.ended, other.stop, other.steps) and (
+                np.array_equal(run.omega, other.omega)
+                and np.array_equal(run.velocity, other.velocity)
+                and np.array_equal(run.recorded_time, other.recorded_time)
+            )
+            assert same == (reason is not None), (state["case"], name)
 
 
 def test_files_are_small() -> None:

@@ -1,173 +1,141 @@
-// Two charts drawn by uPlot, a classic script that the page loads before this one.
+// The panels, drawn by uPlot, a classic script that the page loads before this one.
 //
-// The charts have the page's colours and are redrawn when its colour scheme changes. The legend and
-// the choice of components are elements of the page, so that they can be used without a mouse.
+// The panels have the page's colours and are redrawn when its colour scheme changes. They share the
+// pointer. Their legend and the readout are elements of the page.
 
-const COMPONENTS = ["U1", "U2", "U3"];
-// Heights in pixels, for a narrow and for a wide chart.
-const HEIGHTS = { omega: [280, 360], error: [200, 250] };
-const WIDE = 600;
-// A run that leaves the solution is shown as far beyond the solution as the solution's own size.
-// Its error is shown up to this multiple of that size.
-const FARTHEST_ERROR = 100;
-const MOST_LABELS = 6;
+const LOGARITHMIC = ["error", "quotient"];
+// Heights in pixels, for a narrow and for a wide panel.
+const HEIGHTS = [150, 170];
+const WIDE = 400;
+const MOST_LABELS = 5;
+// How a line looks: its colour, if it has no axis, its width and its dashes.
+const LOOKS = {
+  run: { colour: "--ink", width: 2 },
+  solution: { colour: "--muted", width: 1.5, dash: [6, 4] },
+  limit: { colour: "--part", width: 2, dash: [2, 3] },
+  pinned: { colour: "--missing-text", width: 1.5, dash: [10, 3, 2, 3] },
+  velocity: { colour: "--ink", width: 1.5, dash: [5, 3] },
+  bound: { colour: "--bad", width: 1.5 },
+};
 
 export class Charts {
-  // `omega` and `error` are the elements that contain the charts, `readout` is the element for the
-  // numbers at the pointer. `isShown` says whether a component, counted from 0, is to be drawn.
-  constructor(omega, error, readout, isShown) {
-    this.places = { omega, error };
-    this.readout = readout;
-    this.isShown = isShown;
-    this.drawn = {};
+  // `places` has the elements that contain the panels, by the panels' names. `tell` gets the index of the time at the
+  // pointer or null, and `pick` that of a time that was clicked.
+  constructor(places, tell, pick) {
+    Object.assign(this, { places, tell, pick });
+    this.drawn = new Map();
     this.shown = null;
-    new ResizeObserver(() => this.resize()).observe(omega);
+    new ResizeObserver(() => this.resize()).observe(places.omega1);
   }
 
-  // Show an experiment.
-  show(found) {
-    this.shown = found;
-    this.data = { omega: omegaData(found), error: errorData(found) };
-    for (const name of ["omega", "error"]) {
-      if (this.drawn[name]) this.drawn[name].setData(this.data[name]);
-      else this.drawn[name] = this.made(name);
+  // Show panels; `mark` is the time (s) of the chosen step, `end` the time and the reason of an early
+  // end, or null.
+  show(panels, times, mark, end) {
+    this.shown = { panels, times, mark, end };
+    for (const id of this.drawn.keys()) {
+      if (!panels.some((panel) => panel.id === id)) this.remove(id);
+    }
+    for (const panel of panels) {
+      const looks = panel.lines.map(({ name, look }) => name + look).join();
+      if (this.drawn.get(panel.id)?.looks !== looks) this.remove(panel.id);
+      const data = [times, ...panel.lines.map((line) => line.values)];
+      const old = this.drawn.get(panel.id);
+      if (old) {
+        old.range = panel.range;
+        old.chart.setData(data);
+      } else {
+        this.drawn.set(panel.id, this.made(panel, looks, data));
+      }
     }
   }
 
-  // Redraw with the components that are selected now.
-  choose() {
-    for (const chart of Object.values(this.drawn)) {
-      chart.batch(() => {
-        for (let n = 1; n < chart.series.length; n++) {
-          chart.setSeries(n, { show: this.isShown((n - 1) % COMPONENTS.length) });
-        }
-      });
-    }
+  // Mark another step.
+  mark(time) {
+    if (this.shown === null) return;
+    this.shown.mark = time;
+    for (const { chart } of this.drawn.values()) chart.redraw(false, false);
   }
 
   // Redraw with the colours that apply now.
   recolour() {
-    for (const name of Object.keys(this.drawn)) this.drawn[name].destroy();
-    this.drawn = {};
-    if (this.shown) this.show(this.shown);
+    colours.clear();
+    for (const id of [...this.drawn.keys()]) this.remove(id);
+    if (this.shown) this.show(this.shown.panels, this.shown.times, this.shown.mark, this.shown.end);
+  }
+
+  remove(id) {
+    this.drawn.get(id)?.chart.destroy();
+    this.drawn.delete(id);
   }
 
   resize() {
-    for (const [name, chart] of Object.entries(this.drawn)) {
-      const size = this.sizeOf(name);
+    for (const [id, { chart }] of this.drawn) {
+      const size = this.sizeOf(id);
       if (size.width > 0 && size.width !== chart.width) chart.setSize(size);
     }
   }
 
-  sizeOf(name) {
-    const width = this.places[name].clientWidth;
-    return { width, height: HEIGHTS[name][width < WIDE ? 0 : 1] };
+  sizeOf(id) {
+    const width = this.places[id].clientWidth;
+    return { width, height: HEIGHTS[width < WIDE ? 0 : 1] };
   }
 
-  made(name) {
+  made(panel, looks, data) {
+    const found = { looks, range: panel.range };
+    const isLog = LOGARITHMIC.includes(panel.id);
     const options = {
-      ...this.sizeOf(name),
-      scales: { x: { time: false }, y: this.scale(name) },
-      axes: [axis(), name === "error" ? logarithmic(axis()) : { ...axis(), size: 56, values: labels }],
-      series: [{}, ...this.series(name)],
-      hooks: { draw: [(chart) => this.markEnd(chart)], setCursor: [(chart) => this.tell(chart)] },
+      ...this.sizeOf(panel.id),
+      scales: {
+        x: { time: false },
+        y: { distr: isLog ? 3 : 1, range: (_, low, high) => found.range(low, high) },
+      },
+      axes: [
+        { ...axis(), size: 30 },
+        isLog ? logarithmic(axis()) : { ...axis(), size: 64, values: labels },
+      ],
+      series: [{}, ...panel.lines.map(style)],
+      hooks: {
+        draw: [(chart) => this.annotate(chart, panel.id)],
+        setCursor: [(chart) => panel.id === "omega1" && this.tell(chart.cursor.idx ?? null)],
+        ready: [(chart) => this.listen(chart)],
+      },
       legend: { show: false },
-      cursor: { drag: { x: true, y: false } },
+      cursor: { drag: { x: true, y: false }, sync: { key: "laboratory" } },
     };
-    return new uPlot(options, this.data[name], this.places[name]);
+    found.chart = new uPlot(options, data, this.places[panel.id]);
+    return found;
   }
 
-  series(name) {
-    const line = (axis, more) => ({
-      stroke: colour(`--c${axis + 1}`),
-      show: this.isShown(axis),
-      points: { show: false },
-      ...more,
+  // A click chooses a step; a drag shows a part of the time.
+  listen(chart) {
+    let from = 0;
+    chart.over.addEventListener("pointerdown", (event) => (from = event.clientX));
+    chart.over.addEventListener("click", (event) => {
+      const { idx } = chart.cursor;
+      if (Math.abs(event.clientX - from) < 4 && idx !== null && idx !== undefined) this.pick(idx);
     });
-    const run = COMPONENTS.map((_, axis) => line(axis, { width: 2 }));
-    if (name === "error") return run;
-    return [...run, ...COMPONENTS.map((_, axis) => line(axis, { width: 1.25, dash: [6, 4] }))];
   }
 
-  // Show the numbers at the pointer.
-  tell(chart) {
-    const n = chart.cursor.idx;
-    const [time, ...columns] = this.data.omega;
-    if (n === null || n === undefined || n >= time.length) {
-      this.readout.textContent = "";
-      return;
-    }
-    const told = COMPONENTS.map((name, axis) => {
-      const [run, truth] = [columns[axis][n], columns[axis + COMPONENTS.length][n]];
-      return `${name} ${number(run)} (solution ${number(truth)})`;
-    });
-    this.readout.textContent = `${number(time[n])} s: ${told.join(", ")}`;
-  }
-
-  scale(name) {
-    const range = name === "error" ? "errorRange" : "omegaRange";
-    return { distr: name === "error" ? 3 : 1, range: (_, low, high) => this[range](low, high) };
-  }
-
-  // Return the least and the greatest value of the solution.
-  extent() {
-    const values = [...this.shown.truth.flat(), ...this.shown.scene.initial.omega];
-    const least = values.reduce((x, y) => Math.min(x, y), Infinity);
-    const most = values.reduce((x, y) => Math.max(x, y), -Infinity);
-    return { least, most, size: Math.max(Math.abs(least), Math.abs(most), 1e-300) };
-  }
-
-  omegaRange(low, high) {
-    const { least, most, size } = this.extent();
-    const from = Math.max(low ?? 0, least - size);
-    const to = Math.min(high ?? 0, most + size);
-    const margin = 0.06 * (to - from) || 0.5 * size;
-    return [from - margin, to + margin];
-  }
-
-  // Return a range from one power of ten to another.
-  errorRange(low, high) {
-    if (!(low > 0)) return [1e-17, 1];
-    const from = Math.max(Math.floor(Math.log10(low)), -300);
-    const farthest = Math.max(FARTHEST_ERROR * this.extent().size, 10 * low);
-    const to = Math.ceil(Math.log10(Math.min(high, farthest)));
-    return [10 ** from, 10 ** Math.max(to, from + 1)];
-  }
-
-  // Draw a line where the run ended before all steps were done.
-  markEnd(chart) {
-    const { run } = this.shown;
-    if (run.ended === "complete") return;
-    const time = this.shown.times[Math.max(run.rows.length - 1, 0)];
-    const { ctx } = chart;
-    const { left, top, width, height } = chart.bbox;
-    const x = Math.round(chart.valToPos(time, "x", true));
-    if (x < left || x > left + width) return;
-    ctx.save();
-    ctx.setLineDash([]);
-    ctx.strokeStyle = colour("--bad");
-    ctx.lineWidth = 2 * uPlot.pxRatio;
-    ctx.beginPath();
-    ctx.moveTo(x, top);
-    ctx.lineTo(x, top + height);
-    ctx.stroke();
-    const words = run.stop ? `step ${run.stop.step}: ${run.stop.variable}` : "overflow";
-    const size = 13 * uPlot.pxRatio;
-    ctx.font = `${size}px sans-serif`;
-    const length = ctx.measureText(words).width;
-    const from = x > left + width / 2 ? x - length - size / 2 : x + size / 2;
-    ctx.fillStyle = colour("--paper");
-    ctx.fillRect(from, top + size / 2, length, 1.3 * size);
-    ctx.fillStyle = colour("--bad");
-    ctx.textAlign = "left";
-    ctx.fillText(words, from, top + 1.5 * size);
-    ctx.restore();
+  annotate(chart, id) {
+    const { mark, end, panels } = this.shown;
+    if (end !== null) line(chart, end.time, "--bad", [], id === "omega1" ? end.words : null);
+    if (mark !== null) line(chart, mark, "--accent", [3, 3], null);
+    const panel = panels.find((each) => each.id === id);
+    if (panel && !id.startsWith("omega")) nameLines(chart, panel);
   }
 }
+
+// Colours of the style by name, as they apply now.
+const colours = new Map();
 
 // Return the current value of a colour of the style. It may depend on the colour scheme, which only
 // the computed style of an element shows.
 function colour(name) {
+  if (!colours.has(name)) colours.set(name, computed(name));
+  return colours.get(name);
+}
+
+function computed(name) {
   const probe = document.createElement("span");
   probe.style.color = `var(${name})`;
   document.body.append(probe);
@@ -176,13 +144,72 @@ function colour(name) {
   return found;
 }
 
-function number(value) {
-  return value === null || value === undefined ? "-" : String(Number(value.toPrecision(5)));
+function style({ look, axis: number }) {
+  const { colour: own, width, dash } = LOOKS[look];
+  return {
+    stroke: colour(number === null ? own : `--c${number + 1}`),
+    width,
+    dash,
+    points: { show: false },
+    spanGaps: true,
+  };
+}
+
+// Draw a vertical line at a time (s), with words beside it.
+function line(chart, time, name, dash, words) {
+  const { ctx } = chart;
+  const { left, top, width, height } = chart.bbox;
+  const x = Math.round(chart.valToPos(time, "x", true));
+  if (x < left || x > left + width) return;
+  ctx.save();
+  ctx.setLineDash(dash.map((length) => length * uPlot.pxRatio));
+  ctx.strokeStyle = colour(name);
+  ctx.lineWidth = 1.5 * uPlot.pxRatio;
+  ctx.beginPath();
+  ctx.moveTo(x, top);
+  ctx.lineTo(x, top + height);
+  ctx.stroke();
+  if (words !== null) {
+    const size = 12 * uPlot.pxRatio;
+    ctx.font = `${size}px sans-serif`;
+    const length = ctx.measureText(words).width;
+    const from = x > left + width / 2 ? x - length - size / 2 : x + size / 2;
+    ctx.fillStyle = colour("--paper");
+    ctx.fillRect(from, top + size / 4, length, 1.3 * size);
+    ctx.fillStyle = colour(name);
+    ctx.textAlign = "left";
+    ctx.fillText(words, from, top + 1.2 * size);
+  }
+  ctx.restore();
+}
+
+// Write each line's name at its last point, so that colour is not alone.
+function nameLines(chart, { lines }) {
+  const { ctx } = chart;
+  const { left, top, width, height } = chart.bbox;
+  const size = 11 * uPlot.pxRatio;
+  ctx.save();
+  ctx.font = `${size}px sans-serif`;
+  ctx.textAlign = "right";
+  const taken = [];
+  lines.forEach(({ name, look, axis: number, values }) => {
+    if (look === "pinned") return;
+    const last = values.findLastIndex((value) => value !== null);
+    if (last < 0) return;
+    const x = chart.valToPos(chart.data[0][last], "x", true);
+    let y = Math.min(Math.max(chart.valToPos(values[last], "y", true) - size / 3, top + size), top + height);
+    while (taken.some((other) => Math.abs(other - y) < size)) y += size;
+    if (y > top + height) y = Math.min(...taken) - size;
+    taken.push(y);
+    ctx.fillStyle = colour(number === null ? LOOKS[look].colour : `--c${number + 1}`);
+    ctx.fillText(name, Math.min(Math.max(x, left + 2 * size), left + width) - size / 3, y);
+  });
+  ctx.restore();
 }
 
 function axis() {
-  const line = { stroke: colour("--line"), width: 1 };
-  return { stroke: colour("--muted"), grid: line, ticks: line, font: "12px sans-serif" };
+  const drawn = { stroke: colour("--line"), width: 1 };
+  return { stroke: colour("--muted"), grid: drawn, ticks: drawn, font: "12px sans-serif" };
 }
 
 // Label powers of ten only, and not too many of them.
@@ -195,7 +222,7 @@ function logarithmic(plain) {
   };
   return {
     ...plain,
-    size: 56,
+    size: 64,
     splits,
     filter: all,
     grid: { ...plain.grid, filter: all },
@@ -211,24 +238,4 @@ function labels(_, ticks) {
     const long = tick !== 0 && (size < 1e-3 || size >= 1e5);
     return long ? tick.toExponential().replace("+", "") : String(tick);
   });
-}
-
-// Return the times with 0 before them, and the rows and the solution where they exist.
-function omegaData({ scene, run, times, truth }) {
-  const start = scene.initial.omega;
-  const column = (rows, first, at) => [
-    first,
-    ...times.map((_, n) => (n < rows.length ? rows[n][at] : null)),
-  ];
-  return [
-    [0, ...times],
-    ...start.map((first, axis) => column(run.rows, first, axis + 1)),
-    ...start.map((first, axis) => column(truth, first, axis)),
-  ];
-}
-
-// An error of zero has no place on a logarithmic scale.
-function errorData({ times, errors }) {
-  const column = (axis) => times.map((_, n) => errors[n]?.[axis] || null);
-  return [[0, ...times], ...COMPONENTS.map((_, axis) => [null, ...column(axis)])];
 }

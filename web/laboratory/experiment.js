@@ -1,5 +1,6 @@
 // The experiment: from a state to a run and to the statements about it. It needs no page.
 import { PROGRAMS } from "../programs/programs.js";
+import { Trace } from "../programs/trace.js";
 import { reference } from "./reference.js";
 import { sceneOfCase } from "./state.js";
 
@@ -13,19 +14,27 @@ export function sceneOf(data, state) {
   };
 }
 
+// Return the result of the program of a state.
+export function runOf(data, state, trace = null) {
+  const active = new Set(state.active);
+  const { run } = PROGRAMS[state.program];
+  return run(sceneOf(data, state), active, state.lipschitz, state.stops, trace);
+}
+
 // Return the experiment of a state: its `scene`, the result of the program (`run`), the true
 // `times` of all steps (s) and the solution at these times (`truth`, rad/s). `errors` has the error
-// of each row by component, or null where there is no solution.
+// of each row by component, or null where there is no solution. `tests` has what the stop test
+// compares in each step.
 export function experiment(data, state) {
   const scene = sceneOf(data, state);
-  const active = new Set(state.active);
-  const run = PROGRAMS[state.program].run(scene, active, state.lipschitz, state.stops);
+  const trace = new Trace(0);
+  const run = runOf(data, state, trace);
   const times = Array.from({ length: state.steps }, (_, n) => (n + 1) * state.stepSize);
   const truth = reference(scene, times);
   const errors = run.rows.map((row, n) =>
     n < truth.length ? truth[n].map((value, axis) => Math.abs(row[axis + 1] - value)) : null,
   );
-  return { state, scene, run, times, truth, errors };
+  return { state, scene, run, times, truth, errors, tests: trace.tests };
 }
 
 // Return the largest error of any component so far (rad/s), or null if no error is known.

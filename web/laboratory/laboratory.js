@@ -1,8 +1,13 @@
 // The page: from controls and address to charts, table, printer page and sentences.
 //
 // Every change makes a complete new state, and every state is shown completely.
+import { panelsOf, readout } from "./chart-data.js";
 import { Charts } from "./charts.js";
+import { startCopying } from "./copying.js";
 import { brief, ending, experiment, largestError } from "./experiment.js";
+import { startGuide } from "./guide.js";
+import { idleSwitches } from "./idle.js";
+import { limitOf } from "./limit.js";
 import { printerPage } from "./printer-page.js";
 import {
   StateError,
@@ -18,20 +23,28 @@ import {
   stepsFrom,
   written,
 } from "./state.js";
+import { StepViewer } from "./steps.js";
+import { whyEnded } from "./why.js";
 
+// Time (ms) after the last change until the switches are tried.
+const IDLE_DELAY = 60;
 const data = window.laboratoryData;
 const element = (id) => document.getElementById(id);
 const all = (selector) => [...document.querySelectorAll(selector)];
-const charts = new Charts(
-  element("omega-chart"),
-  element("error-chart"),
-  element("readout"),
-  (component) => all("input[name=component]")[component].checked,
-);
+const places = all("[data-panel]").map((each) => [each.dataset.panel, each]);
+const charts = new Charts(Object.fromEntries(places), tellPointer, pick);
+const steps = new StepViewer(data, () => charts.mark(steps.time));
 let state = defaultState(data);
 let found = null;
+// The pinned state and its experiment, or null.
+let pinned = null;
+let pinnedFound = null;
+let limit = null;
+let panels = null;
 // By field: what is wrong with its content, until it is corrected.
 const wrong = new Map();
+// The switches are tried a moment after the last change.
+let waiting = null;
 
 // Compute a state and show it, together with the problems of the input that requested it.
 function show(next, problems = []) {
@@ -39,19 +52,89 @@ function show(next, problems = []) {
   tell(problems);
   showControls();
   found = experiment(data, state);
-  const error = largestError(found);
-  const known = error === null ? "" : ` Largest error of omega: ${brief(error)} rad/s.`;
-  element("status").textContent = `${ending(found)}${known}${withoutTruth()}`;
+  limit = limitOf(data, found);
+  element("status").textContent = `${ending(found)}${errorTold(found)}${withoutTruth()}`;
+  element("why-head").textContent =
+    found.run.ended === "complete" ? "Why did it not stop early?" : "Why did it stop?";
+  element("why").textContent = whyEnded(found);
+  element("limit").textContent = limit.sentence;
+  element("show-limit").disabled = limit.omega === null;
   element("printer-page").textContent = printerPage(
     data.printer[state.program],
     found.scene,
     found.run,
   );
-  charts.show(found);
+  showPinned();
+  steps.show(found);
+  showCharts();
+  const switches = state.base === "corrected" ? "corrected" : "original";
+  element("sheet-told").textContent =
+    `Case ${state.case}, ${state.program}, ${switches}: ${shortEnding(found)}`;
   element("copied").textContent = "";
   element("command").textContent = commandOf(data, state);
-  element("address").href = `#${fragmentOf(data, state)}`;
+  element("address").href = `#${fragmentOf(data, state, pinned)}`;
   showRows();
+  clearTimeout(waiting);
+  waiting = setTimeout(showIdle, IDLE_DELAY);
+}
+
+function errorTold(experiment) {
+  const error = largestError(experiment);
+  return error === null ? "" : ` Largest error of omega: ${brief(error)} rad/s.`;
+}
+
+function shortEnding({ run }) {
+  if (run.ended === "stopped") return `stopped at step ${run.stop.step}`;
+  return run.ended === "overflow" ? `overflow in step ${run.rows.length + 1}` : "complete";
+}
+
+function showPinned() {
+  element("unpin").hidden = pinned === null;
+  element("pinned").hidden = pinned === null;
+  element("difference").hidden = pinned === null;
+  for (const each of all(".with-pin")) each.hidden = pinned === null;
+  if (pinned === null) return;
+  element("pinned-command").textContent = commandOf(data, pinned);
+  element("pinned-ending").textContent = `${ending(pinnedFound)}${errorTold(pinnedFound)}`;
+}
+
+function pin(next) {
+  pinned = next;
+  pinnedFound = next === null ? null : experiment(data, next);
+}
+
+function showCharts() {
+  const omega = element("show-limit").checked ? limit.omega : null;
+  panels = panelsOf(found, pinnedFound, omega, { solution: element("show-solution").checked });
+  element("quotient").hidden = found.tests.length === 0;
+  const { run, times } = found;
+  const words = run.stop ? `step ${run.stop.step}: ${run.stop.variable}` : "overflow";
+  const end =
+    run.ended === "complete" ? null : { time: times[Math.max(run.rows.length - 1, 0)], words };
+  charts.show(panels.panels, panels.times, steps.time, end);
+}
+
+function tellPointer(index) {
+  element("readout").textContent = readout(panels, index);
+}
+
+// Show the step whose time is nearest to a time of the panels.
+function pick(index) {
+  const last = found.run.rows.length;
+  if (last === 0) return;
+  steps.choose(Math.min(Math.max(Math.round(panels.times[index] / state.stepSize), 1), last));
+  charts.mark(steps.time);
+}
+
+// Say beside each switch whether it does nothing here.
+function showIdle() {
+  const reasons = idleSwitches(data, state);
+  for (const box of all("input[name=switch]")) {
+    const reason = reasons.get(box.value);
+    const label = box.closest("label");
+    label.classList.toggle("idle", reason !== null);
+    label.querySelector(".reason").textContent = reason === null ? "" : `No effect here: ${reason}.`;
+  }
 }
 
 function tell(problems = []) {
@@ -82,11 +165,10 @@ function showControls() {
   for (const radio of all("input[name=listing]")) radio.checked = radio.value === state.base;
   for (const box of all("input[name=switch]")) {
     const label = box.closest("label");
-    label.hidden = !label.dataset.programs.split(" ").includes(state.program);
-    box.checked = state.active.includes(box.value);
-  }
-  for (const fieldset of all("fieldset.switches")) {
-    fieldset.hidden = !fieldset.querySelector("label:not([hidden])");
+    const absent = !label.dataset.programs.split(" ").includes(state.program);
+    box.disabled = absent;
+    label.classList.toggle("absent", absent);
+    box.checked = !absent && state.active.includes(box.value);
   }
   element("stop-test").hidden = !hasStopTest(state.program);
   element("stops").checked = state.stops;
@@ -108,7 +190,7 @@ function showRows() {
 // Show a state that a control made, and write it into the address.
 function change(next) {
   show(next);
-  history.replaceState(null, "", `#${fragmentOf(data, state)}`);
+  history.replaceState(null, "", `#${fragmentOf(data, state, pinned)}`);
 }
 
 // Read a field of numbers when it changes. A valid value is used. Otherwise the problem is shown,
@@ -134,7 +216,8 @@ function onChange(id, taken) {
 
 function fromAddress() {
   wrong.clear();
-  const { state: asked, problems } = stateFrom(data, location.hash);
+  const { state: asked, pinned: other, problems } = stateFrom(data, location.hash);
+  pin(other);
   show(asked, problems);
 }
 
@@ -160,23 +243,31 @@ for (const box of all("input[name=switch]")) {
     change({ ...state, active: box.checked ? [...others, box.value] : others });
   });
 }
-for (const box of all("input[name=component]")) {
-  box.addEventListener("change", () => charts.choose());
-}
-for (const button of all("button.copy")) {
-  const of = element(button.dataset.of);
-  button.hidden = navigator.clipboard === undefined;
-  button.addEventListener("click", async () => {
-    try {
-      await navigator.clipboard.writeText(of.href ?? of.textContent);
-      element("copied").textContent = "copied";
-    } catch {
-      element("copied").textContent = "the browser allows no copying from here";
-    }
-  });
-}
+for (const id of ["show-solution", "show-limit"]) element(id).addEventListener("change", showCharts);
+element("pin").addEventListener("click", () => {
+  pin(state);
+  change(state);
+});
+element("unpin").addEventListener("click", () => {
+  pin(null);
+  change(state);
+  element("pin").focus();
+});
+element("sheet").addEventListener("click", () => {
+  const isOpen = element("sheet").getAttribute("aria-expanded") === "true";
+  element("sheet").setAttribute("aria-expanded", String(!isOpen));
+});
+startGuide((words) => {
+  wrong.clear();
+  const asked = stateFrom(data, words);
+  pin(asked.pinned);
+  element("show-limit").checked = true;
+  change(asked.state);
+});
+startCopying();
 element("reset").addEventListener("click", () => {
   wrong.clear();
+  pin(null);
   change(defaultState(data));
 });
 element("numbers").addEventListener("toggle", showRows);
@@ -185,5 +276,5 @@ document.addEventListener("themechange", () => charts.recolour());
 // A page is printed in the colours for paper, whatever the colours of the screen.
 matchMedia("print").addEventListener("change", () => charts.recolour());
 
-for (const block of [...all(".controls"), element("charts")]) block.hidden = false;
+for (const id of ["choices", "charts", "step-viewer", "told"]) element(id).hidden = false;
 fromAddress();

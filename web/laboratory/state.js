@@ -87,10 +87,12 @@ export function hasStopTest(program) {
   return program === "runge-kutta";
 }
 
-export function fragmentOf(data, state) {
-  return wordsOf(data, state)
-    .map(([word, value]) => (value === null ? word : `${word}=${value}`))
-    .join("&");
+// Return the fragment of an address that names a state and, as its last word, the pinned state if
+// there is one.
+export function fragmentOf(data, state, pinned = null) {
+  const words = wordsOf(data, state).map(([word, value]) => (value === null ? word : `${word}=${value}`));
+  if (pinned !== null) words.push(`pin=${encodeURIComponent(fragmentOf(data, pinned))}`);
+  return words.join("&");
 }
 
 export function commandOf(data, state) {
@@ -100,11 +102,20 @@ export function commandOf(data, state) {
   return ["pyharness run", ...options].join(" ");
 }
 
-// Return the state that an address specifies, and a message for each of its words that is invalid;
-// the default replaces such a word.
+// Return the state that an address specifies, the pinned state or null, and a message for each word
+// that is invalid; the default replaces such a word.
 export function stateFrom(data, fragment) {
   const problems = [];
-  const given = wordsIn(fragment, problems);
+  const given = wordsIn(fragment, problems, [...WORDS, "pin"]);
+  const state = stateOfWords(data, given, problems);
+  if (!given.has("pin")) return { state, pinned: null, problems };
+  const told = [];
+  const pinned = stateOfWords(data, wordsIn(given.get("pin") ?? "", told, WORDS), told);
+  problems.push(...told.map((each) => `pin: ${each}`));
+  return { state, pinned, problems };
+}
+
+function stateOfWords(data, given, problems) {
   const read = (word, reader, otherwise) => {
     if (!given.has(word)) return otherwise;
     try {
@@ -163,21 +174,23 @@ export function stateFrom(data, fragment) {
     given.delete("lipschitz");
   }
   state.lipschitz = read("lipschitz", positiveFrom, state.lipschitz);
-  return { state, problems };
+  return state;
 }
 
-const WORDS =
-  "case program listing fix keep reading conjecture omega0 step-size steps lipschitz no-stop";
+const WORDS = [
+  ...["case", "program", "listing", "fix", "keep", "reading", "conjecture", "omega0", "step-size"],
+  ...["steps", "lipschitz", "no-stop"],
+];
 
 // An error whose message says in a line what is wrong with a value.
 export class StateError extends Error {}
 
-function wordsIn(fragment, problems) {
+function wordsIn(fragment, problems, allowed) {
   const given = new Map();
   for (const part of fragment.replace(/^#/, "").split("&").filter((each) => each !== "")) {
     const [word, ...values] = decoded(part).split("=");
-    if (WORDS.split(" ").includes(word)) given.set(word, values.length ? values.join("=") : null);
-    else problems.push(`unknown word '${shown(word)}'; allowed: ${WORDS.split(" ").join(", ")}`);
+    if (allowed.includes(word)) given.set(word, values.length ? values.join("=") : null);
+    else problems.push(`unknown word '${shown(word)}'; allowed: ${allowed.join(", ")}`);
   }
   return given;
 }

@@ -4,7 +4,8 @@
 import { march } from "./collocation.js";
 import { accelerations, eulerCoefficients, omegaRate, velocityRate } from "./equations.js";
 
-export function run(scene, listing) {
+// A collocation program has no stop test, so that its constant and its switch have no effect here.
+export function run(scene, listing, _lipschitz, _mayStop, trace = null) {
   const coefficients = eulerCoefficients(scene);
   const acceleration = accelerations(scene, listing);
 
@@ -14,5 +15,5 @@ export function run(scene, listing) {
     return [...omegaRate(coefficients, torques[k], u), ...velocityRate(acceleration, u, v)];
   };
 
-  return march(scene, listing, (dt) => [dt * 0.2, dt * 0.4, dt * 0.6, dt * 0.8], rates);
+  return march(scene, listing, (dt) => [dt * 0.2, dt * 0.4, dt * 0.6, dt * 0.8], rates, trace);
 }

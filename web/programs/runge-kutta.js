@@ -11,12 +11,12 @@ import {
   normalizedTorque,
   velocityRate,
 } from "./equations.js";
+import { UNKNOWNS, noteAll } from "./trace.js";
 
-const STOP_VARIABLES = ["U1", "U2", "U3", "V1", "V2", "V3"];
+const LETTERS = ["F", "G", "H", "X", "Y", "Z"];
 
-// `lipschitz` is in 1/s; without `mayStop` there is no stop test. `watch` is called in every step with
-// the changes that the stop test compares.
-export function run(scene, listing, lipschitz = 500, mayStop = true, watch = null) {
+// `lipschitz` is in 1/s; without `mayStop` there is no stop test. `trace` is a Trace or null.
+export function run(scene, listing, lipschitz = 500, mayStop = true, trace = null) {
   const [a, b, c] = eulerCoefficients(scene);
   const acceleration = accelerations(scene, listing);
   const { step_size: dt, steps } = scene.run;
@@ -33,6 +33,8 @@ export function run(scene, listing, lipschitz = 500, mayStop = true, watch = nul
   for (let step = 0; step < steps; step++) {
     const begin = step * dt;
     time = time + dt;
+    const note = trace?.recorder(step + 1) ?? null;
+    if (note) noteStart(note, time, point[1], base);
     let torque;
     if (step === 0 && first !== null) {
       torque = { 1: first, 2: first, 3: first, 4: first };
@@ -56,10 +58,12 @@ export function run(scene, listing, lipschitz = 500, mayStop = true, watch = nul
       const [r1, r2, r3] = torque[stage];
       const omegaRates = [r1 + a * u[1] * u[2], r2 + b * u[2] * u[0], r3 + c * u[0] * u[1]];
       slope[stage] = [...omegaRates, ...velocityRate(acceleration, u, v)];
+      if (note) noteSlopes(note, stage, torque[stage], slope[stage]);
     };
     const store = (stage, before, length) => {
       const start = listing.has("stage-base") ? point[before] : base;
       point[stage] = start.map((x, i) => x + length * slope[stage][i]);
+      if (note) noteAll(note, unknownsAt(stage), point[stage]);
     };
 
     evaluate(1, 1);
@@ -76,14 +80,17 @@ export function run(scene, listing, lipschitz = 500, mayStop = true, watch = nul
     );
     if (!allFinite(result.slice(0, 3))) return record.trajectory("overflow", null, false);
     record.add(time, result.slice(0, 3), result.slice(3));
+    if (note) noteAll(note, unknownsAt(4), result);
 
     const changeU = listing.has("lipschitz-mismatched-pairs")
       ? distances(result, base)
       : distances(point[3], firstPoint);
     const changeK = distances(slope[4], slope[1]);
-    watch?.({ changeK, changeU });
+    const tests = lipschitzTests(listing, changeK, changeU);
+    if (note) noteTests(note, changeK, changeU, lipschitz, tests);
+    trace?.tests.push(tests);
     if (mayStop) {
-      const found = lipschitzTest(listing, changeK, changeU, lipschitz);
+      const found = violated(tests, lipschitz);
       if (found !== null) {
         return record.trajectory("stopped", { step: step + 1, ...found }, false);
       }
@@ -92,22 +99,26 @@ export function run(scene, listing, lipschitz = 500, mayStop = true, watch = nul
     point[4] = result;
     base = result;
     if (!listing.has("base-not-restored")) point[1] = result;
+    if (note) noteEnd(note, point[1], base);
   }
   return record.trajectory("complete", null, false);
 }
 
-// Return the variable that violates the condition of eq. 19 and its quotient, or null.
-function lipschitzTest(listing, changeK, changeU, lipschitz) {
+// Return what the condition of eq. 19 compares: for each test the variable, the change of its slope,
+// and its own change.
+function lipschitzTests(listing, changeK, changeU) {
   const velocityCounts = listing.has("lipschitz-tests-velocity");
   const last = velocityCounts ? 6 : 3;
-  let tests;
   if (listing.has("lipschitz-per-component")) {
-    const found = STOP_VARIABLES.slice(0, last).map((name, i) => [name, changeK[i], changeU[i]]);
-    tests = [...found.slice(3), ...found.slice(0, 3)]; // the velocity first
-  } else {
-    const name = velocityCounts ? "UV" : "U";
-    tests = [[name, norm(changeK.slice(0, last)), norm(changeU.slice(0, last))]];
+    const found = UNKNOWNS.slice(0, last).map((name, i) => [name, changeK[i], changeU[i]]);
+    return [...found.slice(3), ...found.slice(0, 3)]; // the velocity first
   }
+  const name = velocityCounts ? "UV" : "U";
+  return [[name, norm(changeK.slice(0, last)), norm(changeU.slice(0, last))]];
+}
+
+// Return the first variable that violates the condition, and its quotient, or null.
+function violated(tests, lipschitz) {
   for (const [variable, change, by] of tests) {
     if (change > by * lipschitz) {
       return { variable, quotient: by === 0 ? Infinity : change / by };
@@ -121,7 +132,43 @@ function distances(x, y) {
 }
 
 function norm(x) {
+  return Math.sqrt(squares(x));
+}
+
+function squares(x) {
   let total = 0;
   for (const each of x) total = total + each * each;
-  return Math.sqrt(total);
+  return total;
+}
+
+// Return the names of the unknowns of a stage, as in U1(2).
+function unknownsAt(stage) {
+  return UNKNOWNS.map((name) => `${name}(${stage})`);
+}
+
+function noteStart(note, time, firstPoint, base) {
+  noteAll(note, UNKNOWNS.map((name) => `before ${name}(1)`), firstPoint);
+  noteAll(note, UNKNOWNS.map((name) => `before ${name[0]}${name}`), base);
+  note("TIME", time);
+  noteAll(note, [1, 2, 3, 4, 5, 6].map((n) => `P${n}`), firstPoint);
+}
+
+function noteSlopes(note, stage, torque, slopes) {
+  noteAll(note, ["R1", "R2", "R3"], torque);
+  noteAll(note, LETTERS.map((letter) => `K${letter}(${stage})`), slopes);
+}
+
+function noteTests(note, changeK, changeU, lipschitz, tests) {
+  noteAll(note, LETTERS.map((letter) => `${letter}L2`), changeU);
+  noteAll(note, LETTERS.map((letter) => `${letter}L1`), changeK);
+  note("LIP", lipschitz);
+  for (const [name, change] of [["SK", changeK], ["SU", changeU]]) {
+    note(name, squares(change.slice(0, 3)));
+    if (tests[0][0] === "UV") note(name, squares(change));
+  }
+}
+
+function noteEnd(note, firstPoint, base) {
+  noteAll(note, UNKNOWNS.map((name) => `${name[0]}${name}`), base);
+  noteAll(note, unknownsAt(1), firstPoint);
 }

@@ -4,7 +4,8 @@
 import { march } from "./collocation.js";
 import { accelerations, eulerCoefficients, omegaRate, velocityRate } from "./equations.js";
 
-export function run(scene, listing) {
+// A collocation program has no stop test, so that its constant and its switch have no effect here.
+export function run(scene, listing, _lipschitz, _mayStop, trace = null) {
   const [a, b, c] = eulerCoefficients(scene);
   const unsetC1 = 0;
   const acceleration = accelerations(scene, listing);
@@ -21,5 +22,5 @@ export function run(scene, listing) {
     return [...omegaRate(coefficients, torques[k], u), ...velocityRate(forces, u, v)];
   };
 
-  return march(scene, listing, (dt) => [dt / 3, (2 * dt) / 3], rates);
+  return march(scene, listing, (dt) => [dt / 3, (2 * dt) / 3], rates, trace);
 }

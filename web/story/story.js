@@ -4,6 +4,7 @@
 // shows the words that apply (`data-when`), and replaces numbers (`data-slot`) and curves.
 import { reference } from "../laboratory/reference.js";
 import { PROGRAMS } from "../programs/programs.js";
+import { Trace } from "../programs/trace.js";
 import { draw, mark } from "./chart.js";
 import { brief } from "./numbers.js";
 
@@ -13,12 +14,12 @@ const all = (selector) => [...document.querySelectorAll(selector)];
 const chosen = (name) => document.querySelector(`input[name="${name}"]:checked`)?.value;
 
 // Run a program in a case: as printed, without some of its faults, with any number of steps.
-function run(number, program, { without = [], parts = 1, stops = true, watch = null } = {}) {
+function run(number, program, { without = [], parts = 1, stops = true, trace = null } = {}) {
   const scene = scenes[number];
   const { step_size, steps } = scene.run;
   const finer = { ...scene, run: { step_size: step_size / parts, steps: steps * parts } };
   const active = new Set(original[program].filter((name) => !without.includes(name)));
-  const found = PROGRAMS[program].run(finer, active, lipschitz, stops, watch);
+  const found = PROGRAMS[program].run(finer, active, lipschitz, stops, trace);
   const times = Array.from({ length: steps * parts }, (_, n) => (n + 1) * finer.run.step_size);
   return { ...found, scene: finer, times };
 }
@@ -102,12 +103,15 @@ function choosePrediction() {
   mark(element("chart-stop"), "prediction", predicted);
 }
 
+// Show a step: V2, and the quotient of V2, or that of U1 if the test reads omega alone.
 function turn() {
-  const without = element("omega-alone").checked ? ["lipschitz-tests-velocity"] : [];
-  const quotients = [];
-  const found = run(2, "runge-kutta", {
-    without,
-    watch: ({ changeK, changeU }) => quotients.push(changeK[4] / changeU[4]),
+  const alone = element("omega-alone").checked;
+  const trace = new Trace(0);
+  const without = alone ? ["lipschitz-tests-velocity"] : [];
+  const found = run(2, "runge-kutta", { without, trace });
+  const quotients = trace.tests.map((tests) => {
+    const [, change, by] = tests.find(([variable]) => variable === (alone ? "U1" : "V2"));
+    return change / by;
   });
   const slider = element("step");
   slider.max = found.rows.length;
@@ -119,12 +123,13 @@ function turn() {
   draw(element("chart-quotient"), "threshold", [0, 100], [lipschitz, lipschitz]);
   for (const name of ["velocity", "quotient"]) mark(element(`chart-${name}`), "marker", step);
   document.querySelector("output[for=step]").textContent = step;
+  say("tested", alone ? "U1" : "V2");
   fill("at-step", step);
   fill("at-velocity", velocity[step]);
   fill("at-quotient", quotients[step - 1]);
   fill("alone-step", found.stop.step);
   say("alone-variable", found.stop.variable);
-  show("turning-point", "at-step", without.length > 0 ? "alone" : "");
+  show("turning-point", "at-step", alone ? "alone" : "");
 }
 
 function slow() {

@@ -1,0 +1,18 @@
+// The buttons that copy the command or the address of the experiment.
+
+const element = (id) => document.getElementById(id);
+
+export function startCopying() {
+  for (const button of document.querySelectorAll("button.copy")) {
+    const of = element(button.dataset.of);
+    button.hidden = navigator.clipboard === undefined;
+    button.addEventListener("click", async () => {
+      try {
+        await navigator.clipboard.writeText(of.href ?? of.textContent);
+        element("copied").textContent = "copied";
+      } catch {
+        element("copied").textContent = "the browser does not allow copying from here";
+      }
+    });
+  }
+}

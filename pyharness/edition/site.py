@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pyharness.edition import api, decks, documents, figures, laboratory, ledger
+from pyharness.edition import api, decks, documents, figures, laboratory, ledger, story
 from pyharness.edition.bundle import bundle
 from pyharness.edition.markdown import inline
 from pyharness.edition.report import MARK, listed
@@ -29,20 +29,32 @@ from pyharness.views.json import json_text
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-# Title and path of each entry of the menu, in order.
-MENU = (
-    ("Listing", "listing/index.html"),
-    ("Laboratory", "laboratory.html"),
-    ("Thesis", "thesis.html"),
-    ("Figures", "figures.html"),
-    ("Claims", "claims.html"),
-    ("Apparatus", "apparatus.html"),
-    ("Findings", "docs/explanation/findings.html"),
-    ("Methods", "docs/explanation/methods.html"),
-    ("Documents", "docs/index.html"),
-    ("API", "api.html"),
-    ("Search", "search.html"),
-)
+# The entries of the menu, in order: the title of a section, and title and path of each of its pages.
+# The entry of a section links to its first page.
+MENU = {
+    "Story": (("Story", "index.html"),),
+    "Programs": (
+        ("Three decks", "listing/index.html"),
+        ("Two-term", "listing/two-term.html"),
+        ("Four-term", "listing/four-term.html"),
+        ("Runge-Kutta", "listing/runge-kutta.html"),
+        ("Apparatus", "apparatus.html"),
+    ),
+    "Laboratory": (("Laboratory", "laboratory.html"),),
+    "Thesis and claims": (
+        ("Thesis", "thesis.html"),
+        ("Claims", "claims.html"),
+        ("Figures", "figures.html"),
+    ),
+    "About": (
+        ("About", "about.html"),
+        ("Documents", "docs/index.html"),
+        ("Findings", "docs/explanation/findings.html"),
+        ("Methods", "docs/explanation/methods.html"),
+        ("API", "api.html"),
+        ("Search", "search.html"),
+    ),
+}
 _DECKS = {"two-term": "Two-term collocation", "four-term": "Four-term collocation",
           "runge-kutta": "Runge-Kutta"}  # fmt: skip
 
@@ -105,9 +117,11 @@ def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -
     judged = ledger.judgements()
     context = {
         "counts": ledger.counts(judged), "kinds": ledger.kinds(judged),
-        "account": ledger.account(),
+        "account": ledger.account(), "story": story.context(),
+        "work": facts("account")["work"], "mechanism": facts("account")["mechanism"],
     }  # fmt: skip
-    yield Page("index.html", "Rigid bodies: a thesis of 1982", "index.html", context)
+    yield Page("index.html", "Story", "index.html", context)
+    yield Page("about.html", "About this edition", "about.html", context)
     progress(2, 5, "listing")
     yield from _listing()
     yield Page("laboratory.html", "Laboratory", "laboratory.html", laboratory.context())
@@ -168,7 +182,7 @@ def _listing() -> Iterator[Page]:
             for each in views
         ]  # fmt: skip
         yield Page(path, f"{_DECKS[program]}: the deck", "deck.html", context, found,
-                   menu="listing/index.html")  # fmt: skip
+                   )  # fmt: skip
     context = {"programs": _DECKS, "scan": facts("cards/scan")}
     yield Page("listing/index.html", "The listing", "listing.html", context)
 
@@ -179,16 +193,24 @@ def _documents(docs: Path) -> Iterator[Page]:
             Found(f"{path}#{part.anchor}", part.title, "document", part.text) for part in each.parts
         ]
         yield Page(path, each.title, "document.html", {"document": each}, found,
-                   menu=path if path in dict(MENU).values() else "docs/index.html")  # fmt: skip
+                   menu=path if path in _listed() else "docs/index.html")  # fmt: skip
+
+
+def _listed() -> set[str]:
+    """Return the paths of all pages that the menu has."""
+    return {path for section in MENU.values() for _, path in section}
 
 
 def _rendered(page: Page) -> bytes:
+    here = page.menu or page.path
+    section = next(name for name, of in MENU.items() if here in [path for _, path in of])
     # The relative path from the page to the top of the site. With relative links, the site works
     # under any path.
     root = "../" * page.path.count("/")
     html = _templates().get_template(page.template).render(
-        {"page": page, "root": root, "menu": MENU, "here": page.menu or page.path,
-         "build": build_record(), "digest": text_digest(), **page.context}
+        {"page": page, "root": root, "menu": MENU, "here": here, "section": section,
+         "build": build_record(), "digest": text_digest(), "edition": facts("account")["edition"],
+         **page.context}
     )  # fmt: skip
     return html.encode()
 
@@ -206,6 +228,8 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
         content[f"assets/{package['name']}-LICENSE.txt"] = licence
     for file in sorted((web / "site").iterdir()):
         content[f"assets/{file.name}"] = file.read_bytes()
+    content["assets/story.js"] = bundle(web / "story" / "story.js").encode()
+    content["assets/story-data.js"] = script("storyData", story.data())
     content["assets/laboratory.js"] = bundle(web / "laboratory" / "laboratory.js").encode()
     content["assets/laboratory-data.js"] = script("laboratoryData", laboratory.context()["data"])
     content["assets/search-data.js"] = script("searchData", [each._asdict() for each in places])
@@ -245,5 +269,6 @@ def _templates() -> "Environment":
         lstrip_blocks=True,
     )
     templates.filters["number"] = written
+    templates.filters["brief"] = story.brief
     templates.globals["inline"] = inline
     return templates

@@ -14,8 +14,9 @@ import {
 
 const STOP_VARIABLES = ["U1", "U2", "U3", "V1", "V2", "V3"];
 
-// `lipschitz` is in 1/s; without `mayStop` there is no stop test.
-export function run(scene, listing, lipschitz = 500, mayStop = true) {
+// `lipschitz` is in 1/s; without `mayStop` there is no stop test. `watch` is called in every step with
+// the changes that the stop test compares.
+export function run(scene, listing, lipschitz = 500, mayStop = true, watch = null) {
   const [a, b, c] = eulerCoefficients(scene);
   const acceleration = accelerations(scene, listing);
   const { step_size: dt, steps } = scene.run;
@@ -80,6 +81,7 @@ export function run(scene, listing, lipschitz = 500, mayStop = true) {
       ? distances(result, base)
       : distances(point[3], firstPoint);
     const changeK = distances(slope[4], slope[1]);
+    watch?.({ changeK, changeU });
     if (mayStop) {
       const found = lipschitzTest(listing, changeK, changeU, lipschitz);
       if (found !== null) {

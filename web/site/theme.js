@@ -3,6 +3,8 @@
 // flashes in the other.
 (() => {
   const root = document.documentElement;
+  // The style hides what only a script can use, and folds the menu of a narrow screen.
+  root.dataset.scripts = "";
   const system = window.matchMedia("(prefers-color-scheme: dark)");
   const kept = () => {
     // A page from a file may be refused a store.
@@ -31,6 +33,12 @@
     document.querySelector(".skip").addEventListener("click", (event) => {
       event.preventDefault();
       document.getElementById("main").focus();
+    });
+    const menu = document.getElementById("menu");
+    menu.hidden = false;
+    menu.addEventListener("click", () => {
+      const isOpen = menu.getAttribute("aria-expanded") === "true";
+      menu.setAttribute("aria-expanded", String(!isOpen));
     });
     button.hidden = false;
     button.addEventListener("click", () => {

@@ -1,0 +1,196 @@
+// The story: each scene runs the programs again when the reader changes something.
+//
+// The page has all words, and the numbers and curves of the first state of each scene. The script
+// shows the words that apply (`data-when`), and replaces numbers (`data-slot`) and curves.
+import { reference } from "../laboratory/reference.js";
+import { PROGRAMS } from "../programs/programs.js";
+import { draw, mark } from "./chart.js";
+import { brief } from "./numbers.js";
+
+const { scenes, original, letters, lipschitz } = window.storyData;
+const element = (id) => document.getElementById(id);
+const all = (selector) => [...document.querySelectorAll(selector)];
+const chosen = (name) => document.querySelector(`input[name="${name}"]:checked`)?.value;
+
+// Run a program in a case: as printed, without some of its faults, with any number of steps.
+function run(number, program, { without = [], parts = 1, stops = true, watch = null } = {}) {
+  const scene = scenes[number];
+  const { step_size, steps } = scene.run;
+  const finer = { ...scene, run: { step_size: step_size / parts, steps: steps * parts } };
+  const active = new Set(original[program].filter((name) => !without.includes(name)));
+  const found = PROGRAMS[program].run(finer, active, lipschitz, stops, watch);
+  const times = Array.from({ length: steps * parts }, (_, n) => (n + 1) * finer.run.step_size);
+  return { ...found, scene: finer, times };
+}
+
+// Return the first component of omega with its start (rad/s), and the times (s).
+function firstOmega({ rows, scene, times }) {
+  return [[0, ...times.slice(0, rows.length)], [scene.initial.omega[0], ...rows.map((row) => row[1])]];
+}
+
+// Return the largest distance of some components of omega from functions of time (rad/s).
+function distance({ rows }, goal, components = [0, 1, 2]) {
+  const each = rows.flatMap((row, n) => components.map((axis) => Math.abs(row[axis + 1] - goal[n][axis])));
+  return each.reduce((most, value) => Math.max(most, value), 0);
+}
+
+function fill(slot, value) {
+  for (const each of all(`[data-slot="${slot}"]`)) {
+    each.value = String(value);
+    each.textContent = brief(value, Number(each.dataset.digits));
+  }
+}
+
+function say(name, text) {
+  for (const each of all(`[data-text="${name}"]`)) each.textContent = text;
+}
+
+// Show the words of a scene that apply, and hide the others.
+function show(scene, ...words) {
+  for (const each of element(scene).querySelectorAll("[data-when]")) {
+    each.hidden = !each.dataset.when.split(" ").some((word) => words.includes(word));
+  }
+}
+
+function onChange(names, update) {
+  for (const each of all(names.map((name) => `input[name="${name}"]`).join())) {
+    each.addEventListener("change", update);
+  }
+  update();
+}
+
+// Run all three programs, and tell what the chosen one did.
+function claim() {
+  const letter = chosen("trust");
+  show("claim", letter);
+  if (letter === undefined) return;
+  for (const program of Object.values(letters)) {
+    const found = run(2, program);
+    draw(element("chart-claim"), program, ...firstOmega(found));
+    const error = distance(found, reference(found.scene, found.times), [0]);
+    if (program !== "runge-kutta") fill("sine", error);
+    else fill("stop-error", error);
+    if (found.stop) fill("stop-step", found.stop.step);
+  }
+}
+
+const answer = element("stop").querySelector(".answer");
+
+// Draw the run step by step, unless the reader prefers no motion.
+function predict() {
+  const chart = element("chart-stop");
+  const found = run(2, "runge-kutta");
+  const [times, omega] = firstOmega(found);
+  const predicted = Number(element("prediction").value);
+  fill("predicted", predicted);
+  fill("run-step", found.stop.step);
+  fill("quotient", found.stop.quotient);
+  say("variable", found.stop.variable);
+  show("stop", "predicted");
+  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  let shown = still ? times.length : 1;
+  const advance = () => {
+    draw(chart, "runge-kutta", times.slice(0, shown), omega.slice(0, shown));
+    answer.hidden = shown < times.length;
+    if (shown++ < times.length) requestAnimationFrame(advance);
+  };
+  advance();
+}
+
+function choosePrediction() {
+  const predicted = Number(element("prediction").value);
+  document.querySelector("output[for=prediction]").textContent = predicted;
+  mark(element("chart-stop"), "prediction", predicted * scenes[2].run.step_size);
+}
+
+function turn() {
+  const without = element("omega-alone").checked ? ["lipschitz-tests-velocity"] : [];
+  const quotients = [];
+  const found = run(2, "runge-kutta", {
+    without,
+    watch: ({ changeK, changeU }) => quotients.push(changeK[4] / changeU[4]),
+  });
+  const slider = element("step");
+  slider.max = found.rows.length;
+  const step = Number(slider.value);
+  const steps = Array.from({ length: found.rows.length + 1 }, (_, n) => n);
+  const velocity = [0, ...found.rows.map((row) => row[5])];
+  draw(element("chart-velocity"), "runge-kutta", steps, velocity);
+  draw(element("chart-quotient"), "runge-kutta", steps.slice(1), quotients);
+  draw(element("chart-quotient"), "threshold", [0, 100], [lipschitz, lipschitz]);
+  for (const name of ["velocity", "quotient"]) mark(element(`chart-${name}`), "marker", step);
+  document.querySelector("output[for=step]").textContent = step;
+  fill("at-step", step);
+  fill("at-velocity", velocity[step]);
+  fill("at-quotient", quotients[step - 1]);
+  fill("alone-step", found.stop.step);
+  say("alone-variable", found.stop.variable);
+  show("turning-point", "at-step", without.length > 0 ? "alone" : "");
+}
+
+function slow() {
+  const without = all("input[name=fault]").filter((box) => !box.checked).map((box) => box.value);
+  const parts = Math.round(scenes[2].run.step_size / Number(element("step-size").value));
+  const found = run(2, "runge-kutta", { without, parts, stops: false });
+  draw(element("chart-half-speed"), "runge-kutta", ...firstOmega(found));
+  const truth = reference(found.scene, found.times);
+  const half = reference(found.scene, found.times.map((t) => t / 2));
+  const start = found.scene.initial.omega;
+  const limit = half.map((row) => row.map((value, axis) => 2 * value - start[axis]));
+  const solution = distance(found, truth, [0]);
+  fill("from-limit", distance(found, limit, [0]));
+  for (const name of ["from-solution", "one-solution", "none-solution"]) fill(name, solution);
+  show("half-speed", ["both", "one", "none"][without.length]);
+}
+
+function blind() {
+  const [number, program] = [chosen("blind-case"), chosen("blind-program")];
+  const found = run(number, program);
+  draw(element(`chart-blind-${number}`), "runge-kutta", ...firstOmega(found));
+  fill(`blind-steps-${number}`, found.rows.length);
+  fill(`blind-error-${number}`, distance(found, reference(found.scene, found.times)));
+  const radio = document.querySelector("input[name=blind-program]:checked");
+  say(`blind-program-${number}`, radio.parentElement.textContent.trim());
+  show("blind", `case-${number}`);
+}
+
+// Run all programs in all cases but the first, and compare Runge-Kutta with collocation.
+function race() {
+  const listing = chosen("race");
+  const without = listing === "original" ? [] : Object.values(original).flat();
+  const cases = Object.keys(scenes).map(Number).filter((number) => number > 1);
+  const errors = {};
+  for (const program of Object.keys(original)) {
+    errors[program] = cases.map((number) => {
+      const found = run(number, program, { without });
+      return distance(found, reference(found.scene, found.times));
+    });
+    draw(element(`chart-race-${listing}`), program, cases, errors[program]);
+  }
+  show("corrected", listing);
+  if (listing === "original") return;
+  const ratios = cases.map((_, n) => {
+    const both = ["two-term", "four-term"].map((name) => errors[name][n] / errors["runge-kutta"][n]);
+    return both.sort((x, y) => x - y);
+  });
+  const known = ratios.filter((_, n) => cases[n] !== 7);
+  fill("ratio", ratios[0][0]);
+  fill("least-ratio", Math.min(...known.map(([least]) => least)));
+  fill("most-ratio", Math.max(...known.map(([, most]) => most)));
+  fill("seven-least", ratios.at(-1)[0]);
+  fill("seven-most", ratios.at(-1)[1]);
+}
+
+onChange(["trust"], claim);
+answer.hidden = true;
+draw(element("chart-stop"), "runge-kutta", [], []);
+choosePrediction();
+element("prediction").addEventListener("input", choosePrediction);
+element("run").addEventListener("click", predict);
+element("step").addEventListener("input", turn);
+element("omega-alone").addEventListener("change", turn);
+turn();
+element("step-size").addEventListener("change", slow);
+onChange(["fault"], slow);
+onChange(["blind-case", "blind-program"], blind);
+onChange(["race"], race);

@@ -1,4 +1,4 @@
-"""The formulas of sections II to IV of the thesis, as MathML, with the cards that carry them."""
+"""The formulas of sections II to IV of the thesis, as MathML, with the cards that compute them."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -23,7 +23,7 @@ class Formula(NamedTuple):
     what : Markup
         One sentence that says what the formula is, as HTML.
     cards : dict of str to str
-        By program, the numbers of the cards that carry the formula; empty if no card does.
+        By program, the numbers of the cards that compute the formula; empty if no card does.
     entry : str
         The entry of the critical apparatus about the formula, or an empty text.
     """

@@ -15,7 +15,6 @@ from pyharness.original.cards import deck, numbers
 FORMULAS: list[dict[str, Any]] = facts("formulas")["formula"]
 THESIS = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
 VELOCITY = entry("translational-block")["cards"]  # the cards of the translational velocity
-COLLOCATION = ("two-term", "four-term")
 
 
 def _first_to_last(number: str) -> list[str]:
@@ -110,10 +109,10 @@ def test_cards_are_those_under_the_citation_of_the_port(program: str) -> None:
 
 def test_coefficients_are_on_the_cards_that_the_port_cites() -> None:
     text = (shipped("fortran/original") / "deck.fypp").read_text()
-    told = re.findall(r"of equations (13-15)\. Two-term (\S+), four-term (\S+), Runge-Kutta (\S+)\.",
-                      text)  # fmt: skip
+    ranges = r"Two-term (\S+), four-term (\S+), Runge-Kutta (\S+)\."
+    told = re.findall(rf"of equations 13-15\. {ranges}", text)
     assert len(told) == 1
-    for program, cards in zip(("two-term", "four-term", "runge-kutta"), told[0][1:], strict=True):
+    for program, cards in zip(("two-term", "four-term", "runge-kutta"), told[0], strict=True):
         assert set(numbers(cards)) <= _cards(BY_NUMBER["13"], program)
 
 
@@ -124,12 +123,16 @@ def test_cards_are_those_of_the_collation() -> None:
     for row in facts("cards/collation")["row"]:
         text = row.get("text", "")
         named = {number: BY_NUMBER[number] for number in _cited(text)}
-        named |= {place: steps[place] for place in re.findall(r"IV\.2 [a-i]", text) if place in steps}
+        named |= {
+            place: steps[place] for place in re.findall(r"IV\.2 [a-i]", text) if place in steps
+        }
         for place, formula in named.items():
             # What the row says of the other method is about another formula of the same row.
-            own = ("runge-kutta",) if place in ("19", "31") else (*COLLOCATION, "runge-kutta")
-            if place in steps or place.startswith("3") and place != "31":
-                own = COLLOCATION
+            own = set(PROGRAMS)
+            if place in ("19", "31"):
+                own = {"runge-kutta"}
+            elif place in steps or place.startswith("3"):
+                own = {"two-term", "four-term"}
             for program in own:
                 cards = _omega(program, set(numbers(row["cards"].get(program, ""))))
                 alike = {"16", "17", "18"}

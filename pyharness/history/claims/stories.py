@@ -42,7 +42,9 @@ def story(judgement: Judgement) -> Story:
     def number(field: re.Match[str]) -> str:
         programs, which, name, percent = field.groups()
         found = outcomes[programs].numbers
-        fitting = [x for each, x in found.items() if (fnmatchcase(each, name) if which else each == name)]
+        fitting = [
+            x for each, x in found.items() if (fnmatchcase(each, name) if which else each == name)
+        ]
         if not fitting:
             raise ValueError(f"claim {judgement.claim['id']} has no number {field[0]}")
         x = min(fitting) if which == "min" else max(fitting)
@@ -60,4 +62,5 @@ def prose(x: float) -> str:
         rounded = float(f"{x:.3g}")
         return f"{rounded:,.0f}" if rounded == int(rounded) else f"{rounded:g}"
     mantissa, exponent = f"{x:.2e}".split("e")
-    return f"{float(mantissa):g} × 10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+    power = str(int(exponent)).translate(_SUPERSCRIPTS)
+    return f"{float(mantissa):g} \N{MULTIPLICATION SIGN} 10{power}"

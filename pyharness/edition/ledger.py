@@ -15,7 +15,7 @@ from pyharness.history.apparatus_report import FIELDS, entry_report
 from pyharness.history.claims.evidence import evidence
 from pyharness.history.claims.evidence_report import evidence_report
 from pyharness.history.claims.ledger import Judgement, claims, judgement
-from pyharness.history.claims.report import KINDS, claims_report, explanation, kinds_table
+from pyharness.history.claims.report import KINDS, claims_report, kinds_table
 from pyharness.history.claims.sentences import Sentence, sentences
 from pyharness.history.claims.stories import Story, story
 from pyharness.history.claims.verdicts import REPRODUCED

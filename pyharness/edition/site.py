@@ -29,8 +29,8 @@ from pyharness.views.json import json_text
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-# The entries of the menu, in order: the title of a section, and title and path of each of its pages.
-# The entry of a section links to its first page.
+# The menu: the title of each section, and title and path of its pages. The entry of a section links
+# to its first page.
 MENU = {
     "Story": (("Story", "index.html"),),
     "Programs": (

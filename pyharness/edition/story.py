@@ -33,6 +33,7 @@ BLIND_CASES = (1, 2, 5)
 RACE_CASES = (2, 3, 4, 5, 6, 7)
 # The plot area of every chart in the units of its picture: left, top, right, bottom.
 BOX = (40, 10, 350, 196)
+_TIMES = "\N{NO-BREAK SPACE}\N{MULTIPLICATION SIGN}\N{NO-BREAK SPACE}"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _DOUBLED = (0.01, 0.005, 0.0025, 0.00125)  # s
 _LOG_STEP = 2  # powers of ten from one label to the next
@@ -49,8 +50,9 @@ class Chart(NamedTuple):
     """A chart with fixed axes, as numbers for an SVG picture.
 
     `x` and `y` are the ranges of the axes. On a logarithmic axis `y` has powers of ten: the
-    exponents of its ends. If `is_marked` is true, the curves are drawn as separate marks. `x_ticks` and `y_ticks` are pairs of a position in the picture and a
-    label. `axes` names both axes with their units.
+    exponents of its ends. `x_ticks` and `y_ticks` are pairs of a position in the picture and a
+    label. `axes` names both axes with their units. If `is_marked` is true, each point is drawn as a
+    mark, and no line joins the points.
     """
 
     name: str
@@ -65,12 +67,12 @@ class Chart(NamedTuple):
 
 
 def brief(value: float, digits: int = 3) -> str:
-    """Return a number with some significant digits, for reading, as in `3305` or `2.5 × 10⁻⁷`."""
+    """Return a number with some significant digits, for reading, perhaps with a power of ten."""
     mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
     if value == 0.0 or -4 <= int(power) < 6:
         return format(Decimal(f"{mantissa}e{power}").normalize(), "f")
     shown = format(Decimal(mantissa).normalize(), "f")
-    return f"{shown} × 10{str(int(power)).translate(_SUPERSCRIPTS)}"
+    return f"{shown}{_TIMES}10{str(int(power)).translate(_SUPERSCRIPTS)}"
 
 
 def data() -> dict[str, Any]:
@@ -99,9 +101,7 @@ def context() -> dict[str, Any]:
         _chart_of_case("claim", 2, LETTERS.values(), (-1.2, 1.4)),
         _chart_of_case("stop", 2, ["runge-kutta"], (-1.2, 1.4)),
         _velocity_chart(stopped),
-        _chart(
-            "quotient", ("step", "quotient, 1/s"), (0, 100), (0, 5), _powers(0, 5), is_log=True
-        ),
+        _chart("quotient", ("step", "quotient, 1/s"), (0, 100), (0, 5), _powers(0, 5), is_log=True),
         limit,
         *(_chart_of_case(f"blind-{n}", n, ["runge-kutta"], _span(n)) for n in BLIND_CASES),
         *(_race_chart(listing) for listing in ("original", "corrected")),
@@ -115,8 +115,8 @@ def context() -> dict[str, Any]:
         "step_sizes": _DOUBLED,
         "stopped": stopped,
         "stop_error": float(abs(stopped.omega - _truth(2).omega[: stopped.steps])[:, 0].max()),
-        "peak": float(stopped.velocity[-2, 1]),
-        "after": float(stopped.velocity[-1, 1]),
+        "peak": _second_velocity(stopped)[-2],
+        "after": _second_velocity(stopped)[-1],
         "limits": _distances(),
         "alone": _run(2, "runge-kutta", without=["lipschitz-tests-velocity"]),
         "right": _run(2, "runge-kutta", without=facts("account")["mechanism"]["alone"]),
@@ -195,7 +195,7 @@ def _distances() -> dict[str, float]:
 
 
 def _span(case: int) -> tuple[float, float]:
-    """Return a range that holds the true omega1 of a case and what lies near it."""
+    """Return a range that holds the true omega1 of a case and a margin."""
     values = [case_scene(case).omega[0], *_truth(case).omega[:, 0]]
     low, high = min(values), max(values)
     margin = 0.25 * (high - low)
@@ -217,9 +217,15 @@ def _chart_of_case(
 
 
 def _velocity_chart(run: Trajectory) -> Chart:
-    velocity = [0.0, *run.velocity[:, 1]]
+    velocity = [0.0, *_second_velocity(run)]
     found = _chart("velocity", ("step", "V2, m/s"), (0, 100), (-0.01, 0.025), _even(-0.01, 0.025))
     return found._replace(curves=[_curve(found, "runge-kutta", range(len(velocity)), velocity)])
+
+
+def _second_velocity(run: Trajectory) -> list[float]:
+    """Return the velocity V2 (m/s) after each step of a run."""
+    assert run.velocity is not None
+    return [float(row[1]) for row in run.velocity]
 
 
 def _race_chart(listing: str) -> Chart:

@@ -53,10 +53,21 @@ def test_every_statement_is_in_its_documents_word_for_word() -> None:
             assert part in _document(name), (part, name)
 
 
-def test_home_page_takes_its_sentences_from_the_data() -> None:
-    page = (ROOT / "pyharness/edition/templates/index.html").read_text()
-    used = set(re.findall(r"account(?:\.|\[\")([a-z-]+)", page))
-    assert used == {"work", "conclusion", "each-alone", "together", "stop", "units", *PARTS}
+def test_pages_take_their_sentences_from_the_data() -> None:
+    folder = ROOT / "pyharness/edition/templates"
+    used = {
+        name: set(re.findall(r"account(?:\.|\[\")([a-z-]+)", (folder / name).read_text()))
+        for name in ("index.html", "about.html")
+    }
+    assert used == {
+        "index.html": {"work", "units"},
+        "about.html": {"conclusion", "work", "machine", "units"},
+    }
+    home = (folder / "index.html").read_text()
+    for name in MECHANISM["alone"]:
+        assert f"apparatus.html#{name}" in home
+    assert "mechanism.limit" in home
+    assert r'"$2\\,\\sin 2.5t$"' in home
 
 
 def test_dates_are_those_of_the_title_page_and_the_foreword() -> None:
@@ -207,7 +218,7 @@ def test_emulated_words_are_told_of_where_they_are_had() -> None:
     assert (shipped("docs") / "explanation/words.md").exists()
 
 
-def test_numbers_of_readme_home_page_and_reconstruction_are_those_of_runs_and_cards() -> None:
+def test_numbers_of_readme_and_reconstruction_are_those_of_runs_and_cards() -> None:
     scene = case_scene(3)
     printed, mended = (
         run_program(scene, each("runge-kutta")) for each in (Listing.original, Listing.corrected)
@@ -220,8 +231,7 @@ def test_numbers_of_readme_home_page_and_reconstruction_are_those_of_runs_and_ca
     assert f"stops at step {printed.stop.step} because a translational *velocity*" in told
     assert printed.stop.variable.startswith("V")
     assert "errors are a million times those of the corrected program" in told
-    home = _document("pyharness/edition/templates/index.html")
-    for text in (told, home):
-        assert f"after {MECHANISM['stopped']['step']} steps" in text
+    # Those of the home page are held by tests/edition/test_story.py.
+    assert f"after {MECHANISM['stopped']['step']} steps" in told
     cards = sum(len(deck(each).cards) for each in PROGRAMS)
     assert f"one row for each of {cards} cards" in _document("docs/explanation/reconstruction.md")

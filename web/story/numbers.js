@@ -4,5 +4,5 @@ export function brief(value, digits = 3) {
   const [mantissa, power] = value.toExponential(digits - 1).split("e");
   if (value === 0 || (power >= -4 && power < 6)) return String(Number(value.toPrecision(digits)));
   const raised = [...String(Number(power))].map((each) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(each)]);
-  return `${Number(mantissa)} × 10${raised.join("")}`;
+  return `${Number(mantissa)}\u00a0×\u00a010${raised.join("")}`;
 }

@@ -1,0 +1,220 @@
+"""The six scenes of the story in a browser: each with its action, and the twins' numbers."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from selenium.webdriver import Chrome, Keys
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.select import Select
+
+from pyharness import case_scene, run_program
+from pyharness.edition import story
+from pyharness.model.listing import Listing, subset
+from pyharness.truth.reference import reference
+from tests.browser.screen import errors, screen
+
+pytestmark = pytest.mark.usefixtures("page")
+
+
+@pytest.fixture
+def page(browser: Chrome, site: Path) -> Iterator[None]:
+    """Open the story on a wide screen; its console must stay empty."""
+    errors(browser)
+    with screen(browser, 1200):
+        browser.get("about:blank")
+        browser.get((site / "index.html").as_uri())
+        yield
+    assert errors(browser) == []
+
+
+def _click(browser: Chrome, selector: str) -> None:
+    """Click as a mouse does, where the element can be seen."""
+    element = browser.find_element(By.CSS_SELECTOR, selector)
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
+    element.click()
+
+
+def _value(browser: Chrome, slot: str) -> float:
+    (found,) = browser.find_elements(By.CSS_SELECTOR, f"data[data-slot='{slot}']")
+    assert found.is_displayed(), slot
+    return float(str(found.get_dom_attribute("value")))
+
+
+def _text(browser: Chrome, scene: str) -> str:
+    return browser.find_element(By.CSS_SELECTOR, f"#{scene} .answer").text
+
+
+def _points(browser: Chrome, chart: str, curve: str) -> str:
+    found = browser.find_element(By.CSS_SELECTOR, f"#chart-{chart} [data-curve='{curve}']")
+    return str(found.get_dom_attribute("points"))
+
+
+def _first_points(chart: str, curve: str) -> str:
+    (found,) = [x.points for x in story.context()["charts"][chart].curves if x.name == curve]
+    return str(found)
+
+
+def _largest(case: int, program: str, listing: Listing) -> float:
+    scene = case_scene(case)
+    run = run_program(scene, listing, "python")
+    truth = reference(scene, scene.times()).omega[: run.steps]
+    return float(np.abs(run.omega - truth).max())
+
+
+@pytest.mark.parametrize(("letter", "has"), [("A", "two collocation"), ("B", "Runge-Kutta")])
+def test_a_reader_chooses_a_program_to_trust(browser: Chrome, letter: str, has: str) -> None:
+    assert _text(browser, "claim") == ""
+    _click(browser, f"input[name=trust][value={letter}]")
+    assert has in _text(browser, "claim")
+    stopped = run_program(case_scene(2), subset("runge-kutta"), "python")
+    if letter == "B":
+        assert _value(browser, "stop-step") == stopped.steps
+    for name in story.LETTERS.values():
+        assert _points(browser, "claim", name) == _first_points("claim", name)
+
+
+def test_a_reader_predicts_before_the_run(browser: Chrome) -> None:
+    assert _points(browser, "stop", "runge-kutta") == ""
+    assert not browser.find_element(By.CSS_SELECTOR, "#stop .answer").is_displayed()
+    slider = browser.find_element(By.ID, "prediction")
+    before = _points(browser, "stop", "prediction")
+    slider.send_keys(Keys.ARROW_LEFT * 10)
+    assert _points(browser, "stop", "prediction") != before
+    _click(browser, "#run")
+    stop = run_program(case_scene(2), subset("runge-kutta"), "python").stop
+    assert stop is not None
+    assert _value(browser, "predicted") == 40
+    assert _value(browser, "run-step") == stop.step
+    assert _value(browser, "quotient") == stop.quotient
+    assert f"was {stop.variable}," in _text(browser, "stop")
+    assert _points(browser, "stop", "runge-kutta") == _first_points("stop", "runge-kutta")
+
+
+def test_v2_turns_and_its_quotient_leaps(browser: Chrome) -> None:
+    run = run_program(case_scene(2), subset("runge-kutta"), "python")
+    assert run.velocity is not None
+    assert run.stop is not None
+    assert _value(browser, "at-quotient") == run.stop.quotient
+    assert _points(browser, "velocity", "runge-kutta") == _first_points("velocity", "runge-kutta")
+    slider = browser.find_element(By.ID, "step")
+    slider.send_keys(Keys.ARROW_LEFT * 15)
+    assert _value(browser, "at-step") == 10
+    assert _value(browser, "at-velocity") == run.velocity[9, 1]
+    assert 0.0 < _value(browser, "at-quotient") < 500.0
+    _click(browser, "#omega-alone")
+    alone = subset("runge-kutta", fix=["lipschitz-tests-velocity"])
+    stop = run_program(case_scene(2), alone, "python").stop
+    assert stop is not None
+    assert _value(browser, "alone-step") == stop.step
+    assert slider.get_dom_attribute("max") == str(stop.step)
+    # The slider keeps its step if the run becomes shorter than it.
+    slider.send_keys(Keys.END)
+    assert _value(browser, "at-step") == stop.step
+    _click(browser, "#omega-alone")
+    assert _value(browser, "at-step") == run.stop.step
+
+
+def test_either_fault_can_be_switched_off(browser: Chrome) -> None:
+    assert _points(browser, "half-speed", "runge-kutta") == _first_points(
+        "half-speed", "runge-kutta"
+    )
+    both = _value(browser, "from-limit")
+    Select(browser.find_element(By.ID, "step-size")).select_by_index(3)
+    assert _value(browser, "from-limit") < 0.2 * both
+    scene = case_scene(2)
+    finer = replace(scene, step_size=0.01 / 8, steps=800)
+    truth = reference(finer, finer.times()).omega[:, 0]
+    fixes: list[str] = []
+    for fault, slot in (("stage-base", "one-solution"), ("base-not-restored", "none-solution")):
+        fixes.append(fault)
+        _click(browser, f"input[name=fault][value={fault}]")
+        listing = subset("runge-kutta", fix=fixes)
+        run = run_program(finer, listing, "python", may_stop=False)
+        expected = np.abs(run.omega[:, 0] - truth).max()
+        assert _value(browser, slot) == pytest.approx(expected, rel=1e-9, abs=1e-14)
+        assert not browser.find_elements(By.CSS_SELECTOR, "[data-slot=from-limit]")[
+            0
+        ].is_displayed()
+
+
+def test_faults_hide_in_case_1_and_show_in_case_5(browser: Chrome) -> None:
+    assert _value(browser, "blind-error-1") < 1e-14
+    for case, program in ((5, "runge-kutta"), (5, "two-term"), (2, "four-term")):
+        _click(browser, f"input[name=blind-program][value={program}]")
+        _click(browser, f"input[name=blind-case][value='{case}']")
+        expected = _largest(case, program, subset(program))
+        assert _value(browser, f"blind-error-{case}") == pytest.approx(expected, rel=1e-12)
+        assert story.NAMES[program] in _text(browser, "blind")
+        shown = [
+            each.get_dom_attribute("id")
+            for each in browser.find_elements(By.CSS_SELECTOR, "#blind .chart")
+            if each.is_displayed()
+        ]
+        assert shown == [f"chart-blind-{case}"]
+
+
+def test_corrected_programs_are_run_beside_the_printed_ones(browser: Chrome) -> None:
+    for listing in ("corrected", "original"):
+        _click(browser, f"input[name=race][value={listing}]")
+        for program in story.NAMES:
+            drawn = _points(browser, f"race-{listing}", program)
+            assert drawn == _first_points(f"race-{listing}", program)
+    errors = [_largest(2, name, Listing.corrected(name)) for name in ("four-term", "runge-kutta")]
+    assert _value(browser, "ratio") == pytest.approx(errors[0] / errors[1], rel=1e-9)
+
+
+def test_all_actions_can_be_reached_with_the_keyboard(browser: Chrome) -> None:
+    reached = []
+    for _ in range(60):
+        browser.switch_to.active_element.send_keys(Keys.TAB)
+        focus = browser.switch_to.active_element
+        reached.append(focus.get_dom_attribute("id") or focus.get_dom_attribute("name"))
+    wanted = "trust prediction run step omega-alone fault step-size blind-case blind-program race"
+    assert set(wanted.split()) <= set(reached)
+
+
+def test_the_story_can_be_read_in_four_minutes(browser: Chrome) -> None:
+    """A reader who takes every action once sees fewer words than 250 a minute."""
+    for selector in ("input[name=trust]", "#run", "#omega-alone", "input[value=corrected]"):
+        _click(browser, selector)
+    script = """
+      const words = ".scene :is(p, h2, legend, label, figcaption, button)";
+      const shown = [...document.querySelectorAll(words)].filter((each) => each.checkVisibility());
+      return shown.map((each) => each.textContent);
+    """
+    words = " ".join(browser.execute_script(script)).split()
+    assert 600 < len(words) < 1000, len(words)
+
+
+def test_without_scripts_the_story_can_be_read(browser: Chrome, site: Path) -> None:
+    browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
+    try:
+        browser.get((site / "index.html").as_uri())
+        text = browser.find_element(By.TAG_NAME, "main").text
+        for told in ("ended at step 25 of 100", "Case 5, Runge-Kutta", "times smaller", "step 62"):
+            assert told in text
+        assert "One fault: the curve is 0 " not in text
+        assert not browser.find_element(By.ID, "run").is_displayed()
+        assert _points(browser, "stop", "runge-kutta") != ""
+    finally:
+        browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+
+
+def test_the_menu_of_a_phone_takes_a_line_until_it_is_opened(browser: Chrome, site: Path) -> None:
+    with screen(browser, 360):
+        browser.get((site / "index.html").as_uri())
+        header = browser.find_element(By.CSS_SELECTOR, "header.top")
+        entry = browser.find_element(By.CSS_SELECTOR, "nav a[href='laboratory.html']")
+        assert header.size["height"] < 60
+        picture = browser.find_element(By.ID, "chart-claim")
+        assert picture.location["y"] + picture.size["height"] < 740
+        assert not entry.is_displayed()
+        button = browser.find_element(By.ID, "menu")
+        button.send_keys(Keys.ENTER)
+        assert button.get_dom_attribute("aria-expanded") == "true"
+        assert entry.is_displayed()
+        button.send_keys(Keys.ENTER)
+        assert header.size["height"] < 60

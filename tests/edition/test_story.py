@@ -1,0 +1,206 @@
+"""The story without a browser: its numbers, curves and words are those of the programs."""
+
+import json
+import random
+import subprocess
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pyharness import case_scene, run_program
+from pyharness.edition import story
+from pyharness.edition.story import brief
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS, Listing, subset, switches
+from pyharness.truth.reference import reference
+from tests.edition.pages import pages
+from tests.ports import WEB, engine
+
+ROOT = Path(__file__).parents[2]
+EDITION = facts("account")["edition"]
+
+
+class Slots(HTMLParser):
+    """The numbers of a page by their slots, and their texts."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.values: dict[str, float] = {}
+        self.digits: dict[str, int] = {}
+        self.texts: dict[str, str] = {}
+        self._open = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Record a number."""
+        found = dict(attrs)
+        if tag == "data":
+            self._open = str(found["data-slot"])
+            assert self._open not in self.values
+            self.values[self._open] = float(str(found["value"]))
+            self.digits[self._open] = int(str(found["data-digits"]))
+
+    def handle_data(self, data: str) -> None:
+        """Record the text of a number."""
+        if self._open:
+            self.texts[self._open] = data
+            self._open = ""
+
+
+@pytest.fixture(scope="module")
+def slots(built_site: dict[str, bytes]) -> Slots:
+    return Slots(built_site["index.html"].decode())
+
+
+def _error(case: int, program: str, listing: str, components: slice = slice(None)) -> float:
+    scene = case_scene(case)
+    run = run_program(scene, getattr(Listing, listing)(program), "python")
+    truth = reference(scene, scene.times()).omega[: run.steps]
+    return float(np.abs(run.omega - truth)[:, components].max())
+
+
+def test_numbers_of_the_first_states_are_those_of_the_twins(slots: Slots) -> None:
+    found = slots.values
+    first = slice(0, 1)
+    stopped = run_program(case_scene(2), subset("runge-kutta"), "python")
+    assert stopped.stop is not None
+    assert stopped.velocity is not None
+    assert found["stop-step"] == found["run-step"] == found["at-step"] == stopped.stop.step == 25
+    assert found["quotient"] == found["at-quotient"] == stopped.stop.quotient
+    assert found["peak"] == stopped.velocity[23, 1] == stopped.velocity[:, 1].max()
+    assert found["after"] == found["at-velocity"] == stopped.velocity[24, 1]
+    assert found["sine"] == _error(2, "two-term", "original", first)
+    assert found["sine"] == pytest.approx(_error(2, "four-term", "original", first), rel=1e-9)
+    assert found["stop-error"] == _error(2, "runge-kutta", "original", first)
+    assert found["sine-corrected"] == _error(2, "runge-kutta", "corrected", first)
+    assert found["lipschitz"] == facts("cases")["deck"]["lipschitz"]
+    for case in (1, 2, 5):
+        run = run_program(case_scene(case), subset("runge-kutta"), "python")
+        assert found[f"blind-steps-{case}"] == run.steps
+        assert found[f"blind-error-{case}"] == _error(case, "runge-kutta", "original")
+
+
+def test_what_ends_a_run_whose_omega_is_right(slots: Slots, built_site: dict[str, bytes]) -> None:
+    alone = run_program(
+        case_scene(2), subset("runge-kutta", fix=["lipschitz-tests-velocity"]), "python"
+    )
+    right = run_program(
+        case_scene(2), subset("runge-kutta", fix=["stage-base", "base-not-restored"]), "python"
+    )
+    assert alone.stop is not None
+    assert right.stop is not None
+    assert slots.values["alone-step"] == alone.stop.step
+    assert slots.values["right-step"] == right.stop.step
+    # The page says that both variables are at a turning point there.
+    for run in (alone, right):
+        assert run.stop is not None
+        assert run.stop.variable == "U1"
+        change = np.abs(np.diff(run.omega[:, 0]))
+        assert change[-1] == change.min() < 0.02 * change.max()
+    truth = reference(case_scene(2), list(right.time)).omega
+    assert np.abs(right.omega - truth).max() < 1e-5
+    assert b'data-text="alone-variable">U1<' in built_site["index.html"]
+
+
+def test_ratios_are_those_of_the_largest_errors(slots: Slots) -> None:
+    ratios = {
+        case: [
+            _error(case, name, "corrected") / _error(case, "runge-kutta", "corrected")
+            for name in ("two-term", "four-term")
+        ]
+        for case in range(2, 8)
+    }
+    found = slots.values
+    assert found["ratio"] == min(ratios[2])
+    assert found["least-ratio"] == min(min(ratios[case]) for case in range(2, 7))
+    assert found["most-ratio"] == max(max(ratios[case]) for case in range(2, 7))
+    assert [found["seven-least"], found["seven-most"]] == sorted(ratios[7])
+    # "The conclusion was false of the methods" rests on this.
+    assert min(min(each) for each in ratios.values()) > 1.0
+
+
+def test_sentences_about_checks_that_see_no_fault_are_true(built_site: dict[str, bytes]) -> None:
+    for program in PROGRAMS:
+        last = run_program(case_scene(1), subset(program), "python").omega[-1]
+        np.testing.assert_allclose(last, 3.5, rtol=1e-14)
+    for program in ("two-term", "four-term"):
+        original, corrected = (
+            run_program(case_scene(2), listing(program), "python").omega
+            for listing in (Listing.original, Listing.corrected)
+        )
+        np.testing.assert_allclose(original, corrected, rtol=1e-13, atol=1e-14)
+    assert _error(5, "runge-kutta", "original") > 1.0
+    assert _error(5, "two-term", "original") > 1000.0 * _error(5, "two-term", "corrected")
+    assert b"right\n3.5 rad/s" in built_site["index.html"]
+    evaluations = story.context()["evaluations"]
+    for program in PROGRAMS:
+        run = run_program(case_scene(2), Listing.corrected(program))
+        assert run.evaluations == 100 * evaluations[program]
+
+
+def test_the_limit_of_both_faults_is_the_sine_of_half_the_speed(slots: Slots) -> None:
+    active = set(switches("runge-kutta"))
+    scene = case_scene(2)
+    for parts in (1, 8):
+        finer = replace(scene, step_size=0.01 / parts, steps=100 * parts)
+        times = np.array(finer.times())
+        run = run_program(finer, Listing("runge-kutta", active), "python", may_stop=False)
+        from_limit = np.abs(run.omega[:, 0] - 2.0 * np.sin(2.5 * times)).max()
+        from_truth = np.abs(run.omega[:, 0] - np.sin(5.0 * times)).max()
+        if parts == 1:
+            assert slots.values["from-limit"] == pytest.approx(from_limit, rel=1e-12)
+            assert slots.values["from-solution"] == pytest.approx(from_truth, rel=1e-12)
+        else:
+            assert from_limit < 0.2 * slots.values["from-limit"]
+
+
+def test_48_bits_stop_the_run_too() -> None:
+    run = run_program(case_scene(2), Listing.original("runge-kutta"), "python", word="cdc48")
+    assert run.stop == story.context()["in_48_bits"].stop
+    assert run.stop is not None
+    assert (run.stop.step, run.stop.variable) == (25, "V2")
+
+
+def test_texts_are_brief_forms_of_the_values(slots: Slots) -> None:
+    assert len(slots.values) > 25
+    for slot, value in slots.values.items():
+        assert slots.texts[slot] == brief(value, slots.digits[slot]), slot
+
+
+def test_both_languages_write_a_number_alike() -> None:
+    generator = random.Random(29)
+    numbers = [
+        (generator.choice((-1, 1)) * 10.0 ** generator.uniform(-20, 20), generator.randint(1, 6))
+        for _ in range(2000)
+    ]
+    numbers += [(0.0, 3), (3304.7, 4), (999999.0, 2), (9.9999e-5, 2), (1e-4, 3), (0.5, 1)]
+    script = (
+        f"import {{ brief }} from {json.dumps(str(WEB / 'story' / 'numbers.js'))};"
+        "import { readFileSync } from 'node:fs';"
+        "console.log(JSON.stringify(JSON.parse(readFileSync(0)).map(([x, n]) => brief(x, n))));"
+    )
+    done = subprocess.run(
+        [engine(), "--input-type=module", "--eval", script],
+        input=json.dumps(numbers), capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert json.loads(done.stdout) == [brief(value, digits) for value, digits in numbers]
+
+
+def test_the_home_page_is_light(built_site: dict[str, bytes]) -> None:
+    home = pages(built_site)["index.html"]
+    loaded = {path for element, path, _ in home.targets if element != "a"}
+    assert "assets/story.js" in loaded
+    assert sum(len(built_site[path]) for path in {"index.html", *loaded}) < 150e3
+
+
+def test_the_name_of_the_edition_is_everywhere(built_site: dict[str, bytes]) -> None:
+    home = built_site["index.html"].decode()
+    assert f"<h1>{EDITION['name']}</h1>" in home
+    assert f"<title>{EDITION['name']}</title>" in home
+    for name in ("index.html", "about.html"):
+        assert EDITION["subtitle"] in built_site[name].decode()
+    assert EDITION["name"] in (ROOT / "README.md").read_text()
+    assert EDITION["name"] in (ROOT / "CITATION.cff").read_text()

@@ -17,6 +17,12 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 SECONDS = 28.0
+# Tests of a file that no test names, by the beginning of its path. Those of a package follow.
+USERS = {
+    "fortran/original": "tests/original", "fortran/many/lanes": "tests/original",
+    "fortran": "tests/methods", "web": "tests/edition", "pyharness/edition": "tests/edition",
+    "pyharness/data": "tests/history", "pyharness/__main__": "tests/cli",
+}  # fmt: skip
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -61,27 +67,61 @@ def sources() -> dict[str, str]:
 
 
 def nearest(paths: Sequence[str], tests: dict[str, str]) -> list[str]:
-    """Return the test files to run: changed ones, those of a changed file's name, those naming it.
+    """Return the test files to run, the nearest first.
 
-    A test names a module of Python that it imports, and any other file by its name.
+    The nearest are the changed test files, then those of a changed file's name. Tests of a module
+    of Python follow by the number of imports from the test to the module. Tests of any other file
+    name it; if none does, they are those of the folder that uses it.
     """
-    ranks: dict[str, int] = {}
+    ranks: dict[str, tuple[int, bool]] = {}
     for path in paths:
         stem = Path(path).stem
-        module = path.removesuffix(".py").replace("/", ".") if path.endswith(".py") else None
+        folder = Path(path).parent.name
+        near = importers(path) if path.endswith(".py") else {}
+        found = {}
         for test, text in tests.items():
             if path == test:
-                rank = 0
+                found[test] = 0
             elif Path(test).stem == f"test_{stem}":
-                rank = 1
-            elif module and module in imported(text):
-                rank = 2
-            elif module is None and re.search(rf"\b{re.escape(stem)}\b", text):
-                rank = 3
-            else:
-                continue
+                found[test] = 1
+            elif between := [near[name] for name in imported(text) if name in near]:
+                found[test] = 2 + min(between)
+            elif not path.endswith(".py") and re.search(rf"\b{re.escape(stem)}\b", text):
+                found[test] = 2
+        if not found:
+            of_package = {f"pyharness/{each}": f"tests/{each}" for each in Path(path).parts[1:2]}
+            every = [*USERS.items(), *of_package.items()]
+            users = [user for begin, user in every if path.startswith(begin)][:1]
+            found = {test: 2 for test in tests for user in users if test.startswith(user)}
+        for test, steps in found.items():
+            rank = (steps, Path(test).parent.name != folder)
             ranks[test] = min(rank, ranks.get(test, rank))
     return sorted(ranks, key=lambda test: (ranks[test], test))
+
+
+def importers(path: str) -> dict[str, int]:
+    """Return the modules that import a module, by the number of imports between them."""
+    found = {_module(path): 0}
+    last = list(found)
+    while last:
+        distance = found[last[0]] + 1
+        last = sorted({user for name in last for user in users_of().get(name, ())} - set(found))
+        found |= dict.fromkeys(last, distance)
+    return found
+
+
+@cache
+def users_of() -> dict[str, set[str]]:
+    """Return the modules of the package and of the tests that import a module, by its name."""
+    found: dict[str, set[str]] = {}
+    for path in [*(ROOT / "pyharness").rglob("*.py"), *(ROOT / "tests").rglob("*.py")]:
+        for name in imported(path.read_text()):
+            found.setdefault(name, set()).add(_module(str(path.relative_to(ROOT))))
+    return found
+
+
+def _module(path: str) -> str:
+    return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
 
 
 @cache

@@ -1,7 +1,8 @@
-"""`python -m tests.style [FILE ...]`: find expressions that the project's prose does not use.
+"""`python -m tests.style [FILE ...]`: find what the project's prose and imports do not use.
 
-It reads docstrings and comments of Python, Fortran and C, and documents, outside code and
-quotations. Exit status 1 if it finds any. `style.toml` has the expressions.
+Expressions are searched in docstrings and comments of Python, Fortran and C, and in documents,
+outside code and quotations; `style.toml` has them. A private name that is imported from another
+package is found too. Exit status 1 if there is any.
 """
 
 import ast
@@ -16,6 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 TERMS = tomllib.loads((Path(__file__).parent / "style.toml").read_text())
 _FOLDERS = ("pyharness", "fortran", "docs", "web/programs", "web/laboratory", "tests")
+_SHARED = ("_build", "_kernels", "_many", "_solver")
 _NOT = ("_build.py",)  # written by the build
 _CODE = re.compile(
     r"```.*?```|``.*?``|`[^`]*`|\$[^$]*\$|\"[^\"\n]*\"|“[^”]*”|\]\([^)]*\)|(?<!\w)'[^'\n]+'(?!\w)"
@@ -78,6 +80,23 @@ def findings(path: Path) -> Iterator[tuple[int, str, str]]:
                 yield first, begin[1], instead
 
 
+def private_imports(text: str, package: str) -> Iterator[tuple[int, str]]:
+    """Yield line and name of each private name that a module imports from another package.
+
+    `package` is that of the module, as in ``pyharness.model`` or ``tests.cli``. The compiled
+    modules of pyharness and `_build` are no one's private names.
+    """
+    for node in ast.walk(ast.parse(text)):
+        if not isinstance(node, ast.ImportFrom) or node.module is None:
+            continue
+        parts = node.module.split(".")
+        if parts[0] not in ("pyharness", "tests") or ".".join(parts[:2]) == package:
+            continue
+        for name in [*parts[1:], *(each.name for each in node.names)]:
+            if re.match("_(?!_)", name) and name not in _SHARED:
+                yield node.lineno, f"{node.module}.{name}"
+
+
 def main(arguments: list[str]) -> int:
     """Print what is found in the files, by default in all."""
     paths = [Path(each).resolve() for each in arguments] or files()
@@ -87,6 +106,11 @@ def main(arguments: list[str]) -> int:
             shown = " ".join(found.split())
             print(f"{path.relative_to(ROOT)}:{line}: '{shown}'; write: {instead}")
             count += 1
+        if path.suffix == ".py":
+            package = ".".join(path.relative_to(ROOT).with_suffix("").parts[:2])
+            for line, name in private_imports(path.read_text(), package):
+                print(f"{path.relative_to(ROOT)}:{line}: {name} is private to its package")
+                count += 1
     return int(count > 0)
 
 

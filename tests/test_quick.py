@@ -23,6 +23,8 @@ TESTS = {
         ("fortran/modern/taylor_march.f90", ["test_other"]),
         ("tests/truth/test_other.py", ["test_other"]),
         ("docs/index.md", []),
+        ("pyharness/methods/registry.py", ["test_taylor", "test_plan"]),
+        ("fortran/modern/sphere.f90", ["test_plan", "test_taylor"]),
     ],
 )
 def test_nearest_tests_come_first(path: str, wanted: list[str]) -> None:
@@ -33,6 +35,14 @@ def test_a_module_has_the_tests_that_import_it() -> None:
     found = nearest(["pyharness/scenes/rescaled.py"], sources())
     assert found[0] == "tests/scenes/test_rescaled.py"
     assert nearest(["fortran/modern/taylor_march.f90"], sources())
+
+
+def test_every_source_has_tests() -> None:
+    kept = (".py", ".f90", ".fypp", ".c")
+    paths = [path for folder in ("pyharness", "fortran") for path in (ROOT / folder).rglob("*")]
+    names = [str(path.relative_to(ROOT)) for path in paths if path.suffix in kept]
+    tests = sources()
+    assert [name for name in names if not nearest([name], tests)] == []
 
 
 def test_it_ends_when_the_time_is_up(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.style import ROOT, TERMS, files, findings
+from tests.style import ROOT, TERMS, files, findings, private_imports
 
 _PROCEDURE = re.compile(
     r"^(?!\s*end\b)[^!\n]*\b(?:subroutine|function)\s+(\w+)\s*\(([^)]*)\)", re.M
@@ -37,6 +37,24 @@ def test_expressions_are_found_in_prose_alone(
     path = tmp_path / name
     path.write_text(text)
     assert [line for line, *_ in findings(path)] == lines
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (
+            "from pyharness.bench.random_loads import _LENGTHS",
+            ["pyharness.bench.random_loads._LENGTHS"],
+        ),
+        ("def f():\n    from tests.random_scenes import _draw", ["tests.random_scenes._draw"]),
+        ("from pyharness.bench._own import name", ["pyharness.bench._own._own"]),
+        ("from pyharness.checks.judge import _own", []),
+        ("from pyharness import _kernels", []),
+        ("from collections import _private", []),
+    ],
+)
+def test_private_names_of_other_packages_are_found(text: str, found: list[str]) -> None:
+    assert [name for _, name in private_imports(text, "pyharness.checks")] == found
 
 
 def test_each_expression_has_its_replacement() -> None:

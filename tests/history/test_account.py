@@ -67,7 +67,7 @@ def test_pages_take_their_sentences_from_the_data() -> None:
     for name in MECHANISM["alone"]:
         assert f"apparatus.html#{name}" in home
     assert "mechanism.limit" in home
-    assert r'"$2\\,\\sin 2.5t$"' in home
+    assert r'"$2\\,\\sin \\,2.5t$"' in home
 
 
 def test_dates_are_those_of_the_title_page_and_the_foreword() -> None:

@@ -68,9 +68,7 @@ function claim() {
     const found = run(2, program);
     draw(element("chart-claim"), program, ...firstOmega(found));
     const error = distance(found, reference(found.scene, found.times), [0]);
-    if (program !== "runge-kutta") fill("sine", error);
-    else fill("stop-error", error);
-    if (found.stop) fill("stop-step", found.stop.step);
+    fill(program === "runge-kutta" ? "stop-error" : "sine", error);
   }
 }
 
@@ -80,7 +78,8 @@ const answer = element("stop").querySelector(".answer");
 function predict() {
   const chart = element("chart-stop");
   const found = run(2, "runge-kutta");
-  const [times, omega] = firstOmega(found);
+  const omega = firstOmega(found)[1];
+  const steps = [...omega.keys()];
   const predicted = Number(element("prediction").value);
   fill("predicted", predicted);
   fill("run-step", found.stop.step);
@@ -88,11 +87,11 @@ function predict() {
   say("variable", found.stop.variable);
   show("stop", "predicted");
   const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-  let shown = still ? times.length : 1;
+  let shown = still ? steps.length : 1;
   const advance = () => {
-    draw(chart, "runge-kutta", times.slice(0, shown), omega.slice(0, shown));
-    answer.hidden = shown < times.length;
-    if (shown++ < times.length) requestAnimationFrame(advance);
+    draw(chart, "runge-kutta", steps.slice(0, shown), omega.slice(0, shown));
+    answer.hidden = shown < steps.length;
+    if (shown++ < steps.length) requestAnimationFrame(advance);
   };
   advance();
 }
@@ -100,7 +99,7 @@ function predict() {
 function choosePrediction() {
   const predicted = Number(element("prediction").value);
   document.querySelector("output[for=prediction]").textContent = predicted;
-  mark(element("chart-stop"), "prediction", predicted * scenes[2].run.step_size);
+  mark(element("chart-stop"), "prediction", predicted);
 }
 
 function turn() {
@@ -148,7 +147,7 @@ function blind() {
   const found = run(number, program);
   draw(element(`chart-blind-${number}`), "runge-kutta", ...firstOmega(found));
   fill(`blind-steps-${number}`, found.rows.length);
-  fill(`blind-error-${number}`, distance(found, reference(found.scene, found.times)));
+  fill(`blind-error-${number}`, distance(found, reference(found.scene, found.times), [0]));
   const radio = document.querySelector("input[name=blind-program]:checked");
   say(`blind-program-${number}`, radio.parentElement.textContent.trim());
   show("blind", `case-${number}`);
@@ -177,8 +176,9 @@ function race() {
   fill("ratio", ratios[0][0]);
   fill("least-ratio", Math.min(...known.map(([least]) => least)));
   fill("most-ratio", Math.max(...known.map(([, most]) => most)));
-  fill("seven-least", ratios.at(-1)[0]);
-  fill("seven-most", ratios.at(-1)[1]);
+  const last = cases.indexOf(7);
+  fill("seven-two", errors["two-term"][last] / errors["runge-kutta"][last]);
+  fill("seven-four", errors["four-term"][last] / errors["runge-kutta"][last]);
 }
 
 onChange(["trust"], claim);

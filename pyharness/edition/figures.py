@@ -7,12 +7,17 @@ omega converges as the step size goes to 0.
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from markupsafe import Markup
+
+from pyharness.edition.markdown import inline
+from pyharness.history.claims.sentences import sentences
 from pyharness.history.figures import (
     FigureFinding,
     figure_picture,
     findings,
     together_picture,
 )
+from pyharness.model.facts import facts
 from pyharness.views.pictures import saved
 
 
@@ -47,3 +52,65 @@ def together(figures: Mapping[str, Drawn]) -> dict[str, bytes]:
     """
     original, corrected = (figures[name].finding for name in ("figure-07", "figure-07-corrected"))
     return saved(together_picture(original, corrected), "figure-07-together.svg")
+
+
+class Printed(NamedTuple):
+    """A figure as the thesis has it, beside our drawings of it.
+
+    Attributes
+    ----------
+    number : int
+        The number of the figure in the thesis.
+    caption : str
+        Its printed caption.
+    where : str
+        Its place in the thesis.
+    says : list of tuple of Markup and str
+        What the text of the thesis says of the figure, sentence by sentence, each with the anchor
+        of the sentence in the page of the thesis; the anchor is empty for sections I to IV.
+    ours : Markup
+        What this edition has in place of a figure that it does not draw; empty if it draws it.
+    drawn : dict of str to Drawn
+        Our drawings of the figure, by the names of their files without the suffix.
+    """
+
+    number: int
+    caption: str
+    where: str
+    says: list[tuple[Markup, str]]
+    ours: Markup
+    drawn: dict[str, Drawn]
+
+    @property
+    def anchor(self) -> str:
+        """Return the anchor of a figure that is not drawn; our drawings have their own anchors."""
+        return "" if self.drawn else f"figure-{self.number:02d}"
+
+
+def printed(figures: Mapping[str, Drawn]) -> list[Printed]:
+    """Return the figures of the thesis in their order, each with our drawings of it.
+
+    `figures` is the result of `drawn`.
+    """
+    found = []
+    for each in facts("figures")["printed"]:
+        ours = {
+            stem: drawing
+            for stem, drawing in figures.items()
+            if drawing.finding.plan.number == each["number"]
+        }
+        cases = {f"V.2, Case {drawing.finding.plan.case}" for drawing in ours.values()}
+        says = [
+            (inline(sentence.text), f"sentence-{number}")
+            for number, sentence in enumerate(sentences(), 1)
+            if sentence.where in cases
+        ]
+        if "says" in each:
+            says = [(inline(each["says"]), "")]
+        found.append(
+            Printed(
+                each["number"], each["caption"], each["where"], says,
+                inline(each.get("ours", "")), ours,
+            )
+        )  # fmt: skip
+    return found

@@ -4,7 +4,7 @@ A claim is a statement of the thesis that we test, and a judgement has our verdi
 critical apparatus lists the defects, readings and conjectures with their evidence.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from markupsafe import Markup
@@ -15,9 +15,12 @@ from pyharness.history.apparatus_report import FIELDS, entry_report
 from pyharness.history.claims.evidence import evidence
 from pyharness.history.claims.evidence_report import evidence_report
 from pyharness.history.claims.ledger import Judgement, claims, judgement
-from pyharness.history.claims.report import claims_report, explanation, kinds_table
+from pyharness.history.claims.report import KINDS, claims_report, kinds_table
 from pyharness.history.claims.sentences import Sentence, sentences
+from pyharness.history.claims.stories import Story, story
+from pyharness.history.claims.verdicts import REPRODUCED
 from pyharness.model.facts import facts
+from pyharness.model.report import Column, Table
 from pyharness.views import html
 
 
@@ -84,26 +87,93 @@ def account() -> dict[str, Markup]:
     return {name: inline(text) for name, text in texts.items()}
 
 
-def context(judged: Sequence[Judgement]) -> dict[str, Any]:
-    """Return the data of the claims page: the tables, each claim in detail, and the evidence.
+class ClaimStory(NamedTuple):
+    """A claim of the thesis as its part of the claims page shows it.
 
-    `judged` has our verdicts on all claims of the thesis. The values are HTML, except for a list of
-    pairs of a judgement (verdicts on a claim) and its HTML.
+    Attributes
+    ----------
+    judgement : Judgement
+        Our verdicts on the claim.
+    story : Story
+        The claim in three sentences, as HTML.
+    sentences : list of tuple of str and str
+        Place and anchor of each sentence in the page of the thesis that makes the claim.
+    laboratory : str
+        A state of the laboratory that shows the claim, or an empty text.
+    """
+
+    judgement: Judgement
+    story: Story
+    sentences: list[tuple[str, str]]
+    laboratory: str
+
+
+def claim_stories(judged: Sequence[Judgement]) -> dict[str, list[ClaimStory]]:
+    """Return, by kind, the claims of the thesis, each with its story.
+
+    `judged` has our verdicts on all claims. The kinds are in the order of `KINDS`, and the claims
+    of a kind in the order of the data.
+    """
+    found: dict[str, list[ClaimStory]] = {kind: [] for kind in KINDS}
+    for each in judged:
+        making = [
+            (sentence, f"sentence-{number}")
+            for number, sentence in enumerate(sentences(), 1)
+            if each.claim["id"] in sentence.claims
+        ]
+        states = [sentence.laboratory for sentence, _ in making if sentence.laboratory]
+        found[each.claim["kind"]].append(
+            ClaimStory(
+                each, Story(*map(inline, story(each))),
+                [(sentence.where, anchor) for sentence, anchor in making], (states or [""])[0],
+            )
+        )  # fmt: skip
+    return found
+
+
+def context(judged: Sequence[Judgement]) -> dict[str, Any]:
+    """Return the data of the claims page: counts, each claim as a story, and the evidence.
+
+    `judged` has our verdicts on all claims of the thesis. The values are HTML, except for the
+    claims by kind and what each kind is about.
     """
     table = claims_report(judged).data
     assert table is not None
     links = {each.claim["id"]: f"#{each.claim['id']}" for each in judged}
-    stories = []
-    for each in judged:
-        # Skip the first section, because the page writes it as its own heading.
-        story = explanation(each).text[1:]
-        stories.append((each, Markup(html.sections(story))))
     return {
         "table": Markup(html.table(table, "all claims", links)),
         "kinds": kinds(judged),
-        "stories": stories,
+        "about": KINDS,
+        "groups": claim_stories(judged),
         "evidence": Markup(html.write(evidence_report(list(evidence())))),
     }
+
+
+def thesis_counts(sections: Mapping[str, Sequence[SentenceVerdicts]]) -> Markup:
+    """Return an HTML table of the number of sentences and claims in each section of the thesis.
+
+    `sections` is the result of `thesis`. Only claims about results are counted as reproduced.
+    """
+    columns = [
+        Column("section", left=True), Column("sentences"), Column("that make a claim"),
+        Column("results claimed"), Column("reproduced as printed"),
+        Column("reproduced as corrected"),
+    ]  # fmt: skip
+    rows = []
+    for section, told in sections.items():
+        results = {
+            each.claim["id"]: each
+            for sentence in told
+            for each in sentence.judged
+            if each.claim["kind"] == "result"
+        }.values()
+        reproduced = [
+            sum(getattr(each, state).verdict == REPRODUCED for each in results)
+            for state in ("original", "corrected")
+        ]
+        makes = sum(bool(sentence.judged) for sentence in told)
+        rows.append([section, len(told), makes, len(results), *reproduced])
+    return Markup(html.table(Table(columns, rows), "sentences and claims by section"))
 
 
 def apparatus() -> list[tuple[dict[str, Any], Markup]]:

@@ -13,8 +13,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pyharness.edition import (
-    api, decks, documents, figures, laboratory, ledger, parallel_decks, story,
-)  # fmt: skip
+    api,
+    decks,
+    documents,
+    figures,
+    formulas,
+    laboratory,
+    ledger,
+    parallel_decks,
+    story,
+)
 from pyharness.edition.bundle import bundle
 from pyharness.edition.markdown import inline
 from pyharness.edition.report import MARK, listed
@@ -131,16 +139,18 @@ def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -
     yield Page("laboratory.html", "Laboratory", "laboratory.html", laboratory.context())
     sentences = ledger.thesis(judged)
     yield Page(
-        "thesis.html", "The thesis, executable", "thesis.html", {"sections": sentences},
+        "thesis.html", "The thesis, executable", "thesis.html",
+        {"sections": sentences, "formulas": formulas.formulas(),
+         "table": ledger.thesis_counts(sentences)},
         [
             Found(f"thesis.html#{told.anchor}", told.sentence.where, "sentence",
-                  f"{told.sentence.quote}: {told.sentence.why or told.statements}")
+                  f"{told.sentence.text}: {told.sentence.why or told.statements}")
             for section in sentences.values()
             for told in section
         ],
     )  # fmt: skip
     yield Page(
-        "figures.html", "Figures 6 to 12", "figures.html", {"figures": drawn},
+        "figures.html", "Figures", "figures.html", {"figures": figures.printed(drawn)},
         [
             Found(f"figures.html#{stem}", f"{each.finding.plan.title}, {each.finding.plan.set}",
                   "figure", each.finding.plan.caption)

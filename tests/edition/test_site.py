@@ -134,7 +134,7 @@ def test_every_claim_entry_and_sentence_is_there(built_site: dict[str, bytes]) -
     thesis = " ".join(" ".join(read["thesis.html"].text).split())
     for each in sentences():
         assert " ".join(each.quote.split()) in thesis
-    assert {each["number"] for each in facts("figures")["figure"]} == {
+    assert {each["number"] for each in facts("figures")["printed"]} == {
         int(anchor[7:9]) for anchor in read["figures.html"].anchors if anchor.startswith("figure-")
     }
 

@@ -131,6 +131,33 @@ def test_every_sentence_of_the_thesis_has_its_quote() -> None:
         assert sentence.quote in text
 
 
+def test_quote_is_a_part_of_the_sentence() -> None:
+    for each in SENTENCES:
+        assert each.quote in " ".join(each.text.split()), each.quote
+        assert each.text == each.text.strip()
+        assert each.text.count("$") % 2 == 0
+
+
+@pytest.mark.skipif(not THESIS.exists(), reason="the text of the thesis is not beside the project")
+def test_every_sentence_has_the_letters_of_the_thesis_in_its_order() -> None:
+    """Letter for letter: only blanks and signs are ours, and nothing but formulas is skipped."""
+    thesis = THESIS.read_text()
+    found = _letters(thesis[thesis.index("## SECTION V\n") : thesis.index("## REFERENCES\n")])
+    at = 0
+    for each in SENTENCES:
+        for line in each.text.split("\n"):
+            start = found.find(_letters(line), at)
+            assert start >= 0, line
+            # Between two sentences are at most headings and the captions of the figures.
+            assert start - at <= 200, found[at:start]
+            at = start + len(_letters(line))
+
+
+def _letters(text: str) -> str:
+    """Return the letters and digits of a text alone."""
+    return re.sub(r"[^A-Za-z0-9]", "", text)
+
+
 def _sentences_of(thesis: str) -> list[str]:
     """Return the sentences of V and VI, and Table 1, without formulas, headings and captions."""
     _, _, text = thesis.rpartition("## RESULTS\n")

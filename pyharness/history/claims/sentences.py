@@ -17,6 +17,9 @@ class Sentence(NamedTuple):
         The section, with the paragraph, the case or the recommendation.
     quote : str
         A few words of the sentence.
+    text : str
+        The whole sentence in our reading, with formulas in LaTeX. It has a line for each line of
+        the thesis that a formula or a table has of its own.
     claims : tuple of str
         The identifiers of the claims that the sentence makes.
     why : str
@@ -31,6 +34,7 @@ class Sentence(NamedTuple):
 
     where: str
     quote: str
+    text: str
     claims: tuple[str, ...] = ()
     why: str = ""
     laboratory: str = ""

@@ -1,0 +1,66 @@
+"""Each claim of the thesis as a story of three sentences, with the computed numbers in them.
+
+The sentences are in `data/claims.toml`. In place of a number they have a field, which names a
+number of our verdict on the claim, so that no number of a story is written by hand.
+"""
+
+import re
+from fnmatch import fnmatchcase
+from typing import NamedTuple
+
+from pyharness.history.claims.ledger import Judgement
+
+FIELD = re.compile(r"\{(original|corrected): (?:(min|max) of )?(.+?)( in %)?\}")
+"""A field: the programs, `min of` or `max of`, the name of the number, and ` in %`.
+
+After `min of` or `max of`, the name is a pattern, as for file names, and the field is replaced by
+the smallest or the largest of all numbers that fit the pattern.
+"""
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+class Story(NamedTuple):
+    """A claim of the thesis told in three sentences.
+
+    `saw` says what the thesis reports or states, `why` how this came about, and `truth` what is
+    true of it. Formulas are LaTeX between dollar signs.
+    """
+
+    saw: str
+    why: str
+    truth: str
+
+
+def story(judgement: Judgement) -> Story:
+    """Return the story of a claim of the thesis, with the numbers of our verdicts on it.
+
+    `judgement` is the claim with its verdicts for the original and the corrected programs. Raise
+    ValueError if a field of a sentence fits no number of these verdicts.
+    """
+    outcomes = {"original": judgement.original, "corrected": judgement.corrected}
+
+    def number(field: re.Match[str]) -> str:
+        programs, which, name, percent = field.groups()
+        found = outcomes[programs].numbers
+        fitting = [
+            x for each, x in found.items() if (fnmatchcase(each, name) if which else each == name)
+        ]
+        if not fitting:
+            raise ValueError(f"claim {judgement.claim['id']} has no number {field[0]}")
+        x = min(fitting) if which == "min" else max(fitting)
+        return f"{prose(100.0 * x)} %" if percent else prose(x)
+
+    return Story(*(FIELD.sub(number, judgement.claim[name]) for name in Story._fields))
+
+
+def prose(x: float) -> str:
+    """Return a number as text for a sentence, with three significant digits.
+
+    A large number has commas, and a very large or very small one has a power of ten.
+    """
+    if x == 0 or 1e-3 <= abs(x) < 1e6:
+        rounded = float(f"{x:.3g}")
+        return f"{rounded:,.0f}" if rounded == int(rounded) else f"{rounded:g}"
+    mantissa, exponent = f"{x:.2e}".split("e")
+    power = str(int(exponent)).translate(_SUPERSCRIPTS)
+    return f"{float(mantissa):g} \N{MULTIPLICATION SIGN} 10{power}"

@@ -1,0 +1,107 @@
+"""The pages of the thesis, claims and figures: what an address opens, and what is side by side."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from selenium.webdriver import Chrome
+
+from tests.browser.screen import errors, screen
+
+_OPEN = """
+const [id] = arguments, named = document.getElementById(id);
+const folded = [...named.querySelectorAll("details")];
+const others = [...document.querySelectorAll(".claim, .sentence")].filter((each) => each !== named);
+return {
+  folded: folded.length,
+  open: folded.filter((each) => each.open).length,
+  others: others.filter((each) => each.querySelector("details[open]")).length,
+  top: named.getBoundingClientRect().top,
+};
+"""
+_BOXES = """
+return arguments[0].map((each) => {
+  const { left, right, top, bottom } = document.querySelector(each).getBoundingClientRect();
+  return { left, right, top, bottom };
+});
+"""
+
+
+def _boxes(browser: Chrome, *selectors: str) -> list[dict[str, float]]:
+    found: list[dict[str, float]] = browser.execute_script(_BOXES, selectors)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("page", "name", "folded"),
+    [("claims.html", "vi-superior", 2), ("thesis.html", "sentence-27", 2)],
+)
+def test_an_address_opens_what_is_folded_there_alone(
+    browser: Chrome, site: Path, page: str, name: str, folded: int
+) -> None:
+    with screen(browser, 1440):
+        browser.get(f"{(site / page).as_uri()}#{name}")
+        found: dict[str, Any] = browser.execute_script(_OPEN, name)
+        assert (found["folded"], found["open"], found["others"]) == (folded, folded, 0)
+        assert 0 <= found["top"] < 100  # at its place at once
+    assert errors(browser) == []
+
+
+def test_a_link_within_the_page_opens_its_claim(browser: Chrome, site: Path) -> None:
+    browser.get((site / "claims.html").as_uri())
+    assert browser.execute_script(_OPEN, "v2-case-2-stopped")["open"] == 0
+    link = 'section#all a[href="#v2-case-2-stopped"]'
+    browser.execute_async_script(
+        "const done = arguments[1]; addEventListener('hashchange', () => setTimeout(done));"
+        "document.querySelector(arguments[0]).click();",
+        link,
+    )
+    found = browser.execute_script(_OPEN, "v2-case-2-stopped")
+    assert found["open"] == found["folded"] > 0
+    assert 0 <= found["top"] < 100
+
+
+def test_verdicts_are_in_the_margin_or_below_the_sentence(browser: Chrome, site: Path) -> None:
+    places = [f"#sentence-58 {each}" for each in (".said", ".margin", ".more")]
+    with screen(browser, 1440):
+        browser.get((site / "thesis.html").as_uri())
+        said, margin, more = _boxes(browser, *places)
+        assert margin["left"] >= said["right"]
+        assert margin["top"] < more["top"]
+        assert more["left"] == said["left"]
+    with screen(browser, 360):
+        said, margin, more = _boxes(browser, *places)
+        assert said["bottom"] <= margin["top"] < margin["bottom"] <= more["top"]
+
+
+def test_figures_of_the_paper_are_beside_ours(browser: Chrome, site: Path) -> None:
+    places = ("#paper-7 .paper", "#figure-07", "#figure-07-corrected")
+    with screen(browser, 1440):
+        browser.get((site / "figures.html").as_uri())
+        paper, printed, corrected = _boxes(browser, *places)
+        assert paper["right"] < printed["left"] < printed["right"] < corrected["left"]
+        assert printed["top"] == corrected["top"]
+    with screen(browser, 360):
+        paper, printed, corrected = _boxes(browser, *places)
+        assert paper["bottom"] <= printed["top"] < printed["bottom"] <= corrected["top"]
+
+
+@pytest.mark.parametrize(("page", "least"), [("claims.html", 116), ("thesis.html", 78)])
+def test_print_keeps_verdicts_and_numbers(
+    browser: Chrome, site: Path, page: str, least: int
+) -> None:
+    browser.get((site / page).as_uri())
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        shown = browser.execute_script(
+            "const seen = (each) => each.getBoundingClientRect().height > 0;"
+            "return ['.verdict', 'details table td'].map((each) => {"
+            "  const all = [...document.querySelectorAll(each)];"
+            "  return [all.length, all.filter(seen).length];"
+            "});"
+        )
+    finally:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+    (verdicts, seen), (cells, printed) = shown
+    assert verdicts == seen >= least
+    assert cells == printed > 100

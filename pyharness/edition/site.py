@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pyharness.edition import api, decks, documents, figures, laboratory, ledger
+from pyharness.edition import api, body, decks, documents, figures, laboratory, ledger
 from pyharness.edition.bundle import bundle
 from pyharness.edition.markdown import inline
 from pyharness.edition.report import MARK, listed
@@ -111,6 +111,8 @@ def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -
     progress(2, 5, "listing")
     yield from _listing()
     yield Page("laboratory.html", "Laboratory", "laboratory.html", laboratory.context())
+    yield Page("body.html", "A body that tumbles", "body.html", body.context(),
+               menu="laboratory.html")  # fmt: skip
     sentences = ledger.thesis(judged)
     yield Page(
         "thesis.html", "The thesis, executable", "thesis.html", {"sections": sentences},
@@ -208,6 +210,9 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
         content[f"assets/{file.name}"] = file.read_bytes()
     content["assets/laboratory.js"] = bundle(web / "laboratory" / "laboratory.js").encode()
     content["assets/laboratory-data.js"] = script("laboratoryData", laboratory.context()["data"])
+    content["assets/body.js"] = bundle(web / "body" / "body.js").encode()
+    content["assets/body-data.js"] = script("bodyData", body.data())
+    content |= {f"figures/{name}": file for name, file in body.files().items()}
     content["assets/search-data.js"] = script("searchData", [each._asdict() for each in places])
     content["listing/edition.xml"] = tei_document()
     return content

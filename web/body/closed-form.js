@@ -27,6 +27,7 @@ const CANCELLED = 1e-4; // remainder for which double-double is too short
 const FLAT = 1e-10; // difference whose square is negligible
 const LAST = 1e-17; // last term; the means then differ by less
 const FAINT = 1e-240; // squares of smaller perturbations would underflow
+const ENDLESS = 20; // phase that ends the path on the separatrix
 const IDENTITY = [1, 0, 0, 0];
 
 // Return Hamilton's product of two quaternions.
@@ -45,14 +46,16 @@ export function inSpace(q, vector) {
   return product(product(q, [0, ...vector]), conjugate).slice(1);
 }
 
-// Return the torque-free motion of a body, as { at, flipTime, flipAfter, axes, isSteady }, or null
-// if omega is so close to the middle axis that squares underflow.
+// Return the torque-free motion of a body, as { at, flipTime, flipAfter, span, peak, axes, isSteady },
+// or null if omega is so close to the middle axis that squares underflow.
 //
 // `moments` (kg m2) and `omega0` (rad/s) are about the body's axes, and `attitude0` is the unit
 // quaternion at time 0. at(t) returns { omega, attitude } at t seconds. `flipTime` is the time (s)
 // between sign changes of omega about the middle axis, infinite if there is none; flipAfter(t) is
-// the time of the next one. `axes` has the numbers of the body's axes (0, 1, 2) in the order of the
-// orbit.
+// the time of the next one. `span` is a time (s) in which omega runs through its whole path in the
+// body: the period, or on the separatrix the time outside of which omega is steady. `peak` is the
+// largest omega about the middle axis (rad/s). `axes` has the numbers of the body's axes (0, 1, 2) in
+// the order of the orbit.
 export function torqueFree(moments, omega0, attitude0 = IDENTITY) {
   let [axes, gaps] = gapsOf(moments, omega0);
   // Omega about axis 3 keeps its sign: choose that axis.
@@ -89,7 +92,10 @@ export function torqueFree(moments, omega0, attitude0 = IDENTITY) {
   const offset = hasPeriod ? orbit.start[0] / orbit.frequency[0] : 0;
   const flipAfter = (t) =>
     hasPeriod ? (Math.floor((t + offset) / flipTime) + 1) * flipTime - offset : Infinity;
-  return { at, flipTime, flipAfter, axes, isSteady: orbit.isSteady };
+  let span = 2 * flipTime;
+  if (!hasPeriod) span = orbit.isSteady ? 0 : ENDLESS / orbit.frequency[0];
+  const { isSteady, peak = Math.abs(start[1]) } = orbit;
+  return { at, flipTime, flipAfter, span, peak, axes, isSteady };
 }
 
 // Return the body's axes by falling moment, and differences that determine the orbit: d12, d13, d23
@@ -166,7 +172,8 @@ function tumblingOrbit(w, gaps) {
     Math.sqrt(e3[0] / (moment[2] * d13[0])),
   ];
   const sense = moment[2] < moment[0] ? -1 : 1;
-  const orbit = { isSteady: false, sense, direction: moment.map((x) => x / momentum[0]) };
+  const peak = largest[1];
+  const orbit = { isSteady: false, peak, sense, direction: moment.map((x) => x / momentum[0]) };
   // lambda and lambda k', times `inertia`; u' = lambda.
   const upper = root(multiply(d23, e3));
   let comodulus = 0;

@@ -1,0 +1,234 @@
+// The page: from controls and address to motion, drawings, numbers and sentences.
+import { inSpace, torqueFree } from "./closed-form.js";
+import { amplification } from "./digits.js";
+import { Drawing } from "./drawing.js";
+import {
+  StateError,
+  bodyOf,
+  commandOf,
+  fragmentOf,
+  momentsFrom,
+  omegaFrom,
+  stateFrom,
+  stateOfBody,
+  timeFrom,
+  written,
+} from "./state.js";
+
+const data = window.bodyData;
+const element = (id) => document.getElementById(id);
+const drawing = new Drawing({
+  space: element("space"),
+  body: element("polhode"),
+  plane: element("herpolhode"),
+});
+// The slider of the time is logarithmic: from its second position on, 0.01 s to the latest time.
+const DECADES = Math.log10(data.longest) + 2;
+const POSITIONS = Number(element("slider").max);
+const REFRESH = 250; // ms between changes of the numbers while the body moves
+let state = stateOfBody(data, data.first);
+let motion = null;
+let remaining = null;
+let isPlaying = false;
+let isSeen = true;
+let last = null; // time of the last frame, ms
+let told = 0; // time at which the numbers were last changed, ms
+// By field: what is wrong with its content, until it is corrected.
+const wrong = new Map();
+
+const brief = (x) => (x === 0 ? "0" : String(Number(x.toPrecision(3))));
+const rounded = (values) => values.map((x) => x.toFixed(6)).join(", ");
+const seconds = (t) => `${t === Infinity ? "never" : `${Number(t.toPrecision(12))} s`}`;
+
+// Show a state, together with the problems of the input that requested it.
+function show(next, problems = []) {
+  const isSame = motion && next.moments === state.moments && next.omega0 === state.omega0;
+  state = next;
+  if (!isSame) {
+    motion = torqueFree(state.moments, state.omega0);
+    remaining = amplification(state.moments, state.omega0);
+    drawing.setMotion(motion, state.moments);
+    element("told").textContent = sentence();
+  }
+  tell(problems);
+  showControls();
+  showTime();
+  draw();
+}
+
+function change(next) {
+  show(next);
+  history.replaceState(null, "", `#${fragmentOf(data, state)}`);
+}
+
+function tell(problems = []) {
+  element("problems").textContent = [...problems, ...wrong.values()].join("; ");
+}
+
+// Return what the motion does, in words.
+function sentence() {
+  const { axes, flipTime, isSteady, peak } = motion;
+  const [first, middle, third] = axes.map((axis) => state.moments[axis]);
+  const name = (place) => axes[place] + 1;
+  if (isSteady) return "This rotation is steady: omega is constant in the body and in space.";
+  if (flipTime === Infinity) {
+    return `This motion is on the separatrix: it approaches a spin about axis ${name(1)} and never returns.`;
+  }
+  const extreme = third < first ? "smallest" : "largest";
+  const circles = `Omega circles axis ${name(2)}, which has the ${extreme} moment. `;
+  if (first === middle) return `${circles}Two moments are equal: one circle in the body takes ${brief(2 * flipTime)} s.`;
+  const { omega } = motion.at(0);
+  const size = Math.hypot(...omega.map((x, i) => x * state.moments[i]));
+  const angle = (Math.acos(Math.min(1, (middle * peak) / size)) * 180) / Math.PI;
+  return (
+    `${circles}Omega about axis ${name(1)}, the middle one, changes its sign every ` +
+    `${brief(flipTime)} s: this is the flip. Axis ${name(1)} swings between ${angle.toFixed(1)} ` +
+    `and ${(180 - angle).toFixed(1)} degrees from the angular momentum.`
+  );
+}
+
+function showControls() {
+  element("body").value = bodyOf(data, state)?.id ?? "";
+  const values = { moments: state.moments, omega0: state.omega0 };
+  for (const [id, value] of Object.entries(values)) setField(id, value.map(written).join(", "));
+  element("speed").value = String(state.speed);
+}
+
+function setField(id, value) {
+  if (wrong.has(id)) return;
+  element(id).value = value;
+  element(id).removeAttribute("aria-invalid");
+}
+
+// Show everything that depends on the time, except the drawings.
+function showTime() {
+  const { time, moments } = state;
+  const { omega, attitude } = motion.at(time);
+  const start = motion.at(0);
+  const energy = (w) => w.reduce((sum, x, i) => sum + moments[i] * x * x, 0);
+  const momentum = ({ omega: w, attitude: q }) => inSpace(q, w.map((x, i) => moments[i] * x));
+  const [before, after] = [momentum(start), momentum({ omega, attitude })];
+  const size = Math.hypot(...before) || 1;
+  const { digits, growth } = remaining(time);
+  const next = motion.flipAfter(time);
+  const drifts = [
+    Math.abs(energy(omega) / (energy(start.omega) || 1) - (energy(start.omega) ? 1 : 0)),
+    Math.hypot(...after.map((x, i) => x - before[i])) / size,
+  ];
+  const numbers = {
+    "at-time": seconds(time),
+    "at-omega": `${rounded(omega)} rad/s`,
+    "at-attitude": rounded(attitude),
+    "at-flip": motion.isSteady ? "none" : seconds(next),
+    "at-drift": `${brief(drifts[0])} and ${brief(drifts[1])}`,
+    "at-digits": `${digits.omega.toFixed(1)} and ${digits.attitude.toFixed(1)} (amplification ${brief(growth)})`,
+  };
+  for (const [id, text] of Object.entries(numbers)) element(id).textContent = text;
+  element("status").textContent = isPlaying
+    ? `Playing; ${state.speed} s of the motion pass in a second.`
+    : `At ${seconds(time)} omega is ${rounded(omega)} rad/s; energy and angular momentum have ` +
+      `drifted by ${brief(drifts[0])} and ${brief(drifts[1])}; ${digits.omega.toFixed(1)} digits of ` +
+      `omega and ${digits.attitude.toFixed(1)} of the attitude remain.`;
+  setField("time", written(time));
+  const slider = element("slider");
+  slider.value = time < 0.01 ? 0 : 1 + ((Math.log10(time) + 2) / DECADES) * (POSITIONS - 1);
+  slider.setAttribute("aria-valuetext", seconds(time));
+  element("flip").disabled = !(next <= data.longest);
+  const { command, file } = commandOf(data, state);
+  element("command").textContent = command;
+  element("scene").textContent = file;
+  element("scene-file").hidden = file === "";
+  element("address").href = `#${fragmentOf(data, state)}`;
+}
+
+function draw() {
+  drawing.draw(state.time, (Number(element("view").value) * Math.PI) / 180);
+}
+
+function play(wanted) {
+  isPlaying = wanted;
+  last = null;
+  element("play").textContent = wanted ? "Pause" : "Play";
+  if (wanted) requestAnimationFrame(advance);
+  else change(state);
+}
+
+// Advance the time by a frame. Browsers call no frame of a hidden page; the clock stops with them.
+function advance(now) {
+  if (!isPlaying) return;
+  const passed = last === null ? 0 : Math.min(100, now - last) / 1000;
+  last = now;
+  if (isSeen) {
+    const time = Math.min(data.longest, state.time + passed * state.speed);
+    state = { ...state, time };
+    draw();
+    if (now - told > REFRESH) {
+      told = now;
+      showTime();
+    }
+    if (time === data.longest) return play(false);
+  }
+  requestAnimationFrame(advance);
+}
+
+// Read a field when it changes. A valid value is used. Otherwise the problem is shown, and the field
+// stays as it is until it is corrected.
+function onField(id, read, taken) {
+  element(id).addEventListener("change", () => {
+    try {
+      const value = read(element(id).value, id);
+      wrong.delete(id);
+      change(taken(value));
+    } catch (error) {
+      if (!(error instanceof StateError)) throw error;
+      wrong.set(id, error.message);
+      tell();
+      element(id).setAttribute("aria-invalid", "true");
+    }
+  });
+}
+
+function fromAddress() {
+  wrong.clear();
+  const { state: asked, problems } = stateFrom(data, location.hash);
+  show(asked, problems);
+}
+
+onField("moments", momentsFrom, (moments) => ({ ...state, moments }));
+onField("omega0", omegaFrom, (omega0) => ({ ...state, omega0 }));
+onField("time", timeFrom(data), (time) => ({ ...state, time }));
+element("body").addEventListener("change", ({ target }) => {
+  wrong.clear();
+  if (target.value) change({ ...stateOfBody(data, target.value), speed: state.speed });
+});
+element("speed").addEventListener("change", ({ target }) => {
+  change({ ...state, speed: Number(target.value) });
+});
+element("slider").addEventListener("input", ({ target }) => {
+  wrong.delete("time");
+  const place = (Number(target.value) - 1) / (POSITIONS - 1);
+  const time = place < 0 ? 0 : Number((10 ** (DECADES * place - 2)).toPrecision(4));
+  change({ ...state, time: Math.min(time, data.longest) });
+});
+element("view").addEventListener("input", draw);
+element("play").addEventListener("click", () => play(!isPlaying));
+element("flip").addEventListener("click", () => {
+  change({ ...state, time: motion.flipAfter(state.time) });
+});
+window.addEventListener("hashchange", fromAddress);
+const recolour = () => {
+  drawing.recolour();
+  draw();
+};
+document.addEventListener("themechange", () => motion && recolour());
+// A page is printed in the colours for paper, whatever the colours of the screen.
+matchMedia("print").addEventListener("change", recolour);
+
+element("tumbling").hidden = false;
+fromAddress();
+new ResizeObserver(draw).observe(element("space"));
+new IntersectionObserver(([{ isIntersecting }]) => {
+  isSeen = isIntersecting;
+}).observe(element("space"));
+// An address that names a time shows this time.
+if (!matchMedia("(prefers-reduced-motion: reduce)").matches && state.time === 0) play(true);

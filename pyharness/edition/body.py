@@ -84,8 +84,7 @@ def data() -> dict[str, Any]:
          "moments": moments_of_box(each["edges"], each["mass"]), "omega": each["omega"]}
         for each in known["body"]
     ]  # fmt: skip
-    return {"bodies": [*boxes, *cases], "first": known["first"], "longest": known["longest"],
-            "speeds": SPEEDS}
+    return {"bodies": [*boxes, *cases], "first": known["first"], "longest": known["longest"]}
 
 
 def moments_of_box(edges: list[float], mass: float) -> list[float]:

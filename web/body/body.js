@@ -7,38 +7,39 @@ import {
   bodyOf,
   commandOf,
   fragmentOf,
+  listed,
   momentsFrom,
   omegaFrom,
   stateFrom,
   stateOfBody,
   timeFrom,
-  written,
 } from "./state.js";
 
 const data = window.bodyData;
 const element = (id) => document.getElementById(id);
-const drawing = new Drawing({
-  space: element("space"),
-  body: element("polhode"),
-  plane: element("herpolhode"),
-});
+const drawing = new Drawing();
+drawing.recolour();
 // The slider of the time is logarithmic: from its second position on, 0.01 s to the latest time.
 const DECADES = Math.log10(data.longest) + 2;
 const POSITIONS = Number(element("slider").max);
-const REFRESH = 250; // ms between changes of the numbers while the body moves
+// The time (ms) between changes of the numbers while the body moves.
+const REFRESH = 250;
 let state = stateOfBody(data, data.first);
 let motion = null;
 let remaining = null;
 let isPlaying = false;
 let isSeen = true;
-let last = null; // time of the last frame, ms
-let told = 0; // time at which the numbers were last changed, ms
+// Time of the last frame, ms.
+let last = null;
+// Time at which the numbers were last changed, ms.
+let told = 0;
 // By field: what is wrong with its content, until it is corrected.
 const wrong = new Map();
 
+const wordsOf = ({ children: [head, value] }) => `${head.textContent}: ${value.textContent}`;
 const brief = (x) => (x === 0 ? "0" : String(Number(x.toPrecision(3))));
 const rounded = (values) => values.map((x) => x.toFixed(6)).join(", ");
-const seconds = (t) => `${t === Infinity ? "never" : `${Number(t.toPrecision(12))} s`}`;
+const seconds = (t) => (t < Infinity ? `${Number(t.toPrecision(12))} s` : "none");
 
 // Show a state, together with the problems of the input that requested it.
 function show(next, problems = []) {
@@ -67,7 +68,7 @@ function tell(problems = []) {
 
 // Return what the motion does, in words.
 function sentence() {
-  const { axes, flipTime, isSteady, peak } = motion;
+  const { axes, flipTime, isSteady, least, peak } = motion;
   const [first, middle, third] = axes.map((axis) => state.moments[axis]);
   const name = (place) => axes[place] + 1;
   if (isSteady) return "This rotation is steady: omega is constant in the body and in space.";
@@ -76,26 +77,25 @@ function sentence() {
   }
   const extreme = third < first ? "smallest" : "largest";
   const circles = `Omega circles axis ${name(2)}, which has the ${extreme} moment. `;
-  if (first === middle) return `${circles}Two moments are equal: one circle in the body takes ${brief(2 * flipTime)} s.`;
-  const { omega } = motion.at(0);
-  const size = Math.hypot(...omega.map((x, i) => x * state.moments[i]));
-  const angle = (Math.acos(Math.min(1, (middle * peak) / size)) * 180) / Math.PI;
+  if (first === middle) {
+    return `${circles}Two moments are equal: one circle in the body takes ${brief(2 * flipTime)} s.`;
+  }
+  const angle = (Math.atan2(third * least, middle * peak) * 180) / Math.PI;
   return (
     `${circles}Omega about axis ${name(1)}, the middle one, changes its sign every ` +
-    `${brief(flipTime)} s: this is the flip. Axis ${name(1)} swings between ${angle.toFixed(1)} ` +
+    `${brief(flipTime)} s: this is the flip. Axis ${name(1)} swings between ${brief(angle)} ` +
     `and ${(180 - angle).toFixed(1)} degrees from the angular momentum.`
   );
 }
 
 function showControls() {
   element("body").value = bodyOf(data, state)?.id ?? "";
-  const values = { moments: state.moments, omega0: state.omega0 };
-  for (const [id, value] of Object.entries(values)) setField(id, value.map(written).join(", "));
-  element("speed").value = String(state.speed);
+  for (const id of ["moments", "omega0"]) setField(id, listed(state[id]));
 }
 
 function setField(id, value) {
-  if (wrong.has(id)) return;
+  // What is being typed while the body moves is left alone.
+  if (wrong.has(id) || (isPlaying && element(id) === document.activeElement)) return;
   element(id).value = value;
   element(id).removeAttribute("aria-invalid");
 }
@@ -103,33 +103,28 @@ function setField(id, value) {
 // Show everything that depends on the time, except the drawings.
 function showTime() {
   const { time, moments } = state;
-  const { omega, attitude } = motion.at(time);
-  const start = motion.at(0);
-  const energy = (w) => w.reduce((sum, x, i) => sum + moments[i] * x * x, 0);
+  const [start, here] = [motion.at(0), motion.at(time)];
+  const energy = ({ omega: w }) => w.reduce((sum, x, i) => sum + moments[i] * x * x, 0);
   const momentum = ({ omega: w, attitude: q }) => inSpace(q, w.map((x, i) => moments[i] * x));
-  const [before, after] = [momentum(start), momentum({ omega, attitude })];
-  const size = Math.hypot(...before) || 1;
+  const [before, after] = [momentum(start), momentum(here)];
   const { digits, growth } = remaining(time);
   const next = motion.flipAfter(time);
   const drifts = [
-    Math.abs(energy(omega) / (energy(start.omega) || 1) - (energy(start.omega) ? 1 : 0)),
-    Math.hypot(...after.map((x, i) => x - before[i])) / size,
+    Math.abs(energy(here) - energy(start)) / (energy(start) || 1),
+    Math.hypot(...after.map((x, i) => x - before[i])) / (Math.hypot(...before) || 1),
   ];
   const numbers = {
-    "at-time": seconds(time),
-    "at-omega": `${rounded(omega)} rad/s`,
-    "at-attitude": rounded(attitude),
-    "at-flip": motion.isSteady ? "none" : seconds(next),
-    "at-drift": `${brief(drifts[0])} and ${brief(drifts[1])}`,
-    "at-digits": `${digits.omega.toFixed(1)} and ${digits.attitude.toFixed(1)} (amplification ${brief(growth)})`,
+    time: seconds(time),
+    omega: `${rounded(here.omega)} rad/s`,
+    attitude: rounded(here.attitude),
+    flip: seconds(next),
+    drift: drifts.map(brief).join(" and "),
+    digits: `${digits.map((x) => x.toFixed(1)).join(" and ")} (error amplification ${brief(growth)})`,
   };
-  for (const [id, text] of Object.entries(numbers)) element(id).textContent = text;
-  element("status").textContent = isPlaying
-    ? `Playing; ${state.speed} s of the motion pass in a second.`
-    : `At ${seconds(time)} omega is ${rounded(omega)} rad/s; energy and angular momentum have ` +
-      `drifted by ${brief(drifts[0])} and ${brief(drifts[1])}; ${digits.omega.toFixed(1)} digits of ` +
-      `omega and ${digits.attitude.toFixed(1)} of the attitude remain.`;
-  setField("time", written(time));
+  for (const [id, text] of Object.entries(numbers)) element(`at-${id}`).textContent = text;
+  const rows = [...document.querySelectorAll(".numbers > div")];
+  element("status").textContent = isPlaying ? "Playing." : rows.map(wordsOf).join("; ");
+  setField("time", time);
   const slider = element("slider");
   slider.value = time < 0.01 ? 0 : 1 + ((Math.log10(time) + 2) / DECADES) * (POSITIONS - 1);
   slider.setAttribute("aria-valuetext", seconds(time));
@@ -138,7 +133,6 @@ function showTime() {
   element("command").textContent = command;
   element("scene").textContent = file;
   element("scene-file").hidden = file === "";
-  element("address").href = `#${fragmentOf(data, state)}`;
 }
 
 function draw() {
@@ -159,7 +153,7 @@ function advance(now) {
   const passed = last === null ? 0 : Math.min(100, now - last) / 1000;
   last = now;
   if (isSeen) {
-    const time = Math.min(data.longest, state.time + passed * state.speed);
+    const time = Math.min(data.longest, state.time + passed * Number(element("speed").value));
     state = { ...state, time };
     draw();
     if (now - told > REFRESH) {
@@ -199,10 +193,7 @@ onField("omega0", omegaFrom, (omega0) => ({ ...state, omega0 }));
 onField("time", timeFrom(data), (time) => ({ ...state, time }));
 element("body").addEventListener("change", ({ target }) => {
   wrong.clear();
-  if (target.value) change({ ...stateOfBody(data, target.value), speed: state.speed });
-});
-element("speed").addEventListener("change", ({ target }) => {
-  change({ ...state, speed: Number(target.value) });
+  if (target.value) change(stateOfBody(data, target.value));
 });
 element("slider").addEventListener("input", ({ target }) => {
   wrong.delete("time");

@@ -4,7 +4,7 @@
 // fortran/modern/torque_free_attitude.f90, and tests compare its numbers with those of that module.
 //
 // A unit quaternion q, scalar first, rotates body to space: v_space = q v_body q*, and
-// q' = q (0, omega)/2. It is q0 D(0)* D(t), where D = (rotation about axis 3) (shortest rotation of
+// q' = q (0, omega)/2. It is D(0)* D(t), where D = (rotation about axis 3) (shortest rotation of
 // the angular momentum to axis 3). The axes of the orbit are its own: axis 2 has the middle moment,
 // omega about axis 3 does not change its sign, and axes 1, 2, 3 are right-handed.
 import {
@@ -12,7 +12,6 @@ import {
   divide,
   longerTimes,
   multiply,
-  negative,
   productOf,
   root,
   sineCosine,
@@ -22,13 +21,18 @@ import {
 } from "./double-double.js";
 import { ellipticFunctions, startOfPhase, thetaSeries } from "./theta.js";
 
-const MOST_LEVELS = 16; // of the arithmetic-geometric mean
-const CANCELLED = 1e-4; // remainder for which double-double is too short
-const FLAT = 1e-10; // difference whose square is negligible
-const LAST = 1e-17; // last term; the means then differ by less
-const FAINT = 1e-240; // squares of smaller perturbations would underflow
-const ENDLESS = 20; // phase that ends the path on the separatrix
-const IDENTITY = [1, 0, 0, 0];
+// The most levels of the arithmetic-geometric mean.
+const MOST_LEVELS = 16;
+// The remainder for which double-double is too short.
+const CANCELLED = 1e-4;
+// A difference whose square is negligible.
+const FLAT = 1e-10;
+// The last term of the sum; the means then differ by less.
+const LAST = 1e-17;
+// Squares of smaller perturbations would underflow.
+const FAINT = 1e-240;
+// The phase that ends the path on the separatrix.
+const ENDLESS = 20;
 
 // Return Hamilton's product of two quaternions.
 export function product(p, q) {
@@ -46,102 +50,83 @@ export function inSpace(q, vector) {
   return product(product(q, [0, ...vector]), conjugate).slice(1);
 }
 
-// Return the torque-free motion of a body, as { at, flipTime, flipAfter, span, peak, axes, isSteady },
-// or null if omega is so close to the middle axis that squares underflow.
+// Return the torque-free motion of a body, as { at, isSteady, axes, flipTime, flipAfter, span, peak,
+// least }, or null if omega is so close to the middle axis that squares underflow.
 //
-// `moments` (kg m2) and `omega0` (rad/s) are about the body's axes, and `attitude0` is the unit
-// quaternion at time 0. at(t) returns { omega, attitude } at t seconds. `flipTime` is the time (s)
+// `moments` (kg m2) and `omega0` (rad/s) are about the body's axes, which are parallel to those of
+// space at time 0. at(t) returns { omega, attitude } at t seconds. `flipTime` is the time (s)
 // between sign changes of omega about the middle axis, infinite if there is none; flipAfter(t) is
 // the time of the next one. `span` is a time (s) in which omega runs through its whole path in the
-// body: the period, or on the separatrix the time outside of which omega is steady. `peak` is the
-// largest omega about the middle axis (rad/s). `axes` has the numbers of the body's axes (0, 1, 2) in
-// the order of the orbit.
-export function torqueFree(moments, omega0, attitude0 = IDENTITY) {
-  let [axes, gaps] = gapsOf(moments, omega0);
-  // Omega about axis 3 keeps its sign: choose that axis.
-  if (gaps.e2[0] < 0) [axes, gaps] = reversed(axes, gaps);
+// body: the period, or on the separatrix the time outside of which omega is steady. If omega is not
+// steady, `peak` is the largest omega about the middle axis (rad/s), and `least` the smallest about
+// the axis that omega circles. `axes` has the numbers of the body's axes (0, 1, 2) in the order of
+// the orbit.
+export function torqueFree(moments, omega0) {
+  const axes = [0, 1, 2].sort((a, b) => moments[b] - moments[a] || a - b);
+  let gaps = gapsOf(moments, omega0, axes);
+  // Omega about the other extreme axis keeps its sign.
+  if (gaps.e2[0] < 0) gaps = gapsOf(moments, omega0, axes.reverse());
   const { w, energies } = gaps;
   const signs = w.map((x) => (x < 0 ? -1 : 1));
   signs[1] = signs[0] * signs[2] * ((axes[0] + 1) % 3 === axes[1] ? 1 : -1);
   const start = w.map((x, i) => x * signs[i] + 0);
 
-  let orbit;
-  if (!(gaps.d23[0] * gaps.e3[0] > 0) || !(Math.max(Math.abs(w[0]), Math.abs(w[2])) > 0)) {
-    orbit = steadyOrbit(start);
-  } else if (energies[2][0] * gaps.d13[0] <= FAINT * gaps.e3[0]) {
-    return null;
-  } else {
-    orbit = tumblingOrbit(start, gaps);
-  }
-  const into = (q) => [q[0], ...axes.map((axis, i) => signs[i] * q[1 + axis])];
+  const isSteady = !(gaps.d23[0] * gaps.e3[0] > 0) || (w[0] === 0 && w[2] === 0);
+  if (!isSteady && energies[2][0] * gaps.d13[0] <= FAINT * gaps.e3[0]) return null;
+  const orbit = isSteady ? steadyOrbit(start) : tumblingOrbit(start, gaps);
   const [scalar, ...vector] = turned(orbit, 0).turn;
-  const before = product(into(attitude0), [scalar, ...vector.map((x) => -x)]);
+  const before = [scalar, ...vector.map((x) => -x)];
   const at = (t) => {
-    if (t === 0) return { omega: [...omega0], attitude: [...attitude0] };
+    const [omega, attitude] = [[...omega0], [1, 0, 0, 0]];
+    if (t === 0) return { omega, attitude };
     const { found, turn } = turned(orbit, t);
-    const q = product(before, turn);
-    const [omega, attitude] = [[...omega0], [q[0], 0, 0, 0]];
+    const [q0, ...q] = product(before, turn);
+    attitude[0] = q0;
     axes.forEach((axis, i) => {
-      if (!orbit.isSteady) omega[axis] = signs[i] * found[i];
-      attitude[1 + axis] = signs[i] * q[1 + i];
+      if (!isSteady) omega[axis] = signs[i] * found[i];
+      attitude[1 + axis] = signs[i] * q[i];
     });
     return { omega, attitude };
   };
-  const hasPeriod = !orbit.isSteady && orbit.theta.kind !== "endless";
-  const flipTime = hasPeriod ? Math.PI / orbit.frequency[0] : Infinity;
-  const offset = hasPeriod ? orbit.start[0] / orbit.frequency[0] : 0;
-  const flipAfter = (t) =>
-    hasPeriod ? (Math.floor((t + offset) / flipTime) + 1) * flipTime - offset : Infinity;
+  const hasPeriod = !isSteady && orbit.theta.kind !== "endless";
+  const { frequency, peak, least } = orbit;
+  const flipTime = hasPeriod ? Math.PI / frequency[0] : Infinity;
+  const flipAfter = (t) => {
+    if (!hasPeriod) return Infinity;
+    const offset = orbit.start[0] / frequency[0];
+    // A time that is a flip, but for rounding, is followed by another flip.
+    return (Math.floor((t + offset) / flipTime + 1e-7) + 1) * flipTime - offset;
+  };
   let span = 2 * flipTime;
-  if (!hasPeriod) span = orbit.isSteady ? 0 : ENDLESS / orbit.frequency[0];
-  const { isSteady, peak = Math.abs(start[1]) } = orbit;
-  return { at, flipTime, flipAfter, span, peak, axes, isSteady };
+  if (!hasPeriod) span = isSteady ? 0 : ENDLESS / frequency[0];
+  return { at, isSteady, axes, flipTime, flipAfter, span, peak, least };
 }
 
-// Return the body's axes by falling moment, and differences that determine the orbit: d12, d13, d23
-// of the moments, e1 = d13 I1 omega1^2 + d23 I2 omega2^2 and e3 alike, e2 = d23 I3 omega3^2 - d12 I1
-// omega1^2.
-function gapsOf(moments, omega0) {
-  const axes = [0, 1, 2].sort((a, b) => moments[b] - moments[a] || a - b);
+// Return differences that determine the orbit with these axes, the middle moment between the others:
+// d12, d13, d23 of the moments, without sign, e1 = d13 I1 omega1^2 + d23 I2 omega2^2 and e3 alike,
+// e2 = d23 I3 omega3^2 - d12 I1 omega1^2.
+function gapsOf(moments, omega0, axes) {
   const moment = axes.map((axis) => moments[axis]);
   const w = axes.map((axis) => omega0[axis]);
   const energies = w.map((x, i) => times(productOf(x, x), moment[i]));
-  const gaps = {
-    moment,
-    w,
-    energies,
-    d12: sumOf(moment[0], -moment[1]),
-    d13: sumOf(moment[0], -moment[2]),
-    d23: sumOf(moment[1], -moment[2]),
-  };
-  gaps.e2 = subtract(multiply(energies[2], gaps.d23), multiply(energies[0], gaps.d12));
-  if (Math.abs(gaps.e2[0]) <= CANCELLED * energies[2][0] * gaps.d23[0]) gaps.e2 = narrowGap(gaps);
-  return [axes, withSums(gaps)];
-}
-
-function withSums(gaps) {
-  const { energies, d12, d13, d23 } = gaps;
+  const gap = (x, y) => sumOf(Math.max(x, y), -Math.min(x, y));
+  const d12 = gap(moment[0], moment[1]);
+  const d13 = gap(moment[0], moment[2]);
+  const d23 = gap(moment[1], moment[2]);
   const e1 = add(multiply(energies[0], d13), multiply(energies[1], d23));
   const e3 = add(multiply(energies[2], d13), multiply(energies[1], d12));
-  return { ...gaps, e1, e3 };
-}
-
-// Exchange axes 1 and 3.
-function reversed(axes, { moment, w, energies, d12, d13, d23, e2 }) {
-  const turn = (each) => [...each].reverse();
-  const [d, e] = [{ d12: d23, d13, d23: d12 }, { e2: negative(e2) }];
-  const other = { moment: turn(moment), w: turn(w), energies: turn(energies), ...d, ...e };
-  return [turn(axes), withSums(other)];
+  let e2 = subtract(multiply(energies[2], d23), multiply(energies[0], d12));
+  if (Math.abs(e2[0]) <= CANCELLED * energies[2][0] * d23[0]) {
+    e2 = narrowGap(moment, w, energies, d12, d23);
+  }
+  return { moment, w, energies, d12, d13, d23, e1, e2, e3 };
 }
 
 // Return e2 near the separatrix, where nearly all of it cancels, from products in triple-double.
-function narrowGap({ moment, w, energies, d12, d23 }) {
-  const [x, y] = [
-    [w[2], moment[2], d23[0]],
-    [w[0], moment[0], d12[0]],
-  ].map(([rate, inertia, gap]) =>
-    [rate, inertia, gap].reduce((triple, factor) => longerTimes(triple, factor), [rate, 0, 0]),
-  );
+function narrowGap(moment, w, energies, d12, d23) {
+  const triple = (i, gap) =>
+    longerTimes(longerTimes([...productOf(w[i], w[i]), 0], moment[i]), gap[0]);
+  const [x, y] = [triple(2, d23), triple(0, d12)];
   const parts = x.map((each, i) => sumOf(each, -y[i]));
   const low = subtract(times(energies[2], d23[1]), times(energies[0], d12[1]));
   return add(add(add(parts[0], parts[1]), parts[2]), low);
@@ -172,8 +157,7 @@ function tumblingOrbit(w, gaps) {
     Math.sqrt(e3[0] / (moment[2] * d13[0])),
   ];
   const sense = moment[2] < moment[0] ? -1 : 1;
-  const peak = largest[1];
-  const orbit = { isSteady: false, peak, sense, direction: moment.map((x) => x / momentum[0]) };
+  const orbit = { isSteady: false, sense, direction: moment.map((x) => x / momentum[0]) };
   // lambda and lambda k', times `inertia`; u' = lambda.
   const upper = root(multiply(d23, e3));
   let comodulus = 0;
@@ -192,6 +176,7 @@ function tumblingOrbit(w, gaps) {
     const mean = meanOf(upper, root(multiply(d12, e1)));
     theta.ratio = divide(times(mean, 0.5), multiply(orbit.frequency, inertia));
   }
+  const peak = largest[1];
   orbit.start = [0, 0];
   if (e1[0] > FAINT * e3[0]) {
     const values = [w[0] / largest[0], (sense * w[1]) / largest[1], w[2] / largest[2]];
@@ -201,7 +186,8 @@ function tumblingOrbit(w, gaps) {
     largest = [0, 0, largest[2]];
   }
   const sizes = [largest[0], sense * largest[1], largest[2]];
-  return { ...orbit, theta: { ...theta, size: theta.size.map((x, i) => x * sizes[i]) } };
+  const size = theta.size.map((x, i) => x * sizes[i]);
+  return { ...orbit, theta: { ...theta, size }, peak, least: largest[2] * comodulus };
 }
 
 // Return the frequency of the phase, from the arithmetic-geometric mean, and half the rate of the
@@ -267,7 +253,8 @@ function turned(orbit, t) {
   ]);
   const [total, error] = sumOf(angle[0], part * orbit.sense);
   const [sine, cosine] = sineCosine([total, angle[1] + error]);
-  const m = f.map((x, i) => x * orbit.direction[i]); // direction of the angular momentum
+  // The direction of the angular momentum.
+  const m = f.map((x, i) => x * orbit.direction[i]);
   const s = plain * orbit.sense;
   const inverse = 1 / Math.sqrt((c * c + s * s) * (2 + 2 * m[2]));
   const along = (cosine * c - sine * s) * inverse;

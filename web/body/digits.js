@@ -1,7 +1,8 @@
 // The digits that remain of a motion whose start is known to 16 digits.
 import { torqueFree } from "./closed-form.js";
 
-const PERTURBATION = 2 ** -48; // relative to the largest component of omega
+// The perturbation of omega, relative to the largest component of omega.
+const PERTURBATION = 2 ** -48;
 const HALF_ULP = 2 ** -53;
 
 // Return a function of the time (s). It returns { growth, angle, digits }: the error amplification
@@ -29,6 +30,6 @@ export function amplification(moments, omega0) {
     }
     const growth = Math.max(1, ...sums);
     const remain = (factor) => Math.max(0, -Math.log10(HALF_ULP * Math.max(1, factor)));
-    return { growth, angle, digits: { omega: remain(growth), attitude: remain(angle) } };
+    return { growth, angle, digits: [remain(growth), remain(angle)] };
   };
 }

@@ -1,7 +1,8 @@
 // Double-double arithmetic, accurate to some 1e-31: a number is a pair [high, low], where `low` is
 // the rounding error of `high`.
 
-const SPLITTER = 134217729; // 2^27 + 1
+// 2^27 + 1.
+const SPLITTER = 134217729;
 
 // Return the pair that is exactly x + y (Knuth).
 export function sumOf(x, y) {
@@ -30,12 +31,8 @@ export function add(x, y) {
   return [high, rest - (high - total)];
 }
 
-export function negative(x) {
-  return [-x[0], -x[1]];
-}
-
 export function subtract(x, y) {
-  return add(x, negative(y));
+  return add(x, [-y[0], -y[1]]);
 }
 
 export function multiply(x, y) {

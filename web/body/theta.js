@@ -3,11 +3,16 @@
 // x = pi u/(4 K'). This module has the formulas of fortran/modern/theta_functions.f90.
 import { productOf, sineCosine, sumOf, times } from "./double-double.js";
 
-const MOST_LEVELS = 16; // of the arithmetic-geometric mean
-const FLAT = 4e-9; // difference whose square is negligible
-const BALANCED = 0.1085; // nome at which K = sqrt(2) K'
-const PI_LOW = 1.2246467991473532e-16; // pi without its first 53 bits
-const FAR = 340; // larger arguments make exponentials negligible
+// The most levels of the arithmetic-geometric mean.
+const MOST_LEVELS = 16;
+// A difference whose square is negligible.
+const FLAT = 4e-9;
+// The nome at which K = sqrt(2) K'.
+const BALANCED = 0.1085;
+// The number pi without its first 53 bits.
+const PI_LOW = 1.2246467991473532e-16;
+// Larger arguments make exponentials negligible.
+const FAR = 340;
 
 // Return the constants of the series that converges faster, for k^2 = pole[0] pole[1] and k'.
 //
@@ -34,7 +39,8 @@ export function thetaSeries(pole, k, comodulus) {
   return exponentials("hyperbolic", pole, k, square);
 }
 
-// `square` is that of the nome q, and `overPole` is it over pole[0].
+// Return the constants of the series in sines. `square` is the square of the nome q, and `overPole` is
+// `square` over pole[0].
 function sines(pole, comodulus, square, overPole) {
   const q = Math.sqrt(square);
   const powers = [2 * q, 2 * square ** 2, 2 * q * square ** 4, 2 * square ** 8];
@@ -63,7 +69,8 @@ function sines(pole, comodulus, square, overPole) {
   };
 }
 
-// `square` is that of the nome Q = exp(-pi K/(2 K')).
+// Return the constants of the series in exponentials. `square` is the square of the nome
+// Q = exp(-pi K/(2 K')).
 function exponentials(kind, pole, k, square) {
   const theta2 = 1 + square ** 2 * (1 + square ** 4);
   const theta3 = 1 + 2 * (square + square ** 4);
@@ -161,7 +168,8 @@ function sumOfExponentials(theta, phase) {
   const { size, powers, nome: q } = theta;
   const q2 = powers[0];
   let [x, xLow] = phase;
-  let sense = 1; // sign of sn and cn after this number of half periods
+  // The sign of sn and cn after this number of half periods.
+  let sense = 1;
   let part = 0;
   if (theta.kind === "hyperbolic") {
     const turns = Math.round(x / Math.PI);
@@ -175,7 +183,8 @@ function sumOfExponentials(theta, phase) {
   }
   let g = Math.exp(-2 * Math.min(Math.abs(x), FAR));
   g -= 2 * g * (x < 0 ? -xLow : xLow);
-  const h = q > 0 ? q / g : 0; // Q exp(2 |x|), which is 1 at the most
+  // This is Q exp(2 |x|), at most 1.
+  const h = q > 0 ? q / g : 0;
   const [g2, h2] = [g * g, h * h];
   const [g4, h4] = [g2 * g2, h2 * h2];
   const inverse =

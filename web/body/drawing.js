@@ -50,7 +50,7 @@ export class Drawing {
       ...{ motion, moments, path, most, upright, size },
       height: energy / (size || 1) / most,
       radii: moments.map((moment) => Math.sqrt(energy / moment)),
-      box: edges.map((edge) => Math.max(0.03, (0.75 * edge) / Math.max(...edges))),
+      box: edges.map((edge) => Math.max(0.03, (0.85 * edge) / Math.hypot(...edges))),
     };
   }
 
@@ -72,7 +72,7 @@ export class Drawing {
   }
 
   drawSpace({ omega, attitude }, trace, azimuth) {
-    const pen = this.pen("space", azimuth, 2.45, 0.13);
+    const pen = this.pen("space", azimuth, 2.55, 0.1);
     const { moments, most, upright, size, height, box } = this.motion;
     const place = (v) => inSpace(upright, inSpace(attitude, v));
     // An arrow begins where it leaves the box. It is behind the box if this face is not seen.

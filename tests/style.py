@@ -15,7 +15,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 TERMS = tomllib.loads((Path(__file__).parent / "style.toml").read_text())
-_FOLDERS = ("pyharness", "fortran", "docs", "web/programs", "web/laboratory", "tests")
+_FOLDERS = ("pyharness", "fortran", "docs", "web/programs", "web/laboratory", "web/body", "tests")
 _NOT = ("_build.py",)  # written by the build
 _CODE = re.compile(
     r"```.*?```|``.*?``|`[^`]*`|\$[^$]*\$|\"[^\"\n]*\"|“[^”]*”|\]\([^)]*\)|(?<!\w)'[^'\n]+'(?!\w)"

@@ -113,7 +113,7 @@ def _output(program: str) -> str:
     """Return the text that a Python program prints."""
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
-        exec(program, {})  # noqa: S102
+        exec(program, {})
     return printed.getvalue()
 
 
@@ -143,7 +143,7 @@ def _picture(scene: Scene) -> Picture:
     plane.plot(*path[:1].T, "o", color="black", markersize=4)
     plane.set(title="herpolhode", xlabel="rad/s", aspect="equal")
     rows = np.column_stack([times, found.omega, path])
-    return Picture(figure, numbers("time,s omega1,rad/s omega2 omega3 x y", rows))
+    return Picture(figure, numbers("time,s omega1,rad/s omega2 omega3 x y", rows.tolist()))
 
 
 def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:

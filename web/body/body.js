@@ -144,7 +144,7 @@ function play(wanted) {
   last = null;
   element("play").textContent = wanted ? "Pause" : "Play";
   if (wanted) requestAnimationFrame(advance);
-  else change(state);
+  else change({ ...state, time: Number(state.time.toPrecision(9)) });
 }
 
 // Advance the time by a frame. Browsers call no frame of a hidden page; the clock stops with them.

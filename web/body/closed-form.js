@@ -29,8 +29,6 @@ const CANCELLED = 1e-4;
 const FLAT = 1e-10;
 // The last term of the sum; the means then differ by less.
 const LAST = 1e-17;
-// Squares of smaller perturbations would underflow.
-const FAINT = 1e-240;
 // The phase that ends the path on the separatrix.
 const ENDLESS = 20;
 
@@ -51,28 +49,27 @@ export function inSpace(q, vector) {
 }
 
 // Return the torque-free motion of a body, as { at, isSteady, axes, flipTime, flipAfter, span, peak,
-// least }, or null if omega is so close to the middle axis that squares underflow.
+// least }.
 //
 // `moments` (kg m2) and `omega0` (rad/s) are about the body's axes, which are parallel to those of
-// space at time 0. at(t) returns { omega, attitude } at t seconds. `flipTime` is the time (s)
-// between sign changes of omega about the middle axis, infinite if there is none; flipAfter(t) is
-// the time of the next one. `span` is a time (s) in which omega runs through its whole path in the
-// body: the period, or on the separatrix the time outside of which omega is steady. If omega is not
-// steady, `peak` is the largest omega about the middle axis (rad/s), and `least` the smallest about
-// the axis that omega circles. `axes` has the numbers of the body's axes (0, 1, 2) in the order of
-// the orbit.
+// space at time 0. The squares of ratios of the components of omega must not underflow. at(t) returns
+// { omega, attitude } at t seconds. `flipTime` is the time (s) between sign changes of omega about
+// the middle axis, infinite if there is none; flipAfter(t) is the time of the next one. `span` is a
+// time (s) in which omega runs through its whole path in the body: the period, or on the separatrix
+// the time outside of which omega is steady. If omega is not steady, `peak` is the largest omega
+// about the middle axis (rad/s), and `least` the smallest about the axis that omega circles. `axes`
+// has the numbers of the body's axes (0, 1, 2) in the order of the orbit.
 export function torqueFree(moments, omega0) {
   const axes = [0, 1, 2].sort((a, b) => moments[b] - moments[a] || a - b);
   let gaps = gapsOf(moments, omega0, axes);
   // Omega about the other extreme axis keeps its sign.
   if (gaps.e2[0] < 0) gaps = gapsOf(moments, omega0, axes.reverse());
-  const { w, energies } = gaps;
+  const { w } = gaps;
   const signs = w.map((x) => (x < 0 ? -1 : 1));
   signs[1] = signs[0] * signs[2] * ((axes[0] + 1) % 3 === axes[1] ? 1 : -1);
   const start = w.map((x, i) => x * signs[i] + 0);
 
-  const isSteady = !(gaps.d23[0] * gaps.e3[0] > 0) || (w[0] === 0 && w[2] === 0);
-  if (!isSteady && energies[2][0] * gaps.d13[0] <= FAINT * gaps.e3[0]) return null;
+  const isSteady = [gaps.d23, gaps.e1, gaps.e3].some(([x]) => x === 0) || (w[0] === 0 && w[2] === 0);
   const orbit = isSteady ? steadyOrbit(start) : tumblingOrbit(start, gaps);
   const [scalar, ...vector] = turned(orbit, 0).turn;
   const before = [scalar, ...vector.map((x) => -x)];
@@ -151,7 +148,7 @@ function tumblingOrbit(w, gaps) {
     (e1[0] * moment[0]) / (e3[0] * moment[2]),
   ];
   const k = Math.sqrt(pole[0] * pole[1]);
-  let largest = [
+  const largest = [
     Math.sqrt(e1[0] / (moment[0] * d13[0])),
     Math.sqrt(e1[0] / (moment[1] * d23[0])),
     Math.sqrt(e3[0] / (moment[2] * d13[0])),
@@ -176,18 +173,11 @@ function tumblingOrbit(w, gaps) {
     const mean = meanOf(upper, root(multiply(d12, e1)));
     theta.ratio = divide(times(mean, 0.5), multiply(orbit.frequency, inertia));
   }
-  const peak = largest[1];
-  orbit.start = [0, 0];
-  if (e1[0] > FAINT * e3[0]) {
-    const values = [w[0] / largest[0], (sense * w[1]) / largest[1], w[2] / largest[2]];
-    orbit.start = startOfPhase(theta, k, comodulus, slope, values);
-  } else {
-    // About axis 3, except for a negligible perturbation.
-    largest = [0, 0, largest[2]];
-  }
+  const values = [w[0] / largest[0], (sense * w[1]) / largest[1], w[2] / largest[2]];
+  orbit.start = startOfPhase(theta, k, comodulus, slope, values);
   const sizes = [largest[0], sense * largest[1], largest[2]];
   const size = theta.size.map((x, i) => x * sizes[i]);
-  return { ...orbit, theta: { ...theta, size }, peak, least: largest[2] * comodulus };
+  return { ...orbit, theta: { ...theta, size }, peak: largest[1], least: largest[2] * comodulus };
 }
 
 // Return the frequency of the phase, from the arithmetic-geometric mean, and half the rate of the

@@ -12,11 +12,11 @@ const HALF_ULP = 2 ** -53;
 export function amplification(moments, omega0) {
   const size = Math.max(...omega0.map(Math.abs));
   const motion = torqueFree(moments, omega0);
-  const perturbed = [0, 1, 2].flatMap((axis) => {
+  const axes = size > 0 ? [0, 1, 2] : [];
+  const perturbed = axes.map((axis) => {
     const beside = [...omega0];
     beside[axis] += PERTURBATION * size;
-    const other = size > 0 && torqueFree(moments, beside);
-    return other ? [{ other, step: beside[axis] - omega0[axis] }] : [];
+    return { other: torqueFree(moments, beside), step: beside[axis] - omega0[axis] };
   });
   return (t) => {
     const plain = motion.at(t);

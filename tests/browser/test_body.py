@@ -47,7 +47,10 @@ def _fragment(browser: Chrome) -> str:
 def _drawn(browser: Chrome, id: str) -> int:
     """Return the number of pixels of a canvas that are drawn."""
     script = """const canvas = document.getElementById(arguments[0]);
-      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      const { width, height } = canvas;
+      const copy = new OffscreenCanvas(width, height).getContext("2d");
+      copy.drawImage(canvas, 0, 0);
+      const { data } = copy.getImageData(0, 0, width, height);
       return data.filter((x, n) => n % 4 === 3 && x > 0).length;"""
     found: int = browser.execute_script(script, id)
     return found
@@ -241,8 +244,10 @@ def test_it_starts_only_where_motion_is_welcome(browser: Chrome, body: Open) -> 
         assert _text(browser, "play") == "Pause"
         WebDriverWait(browser, 5).until(lambda _: _text(browser, "at-time") != "0 s")
         # A drawing that is out of sight does not move.
-        browser.execute_script("window.scrollTo(0, document.body.scrollHeight)")
-        time.sleep(0.5)
+        browser.execute_script(
+            "window.scrollTo({ top: document.body.scrollHeight, behavior: 'instant' })"
+        )
+        time.sleep(0.7)
         before = _text(browser, "at-time")
         time.sleep(0.5)
         assert _text(browser, "at-time") == before

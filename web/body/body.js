@@ -17,8 +17,8 @@ import {
 
 const data = window.bodyData;
 const element = (id) => document.getElementById(id);
-const drawing = new Drawing();
-drawing.recolour();
+const [space, polhode, herpolhode] = ["space", "polhode", "herpolhode"].map(element);
+const drawing = new Drawing({ space, polhode, herpolhode });
 // The slider of the time is logarithmic: from its second position on, 0.01 s to the latest time.
 const DECADES = Math.log10(data.longest) + 2;
 const POSITIONS = Number(element("slider").max);
@@ -217,9 +217,9 @@ matchMedia("print").addEventListener("change", recolour);
 
 element("tumbling").hidden = false;
 fromAddress();
-new ResizeObserver(draw).observe(element("space"));
+new ResizeObserver(draw).observe(space);
 new IntersectionObserver(([{ isIntersecting }]) => {
   isSeen = isIntersecting;
-}).observe(element("space"));
+}).observe(space);
 // An address that names a time shows this time.
 if (!matchMedia("(prefers-reduced-motion: reduce)").matches && state.time === 0) play(true);

@@ -17,6 +17,12 @@ const AXIS_COLOURS = ["--c1", "--c2", "--c3"];
 const COLOURS = ["--ink", "--paper", "--line", "--muted", "--accent", ...AXIS_COLOURS];
 
 export class Drawing {
+  // `canvases` are { space, polhode, herpolhode }.
+  constructor(canvases) {
+    this.canvases = canvases;
+    this.recolour();
+  }
+
   // Read the colours that apply now; only the computed style of an element shows them.
   recolour() {
     const probe = document.createElement("span");
@@ -155,11 +161,11 @@ export class Drawing {
     pen.dot(flat.at(-1));
   }
 
-  // Clear the canvas with this id and return the functions that draw in it. `across` is the smaller
-  // side of the canvas in units of the drawing, and `down` moves the origin.
-  pen(id, azimuth, across, down, elevation = ELEVATION, distance = DISTANCE) {
+  // Clear a canvas and return the functions that draw in it. `across` is the smaller side of the
+  // canvas in units of the drawing, and `down` moves the origin.
+  pen(name, azimuth, across, down, elevation = ELEVATION, distance = DISTANCE) {
     const { colours } = this;
-    const canvas = document.getElementById(id);
+    const canvas = this.canvases[name];
     const { clientWidth: width, clientHeight: height } = canvas;
     const ratio = window.devicePixelRatio || 1;
     canvas.width = Math.round(width * ratio);

@@ -131,7 +131,7 @@ export class Drawing {
     const { moments, path, radii } = this.motion;
     const unit = Math.max(...radii) || 1;
     // The longest axis is not to point to the eye.
-    const pen = this.pen("polhode", azimuth + (radii[1] > radii[0] ? Math.PI / 2 : 0), 2.5, 0, 0.6);
+    const pen = this.pen("polhode", azimuth + (radii[1] > radii[0] ? Math.PI / 2 : 0), 2.9, 0, 0.6);
     const scaled = (w) => w.map((x) => x / unit);
     // What is behind the ellipsoid is faint. Its outward normal is along I omega.
     const curve = (points, style, stride = 1) => {

@@ -161,8 +161,6 @@ def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
     axes.set_box_aspect(size, zoom=1.2)
     axes.view_init(elev=24.0, azim=-30.0)
     axes.set_axis_off()
-    for axis, end in enumerate(1.15 * np.diag(size)):
-        axes.text(*end, str(axis + 1))
 
 
 def _in_plane(found: Trajectory) -> Array:

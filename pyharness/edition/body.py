@@ -26,7 +26,8 @@ from pyharness import Scene, solve
 
 body = Scene("Case 4", omega=(0, 1, 10), moments=(40, 30, 20))
 found = solve(body, [1.0, 1e3, 1e6], "closed-form", attitude=True)
-print(found.omega.round(6), found.attitude.round(6), sep="\\n")
+print(found.omega.round(6))
+print(found.attitude.round(6))
 """
 """The program that the page shows; it solves Case 4 of the thesis."""
 

@@ -16,7 +16,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 TERMS = tomllib.loads((Path(__file__).parent / "style.toml").read_text())
-_FOLDERS = ("pyharness", "fortran", "docs", "web/programs", "web/laboratory", "tests")
+_FOLDERS = (
+    "pyharness", "fortran", "docs", "tests",
+    "web/programs", "web/laboratory", "web/body", "web/story",
+)  # fmt: skip
 _SHARED = ("_build", "_kernels", "_many", "_solver")
 _NOT = ("_build.py",)  # written by the build
 _CODE = re.compile(

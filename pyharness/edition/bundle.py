@@ -16,6 +16,8 @@ _IMPORT = re.compile(
 _EXPORT = re.compile(r"^export (?=(?:function|const|class) (?P<name>\w+))", re.M)
 # An unsupported form of import or export, which remains after the supported forms are replaced.
 _UNKNOWN = re.compile(r"^\s*(?:import|export)\b.*|\bimport\s*[(.]", re.M)
+# A line that is only a comment. Readers of the script find the comments in the modules.
+_COMMENT = re.compile(r"^ *//.*\n", re.M)
 
 
 def bundle(entry: Path) -> str:
@@ -64,7 +66,7 @@ def _add(
     parts += [
         f"// {path.parent.name}/{path.name}",
         f"const module{number} = (() => {{",
-        body.rstrip(),
+        _COMMENT.sub("", body).rstrip(),
         f"return {{ {', '.join(names)} }};",
         "})();",
         "",

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pyharness.edition import (
     api,
+    body,
     decks,
     documents,
     figures,
@@ -27,6 +28,7 @@ from pyharness.edition.bundle import bundle
 from pyharness.edition.markdown import inline
 from pyharness.edition.report import MARK, listed
 from pyharness.history.claims.report import written
+from pyharness.history.claims.stories import prose
 from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import facts, shipped
@@ -52,7 +54,10 @@ MENU = {
         ("Comparison", "listing/collation.html"),
         ("Apparatus", "apparatus.html"),
     ),
-    "Laboratory": (("Laboratory", "laboratory.html"),),
+    "Laboratory": (
+        ("The programs", "laboratory.html"),
+        ("A body that tumbles", "body.html"),
+    ),
     "Thesis and claims": (
         ("Thesis", "thesis.html"),
         ("Claims", "claims.html"),
@@ -137,6 +142,7 @@ def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -
     progress(2, 5, "listing")
     yield from _listing()
     yield Page("laboratory.html", "Laboratory", "laboratory.html", laboratory.context())
+    yield Page("body.html", "A body that tumbles", "body.html", body.context())
     sentences = ledger.thesis(judged)
     yield Page(
         "thesis.html", "The thesis, executable", "thesis.html",
@@ -255,6 +261,9 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
     content["assets/story-data.js"] = script("storyData", story.data())
     content["assets/laboratory.js"] = bundle(web / "laboratory" / "laboratory.js").encode()
     content["assets/laboratory-data.js"] = script("laboratoryData", laboratory.context()["data"])
+    content["assets/body.js"] = bundle(web / "body" / "body.js").encode()
+    content["assets/body-data.js"] = script("bodyData", body.data())
+    content |= {f"figures/{name}": file for name, file in body.files().items()}
     content["assets/search-data.js"] = script("searchData", [each._asdict() for each in places])
     content["listing/edition.xml"] = tei_document()
     return content
@@ -292,6 +301,6 @@ def _templates() -> "Environment":
         lstrip_blocks=True,
     )
     templates.filters["number"] = written
-    templates.filters["brief"] = story.brief
+    templates.filters["prose"] = prose
     templates.globals["inline"] = inline
     return templates

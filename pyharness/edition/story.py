@@ -7,7 +7,6 @@ and replaces them when a visitor changes something.
 
 import math
 from collections.abc import Iterable, Sequence
-from decimal import Decimal
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -33,7 +32,6 @@ BLIND_CASES = (1, 2, 5)
 RACE_CASES = (2, 3, 4, 5, 6, 7)
 # The plot area of every chart in the units of its picture: left, top, right, bottom.
 BOX = (40, 10, 350, 196)
-_TIMES = "\N{NO-BREAK SPACE}\N{MULTIPLICATION SIGN}\N{NO-BREAK SPACE}"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _DOUBLED = (0.01, 0.005, 0.0025, 0.00125)  # s
 _LOG_STEP = 2  # powers of ten from one label to the next
@@ -64,15 +62,6 @@ class Chart(NamedTuple):
     curves: list[Curve]
     is_logarithmic: bool = False
     is_marked: bool = False
-
-
-def brief(value: float, digits: int = 3) -> str:
-    """Return a number with some significant digits, for reading, perhaps with a power of ten."""
-    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
-    if value == 0.0 or -4 <= int(power) < 6:
-        return format(Decimal(f"{mantissa}e{power}").normalize(), "f")
-    shown = format(Decimal(mantissa).normalize(), "f")
-    return f"{shown}{_TIMES}10{str(int(power)).translate(_SUPERSCRIPTS)}"
 
 
 def data() -> dict[str, Any]:

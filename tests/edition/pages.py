@@ -61,11 +61,11 @@ def dead(site: dict[str, bytes]) -> Iterator[str]:
             target = target if path else name
             if target not in site:
                 yield f"{name}: {element} {path}"
-            # The laboratory's anchor is a state, not an element.
+            # The anchor of these pages is a state, not an element.
             elif (
                 anchor
                 and target in read
-                and target != "laboratory.html"
+                and target not in ("laboratory.html", "body.html")
                 and anchor not in read[target].anchors
             ):
                 yield f"{name}: {element} {path}#{anchor}"

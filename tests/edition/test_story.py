@@ -12,8 +12,8 @@ import pytest
 
 from pyharness import case_scene, run_program
 from pyharness.edition import story
-from pyharness.edition.story import brief
 from pyharness.history.claims.ledger import judgement
+from pyharness.history.claims.stories import prose
 from pyharness.history.claims.verdicts import FALSE, REPRODUCED
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, subset, switches
@@ -168,10 +168,10 @@ def test_48_bits_stop_the_run_too() -> None:
     assert (run.stop.step, run.stop.variable) == (25, "V2")
 
 
-def test_texts_are_brief_forms_of_the_values(slots: Slots) -> None:
+def test_texts_are_the_values_for_reading(slots: Slots) -> None:
     assert len(slots.values) > 25
     for slot, value in slots.values.items():
-        assert slots.texts[slot] == brief(value, slots.digits[slot]), slot
+        assert slots.texts[slot] == prose(value, slots.digits[slot]), slot
 
 
 def test_both_languages_write_a_number_alike() -> None:
@@ -180,17 +180,26 @@ def test_both_languages_write_a_number_alike() -> None:
         (generator.choice((-1, 1)) * 10.0 ** generator.uniform(-20, 20), generator.randint(1, 6))
         for _ in range(2000)
     ]
-    numbers += [(0.0, 3), (3304.7, 4), (999999.0, 2), (9.9999e-5, 2), (1e-4, 3), (0.5, 1)]
+    numbers += [
+        (0.0, 3),
+        (3304.7, 4),
+        (999999.0, 2),
+        (9.9999e-4, 2),
+        (1e-3, 3),
+        (-1234.5, 5),
+        (-0.0, 2),
+        (0.5, 1),
+    ]
     script = (
-        f"import {{ brief }} from {json.dumps(str(WEB / 'story' / 'numbers.js'))};"
+        f"import {{ prose }} from {json.dumps(str(WEB / 'story' / 'numbers.js'))};"
         "import { readFileSync } from 'node:fs';"
-        "console.log(JSON.stringify(JSON.parse(readFileSync(0)).map(([x, n]) => brief(x, n))));"
+        "console.log(JSON.stringify(JSON.parse(readFileSync(0)).map(([x, n]) => prose(x, n))));"
     )
     done = subprocess.run(
         [engine(), "--input-type=module", "--eval", script],
         input=json.dumps(numbers), capture_output=True, text=True, check=True,
     )  # fmt: skip
-    assert json.loads(done.stdout) == [brief(value, digits) for value, digits in numbers]
+    assert json.loads(done.stdout) == [prose(value, digits) for value, digits in numbers]
 
 
 def test_the_home_page_is_light(built_site: dict[str, bytes]) -> None:

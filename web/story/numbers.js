@@ -1,8 +1,11 @@
-// Return a number with some significant digits, for reading, as in `3305` or `2.5 × 10⁻⁷`; the same
-// as `brief` of pyharness/edition/story.py.
-export function brief(value, digits = 3) {
-  const [mantissa, power] = value.toExponential(digits - 1).split("e");
-  if (value === 0 || (power >= -4 && power < 6)) return String(Number(value.toPrecision(digits)));
+// Return a number as text for a sentence, with some significant digits; the same as `prose` of
+// pyharness/history/claims/stories.py.
+export function prose(x, digits = 3) {
+  if (x === 0 || (Math.abs(x) >= 1e-3 && Math.abs(x) < 1e6)) {
+    const rounded = Number(x.toPrecision(digits));
+    return Number.isInteger(rounded) ? String(rounded).replace(/\B(?=(\d{3})+$)/g, ",") : String(rounded);
+  }
+  const [mantissa, power] = x.toExponential(digits - 1).split("e");
   const raised = [...String(Number(power))].map((each) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(each)]);
   return `${Number(mantissa)}\u00a0×\u00a010${raised.join("")}`;
 }

@@ -6,7 +6,7 @@ import { reference } from "../laboratory/reference.js";
 import { PROGRAMS } from "../programs/programs.js";
 import { Trace } from "../programs/trace.js";
 import { draw, mark } from "./chart.js";
-import { brief } from "./numbers.js";
+import { prose } from "./numbers.js";
 
 const { scenes, original, letters, lipschitz } = window.storyData;
 const element = (id) => document.getElementById(id);
@@ -38,7 +38,7 @@ function distance({ rows }, goal, components = [0, 1, 2]) {
 function fill(slot, value) {
   for (const each of all(`[data-slot="${slot}"]`)) {
     each.value = String(value);
-    each.textContent = brief(value, Number(each.dataset.digits));
+    each.textContent = prose(value, Number(each.dataset.digits));
   }
 }
 

@@ -16,6 +16,7 @@ FIELD = re.compile(r"\{(original|corrected): (?:(min|max) of )?(.+?)( in %)?\}")
 After `min of` or `max of`, the name is a pattern, as for file names, and the field is replaced by
 the smallest or the largest of all numbers that fit the pattern.
 """
+_TIMES = "\N{NO-BREAK SPACE}\N{MULTIPLICATION SIGN}\N{NO-BREAK SPACE}"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -53,14 +54,15 @@ def story(judgement: Judgement) -> Story:
     return Story(*(FIELD.sub(number, judgement.claim[name]) for name in Story._fields))
 
 
-def prose(x: float) -> str:
-    """Return a number as text for a sentence, with three significant digits.
+def prose(x: float, digits: int = 3) -> str:
+    """Return a number as text for a sentence, with some significant digits.
 
     A large number has commas, and a very large or very small one has a power of ten.
+    web/story/numbers.js writes the same text.
     """
     if x == 0 or 1e-3 <= abs(x) < 1e6:
-        rounded = float(f"{x:.3g}")
-        return f"{rounded:,.0f}" if rounded == int(rounded) else f"{rounded:g}"
-    mantissa, exponent = f"{x:.2e}".split("e")
+        rounded = float(f"{x:.{digits}g}")
+        return f"{rounded:,.0f}" if rounded == int(rounded) else f"{rounded:.{digits}g}"
+    mantissa, exponent = f"{x:.{digits - 1}e}".split("e")
     power = str(int(exponent)).translate(_SUPERSCRIPTS)
-    return f"{float(mantissa):g} \N{MULTIPLICATION SIGN} 10{power}"
+    return f"{float(mantissa):g}{_TIMES}10{power}"

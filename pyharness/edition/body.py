@@ -1,0 +1,175 @@
+"""The data of the page on which a body without torque tumbles, drawn from its closed form.
+
+The data include a picture of one motion and a short Python program with its output, for readers
+without JavaScript.
+"""
+
+import contextlib
+import io
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from pyharness.methods.solve import solve
+from pyharness.model.facts import facts
+from pyharness.model.report import Picture, numbers
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Array, Trajectory, turned_to_space
+from pyharness.theory.flips import flip_times
+from pyharness.views.pictures import saved
+
+PROGRAM = """\
+from pyharness import Scene, solve
+
+body = Scene("Case 4", omega=(0, 1, 10), moments=(40, 30, 20))
+found = solve(body, [1.0, 1e3, 1e6], "closed-form", attitude=True)
+print(found.omega.round(6))
+print(found.attitude.round(6))
+"""
+"""The program that the page shows; it solves Case 4 of the thesis."""
+
+AGREEMENT = 2e-15
+"""The largest difference between the page's closed form and the Fortran method.
+
+It applies to each component of the attitude, and to omega relative to its largest component.
+"""
+
+SPEEDS = (0.1, 0.25, 0.5, 1, 2, 10, 100, 1000)
+"""The speeds that the page offers, in seconds of the motion per second."""
+
+_FLIPS = 3.0  # length of the motion in the picture, in times between flips
+_POINTS = 601
+_COLOURS = ("#1040a0", "#b02018", "#107040")
+_STYLES = ("-", "--", "-.")
+
+
+@cache
+def context() -> dict[str, Any]:
+    """Return the values for the template of the page on which a body tumbles.
+
+    `data` is the object that the page's script reads as `window.bodyData`. `first` is the scene
+    that the page shows first, and `flip` the time between its flips (s). `program` is a Python
+    program, and `output` is the text that it prints.
+    """
+    first = _first()
+    return {
+        "data": data(),
+        "first": first,
+        "flip": float(flip_times(first.moments or (), first.omega)[0]),
+        "case_4_flip": float(flip_times(case_scene(4).moments or (), case_scene(4).omega)[0]),
+        "program": PROGRAM,
+        "output": _output(PROGRAM),
+        "agreement": AGREEMENT,
+        "speeds": SPEEDS,
+    }
+
+
+def data() -> dict[str, Any]:
+    """Return the JSON values of the page's script: the bodies that it offers, and the latest time.
+
+    Each body has a name for the page's address, a title, moments (kg m2) and an initial omega
+    (rad/s). A body of the thesis also has the number of its case.
+    """
+    known = facts("bodies")
+    cases = [
+        {"id": f"case-{number}", "title": f"Case {number}: {scene.name}", "case": number,
+         "moments": scene.moments, "omega": scene.omega}
+        for number in known["cases"]
+        for scene in [case_scene(number)]
+    ]  # fmt: skip
+    boxes = [
+        {"id": each["id"], "title": each["title"], "case": None,
+         "moments": moments_of_box(each["edges"], each["mass"]), "omega": each["omega"]}
+        for each in known["body"]
+    ]  # fmt: skip
+    return {"bodies": [*boxes, *cases], "first": known["first"], "longest": known["longest"]}
+
+
+def moments_of_box(edges: list[float], mass: float) -> list[float]:
+    """Return the principal moments (kg m2) of a homogeneous box about axes along its edges.
+
+    `edges` are the lengths of the edges (m), and `mass` is in kg. The moments are computed from
+    the decimal numbers, so that they are as short as the decimal result.
+    """
+    squares = [Fraction(str(edge)) ** 2 for edge in edges]
+    twelfth = Fraction(str(mass)) / 12
+    return [float(twelfth * (sum(squares) - square)) for square in squares]
+
+
+def files() -> dict[str, bytes]:
+    """Return the picture for readers without JavaScript, and its numbers, by file name."""
+    return saved(_picture(_first()), "body.svg")
+
+
+def _first() -> Scene:
+    given = data()
+    (found,) = [each for each in given["bodies"] if each["id"] == given["first"]]
+    return Scene(found["title"], found["omega"], moments=found["moments"])
+
+
+def _output(program: str) -> str:
+    """Return the text that a Python program prints."""
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(program, {})
+    return printed.getvalue()
+
+
+def _picture(scene: Scene) -> Picture:
+    """Draw omega over time, the polhode and the herpolhode of a scene over three flips."""
+    from matplotlib.figure import Figure
+
+    assert scene.moments is not None
+    end = _FLIPS * float(flip_times(scene.moments, scene.omega)[0])
+    times = np.linspace(0.0, end, _POINTS)
+    found = solve(scene, times.tolist(), "closed-form", attitude=True)
+    figure = Figure(figsize=(11.0, 3.7), layout="constrained")
+    over_time, ball, plane = (
+        figure.add_subplot(1, 3, 1),
+        figure.add_subplot(1, 3, 2, projection="3d"),
+        figure.add_subplot(1, 3, 3),
+    )
+    for axis, (colour, style) in enumerate(zip(_COLOURS, _STYLES, strict=True)):
+        label = f"$\\omega_{axis + 1}$"
+        over_time.plot(times, found.omega[:, axis], style, color=colour, label=label)
+    over_time.set(title="omega about the body's axes", xlabel="time (s)", ylabel="rad/s")
+    over_time.legend(loc="upper right", fontsize=8)
+    over_time.grid(visible=True, linewidth=0.3)
+    _draw_polhode(ball, np.array(scene.moments), found)
+    path = _in_plane(found)
+    plane.plot(*path.T, color="black", linewidth=0.9)
+    plane.plot(*path[:1].T, "o", color="black", markersize=4)
+    plane.set(title="herpolhode", xlabel="rad/s", aspect="equal")
+    rows = np.column_stack([times, found.omega, path])
+    return Picture(figure, numbers("time,s omega1,rad/s omega2 omega3 x y", rows.tolist()))
+
+
+def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
+    """Draw the path of omega on the ellipsoid of equal energy, in the body's axes."""
+    size = np.sqrt(moments @ np.square(found.omega[0]) / moments)
+    u, v = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 33), np.linspace(0.0, np.pi, 17))
+    ball = np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)
+    ellipsoid = [length * each for length, each in zip(size, ball, strict=True)]
+    axes.plot_wireframe(*ellipsoid, color="0.8", linewidth=0.4)
+    axes.plot(*found.omega.T, color="black", linewidth=1.5)
+    axes.set(
+        title="polhode",
+        **{f"{name}lim": (-length, length) for name, length in zip("xyz", size, strict=True)},
+    )
+    axes.set_box_aspect(size, zoom=1.2)
+    axes.view_init(elev=24.0, azim=-30.0)
+    axes.set_axis_off()
+
+
+def _in_plane(found: Trajectory) -> Array:
+    """Return omega in space (rad/s), perpendicular to the angular momentum, shape (n, 2)."""
+    assert found.attitude is not None
+    momentum = found.angular_momentum("space")[0]
+    up = momentum / np.linalg.norm(momentum)
+    first = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+    first /= np.linalg.norm(first)
+    across = np.column_stack([first, np.cross(up, first)])
+    return np.asarray(turned_to_space(found.attitude, found.omega) @ across)

@@ -154,9 +154,8 @@ def test_counts_by_kind_are_on_the_page_about_the_edition(built_site: dict[str, 
     assert html.table(table, "verdicts by kind of claim") in about
     results = next(row for row in table.rows if row[0] == "result")
     before, after = results[2].split(" / ")
-    told = f"Of {results[1]} statements about results, {before} are reproduced by the programs"
-    assert told in " ".join(home.split())
-    assert f"as printed and {after} by the corrected ones" in " ".join(home.split())
+    told = f"Of {results[1]} statements about results, the programs as printed reproduce {before},"
+    assert f"{told} and the corrected ones {after}." in " ".join(home.split())
 
 
 def test_the_listing_is_cited_by_the_digest_of_its_text(built_site: dict[str, bytes]) -> None:

@@ -61,7 +61,7 @@ def prose(x: float, digits: int = 3) -> str:
     web/story/numbers.js writes the same text.
     """
     if x == 0 or 1e-3 <= abs(x) < 1e6:
-        rounded = float(f"{x:.{digits}g}")
+        rounded = float(f"{x:.{digits}g}") + 0.0  # no sign of zero
         return f"{rounded:,.0f}" if rounded == int(rounded) else f"{rounded:.{digits}g}"
     mantissa, exponent = f"{x:.{digits - 1}e}".split("e")
     power = str(int(exponent)).translate(_SUPERSCRIPTS)

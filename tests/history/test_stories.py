@@ -102,7 +102,8 @@ def test_least_and_largest_of_a_pattern() -> None:
     [
         (25.0, "25"), (19367.2, "19,400"), (0.0018, "0.0018"), (0.2, "0.2"), (0.0, "0"),
         (4.45e6, "4.45\N{NO-BREAK SPACE}\N{MULTIPLICATION SIGN}\N{NO-BREAK SPACE}10⁶"),
-        (5.6e-13, "5.6\N{NO-BREAK SPACE}\N{MULTIPLICATION SIGN}\N{NO-BREAK SPACE}10⁻¹³"), (-0.5, "-0.5"), (99.96, "100"),
+        (5.6e-13, "5.6\N{NO-BREAK SPACE}\N{MULTIPLICATION SIGN}\N{NO-BREAK SPACE}10⁻¹³"),
+        (-0.5, "-0.5"), (99.96, "100"),
     ],
 )  # fmt: skip
 def test_numbers_in_sentences(x: float, text: str) -> None:

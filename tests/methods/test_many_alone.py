@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import Ensemble, Scene, TorqueLaw, prepare, solve, solve_many
+from pyharness import Ensemble, Scene, TorqueLaw, case_scene, prepare, solve, solve_many
 from pyharness.model.codes import Statuses
 from pyharness.model.extension import extension
 from tests.many_alone import BASE, METHODS, differing, differing_starts, mixed, same_bits
@@ -263,3 +263,11 @@ def test_solve_many_takes_torques_in_space_with_attitudes() -> None:
     starts[1] = np.nan
     spoilt = solve_many(scene, 1.5, omega0=starts, attitude0=attitudes, torque_constant=torques)
     assert np.flatnonzero(~spoilt.has_result).tolist() == [1]
+
+
+def test_a_prepared_solver_of_many_starts_has_its_work_limit() -> None:
+    scene = case_scene(5)
+    starts = np.tile(scene.omega, (4, 1))
+    ample, short = (prepare(scene, "taylor", effort=effort).many for effort in (1.0, 1e-3))
+    assert (ample(starts, 3e3)[1] == Statuses.COMPLETE).all()
+    assert (short(starts, 3e3)[1] == Statuses.GAVE_UP).all()

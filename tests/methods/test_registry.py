@@ -18,6 +18,7 @@ from pyharness.scenes.rescaled import scaled
 def test_properties_of_the_registry_are_those_of_its_methods() -> None:
     for name, method in REGISTRY.items():
         assert method.name == name
+        assert re.search(r"[12][09]\d\d|\.f90|solve_ivp|pyharness\.", method.source), name
         assert method.is_fixed_step == (method.evaluations > 0) == (method.finest == 1.0)
         if method.is_fixed_step:
             with pytest.raises(InputError, match=f"{name} has a fixed step and no tolerance"):

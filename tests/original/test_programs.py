@@ -1,5 +1,6 @@
 """Fortran against twin, bit for bit; corrected programs against the truth; stops of the thesis."""
 
+import inspect
 import itertools
 import os
 from dataclasses import replace
@@ -13,7 +14,7 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable, switches
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
-from pyharness.original import compiled
+from pyharness.original import compiled, runge_kutta
 from pyharness.original.cells import all_cells, all_listings, cell_name
 from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY, run_program
 from pyharness.truth.reference import reference
@@ -261,3 +262,14 @@ def test_torque_that_table_1_gives_initially_acts_over_the_first_step(program: s
     other = case_scene(5)
     with_it, without = (run_program(other, each).omega for each in (assumed, plain))
     np.testing.assert_array_equal(with_it, without)
+
+
+def test_the_stop_test_has_the_constant_of_the_deck_everywhere() -> None:
+    wanted = facts("cases")["deck"]["lipschitz"]
+    for function in (
+        run_program,
+        PROGRAM_REGISTRY["runge-kutta"].run,
+        compiled.run,
+        runge_kutta.run,
+    ):
+        assert inspect.signature(function).parameters["lipschitz"].default == wanted

@@ -9,6 +9,7 @@ import pytest
 from pyharness import Ensemble, Scene, TorqueLaw, case_scene, prepare, solve, solve_many
 from pyharness.model.codes import Statuses
 from pyharness.model.extension import extension
+from pyharness.model.trajectory import Array
 from tests.many_alone import BASE, METHODS, differing, differing_starts, mixed, same_bits
 
 TOP = Scene("top", (0.3, -0.4, 1.2), moments=(3.0, 2.0, 1.0))
@@ -271,3 +272,14 @@ def test_a_prepared_solver_of_many_starts_has_its_work_limit() -> None:
     ample, short = (prepare(scene, "taylor", effort=effort).many for effort in (1.0, 1e-3))
     assert (ample(starts, 3e3)[1] == Statuses.COMPLETE).all()
     assert (short(starts, 3e3)[1] == Statuses.GAVE_UP).all()
+
+
+@pytest.mark.parametrize("attitude0", [None, np.array([[1.0, 0.0, 0.0, 0.0]])])
+def test_a_refused_body_has_no_numbers(attitude0: Array | None) -> None:
+    moments = np.tile([3.0, 2.0, 1.0], (3, 1))
+    moments[1, 2] = -1.0
+    found = solve_many(TOP, 1.0, moments=moments, attitude0=attitude0)
+    assert found.status.tolist() == [Statuses.COMPLETE, Statuses.REFUSED, Statuses.COMPLETE]
+    for rows in (found.omega, found.attitude):
+        if rows is not None:
+            assert np.isnan(rows).all(axis=1).tolist() == [False, True, False]

@@ -1,11 +1,14 @@
 """Ports for tests: cells that cover all branches, and the commands of two ports."""
 
+import json
 import re
 import shlex
 import shutil
+import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -51,3 +54,21 @@ def engine() -> str:
 def node(web: Path) -> str:
     """Return the command of the port in a copy of `web`."""
     return shlex.join([engine(), str(web / "port.js")])
+
+
+def run_javascript(modules: Mapping[str, Path], body: str, **given: Any) -> Any:
+    """Return what JavaScript statements return, which use modules and values by their names."""
+    imports = [
+        f"import * as {name} from {json.dumps(str(path))};" for name, path in modules.items()
+    ]
+    script = (
+        f"{''.join(imports)} import {{ readFileSync }} from 'node:fs';"
+        f"const {{ {', '.join(given)} }} = JSON.parse(readFileSync(0));"
+        f"console.log(JSON.stringify((() => {{ {body} }})()));"
+    )
+    done = subprocess.run(
+        [engine(), "--input-type=module", "--eval", script],
+        input=json.dumps(given), capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-500:]
+    return json.loads(done.stdout)

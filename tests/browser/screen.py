@@ -1,9 +1,11 @@
 """Helpers for tests in a browser: the screen, the console's messages, pages that are too wide."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from selenium.webdriver import Chrome
+from selenium.webdriver.common.by import By
 
 WIDTHS = (360, 800, 1440)
 # Wider than any font of a reader: every letter takes one em more.
@@ -53,3 +55,35 @@ def too_wide(browser: Chrome) -> int:
     script = "return document.documentElement.scrollWidth - document.documentElement.clientWidth"
     found: int = browser.execute_script(script)
     return found
+
+
+def click(browser: Chrome, selector: str) -> None:
+    """Click as a mouse does, where the element can be seen."""
+    element = browser.find_element(By.CSS_SELECTOR, selector)
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
+    element.click()
+
+
+def text_of(browser: Chrome, id: str) -> str:
+    """Return the text of an element, hidden parts included."""
+    script = "return document.getElementById(arguments[0]).textContent"
+    return str(browser.execute_script(script, id))
+
+
+def fragment(browser: Chrome) -> str:
+    """Return the fragment of the page's address."""
+    return browser.current_url.partition("#")[2]
+
+
+@contextmanager
+def opening(browser: Chrome, page: Path) -> Iterator[Callable[[str], None]]:
+    """Yield a function that loads a page with a fragment; its console must stay empty."""
+
+    def opened(fragment: str = "") -> None:
+        # Changing only the fragment would not reload the page.
+        browser.get("about:blank")
+        browser.get(f"{page.as_uri()}{fragment}")
+
+    errors(browser)
+    yield opened
+    assert errors(browser) == []

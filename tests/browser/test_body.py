@@ -14,7 +14,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 
 from pyharness import Scene, case_scene, solve
 from pyharness.theory.flips import flip_times
-from tests.browser.screen import WIDTHS, errors, screen, too_wide
+from tests.browser.screen import WIDTHS, fragment, opening, screen, text_of, too_wide
 
 Open = Callable[[str], None]
 CANVASES = ("space", "polhode", "herpolhode")
@@ -23,25 +23,8 @@ CANVASES = ("space", "polhode", "herpolhode")
 @pytest.fixture
 def body(browser: Chrome, site: Path) -> Iterator[Open]:
     """Yield a function that loads the page with a fragment; its console must stay empty."""
-
-    def opened(fragment: str = "") -> None:
-        # Changing only the fragment would not reload the page.
-        browser.get("about:blank")
-        browser.get(f"{(site / 'body.html').as_uri()}{fragment}")
-
-    errors(browser)
-    yield opened
-    assert errors(browser) == []
-
-
-def _text(browser: Chrome, id: str) -> str:
-    return str(
-        browser.execute_script("return document.getElementById(arguments[0]).textContent", id)
-    )
-
-
-def _fragment(browser: Chrome) -> str:
-    return browser.current_url.partition("#")[2]
+    with opening(browser, site / "body.html") as opened:
+        yield opened
 
 
 def _drawn(browser: Chrome, id: str) -> int:
@@ -79,15 +62,15 @@ def test_the_drawings_show_the_state_of_the_address(browser: Chrome, body: Open)
     body("#body=case-4&time=1000000")
     found = solve(case_scene(4), [1e6], "closed-form", attitude=True)
     assert found.attitude is not None
-    shown = [float(x) for x in _text(browser, "at-omega").removesuffix(" rad/s").split(", ")]
+    shown = [float(x) for x in text_of(browser, "at-omega").removesuffix(" rad/s").split(", ")]
     assert shown == pytest.approx(found.omega[0].tolist(), abs=1e-6)
-    shown = [float(x) for x in _text(browser, "at-attitude").split(", ")]
+    shown = [float(x) for x in text_of(browser, "at-attitude").split(", ")]
     assert shown == pytest.approx(found.attitude[0].tolist(), abs=1e-6)
     flip = float(flip_times((40, 30, 20), (0, 1, 10))[0])
-    assert f"changes its sign every {flip:.3f} s: this is the flip" in _text(browser, "told")
-    assert "Time: 1000000 s; omega" in _text(browser, "status")
-    assert "Digits that remain" in _text(browser, "status")
-    assert _text(browser, "problems") == ""
+    assert f"changes its sign every {flip:.3f} s: this is the flip" in text_of(browser, "told")
+    assert "Time: 1000000 s; omega" in text_of(browser, "status")
+    assert "Digits that remain" in text_of(browser, "status")
+    assert text_of(browser, "problems") == ""
     for id in CANVASES:
         assert _drawn(browser, id) > 500, id
 
@@ -100,8 +83,8 @@ def test_every_body_is_drawn_and_in_the_address(browser: Chrome, body: Open) -> 
     seen = set()
     for name in [*names[2:], names[1], "case-4"]:
         choice.select_by_value(name)
-        assert _fragment(browser) == f"body={name}"
-        assert _text(browser, "problems") == ""
+        assert fragment(browser) == f"body={name}"
+        assert text_of(browser, "problems") == ""
         assert _drawn(browser, "space") > 1000
         seen.add(_picture(browser, "space"))
     assert len(seen) == 5
@@ -112,8 +95,8 @@ def test_dragging_the_time_draws_at_once(browser: Chrome, body: Open) -> None:
     body("#body=racket")
     before = [_picture(browser, id) for id in CANVASES]
     _slide(browser, "slider", 801)
-    assert _fragment(browser) == "body=racket&time=1000000"
-    assert _text(browser, "at-time") == "1000000 s"
+    assert fragment(browser) == "body=racket&time=1000000"
+    assert text_of(browser, "at-time") == "1000000 s"
     after = [_picture(browser, id) for id in CANVASES]
     assert all(old != new for old, new in zip(before, after, strict=True))
     slider = browser.find_element(By.ID, "slider")
@@ -124,10 +107,10 @@ def test_dragging_the_time_draws_at_once(browser: Chrome, body: Open) -> None:
         assert slider.get_property("value") == str(value)
     # The keyboard moves it too.
     _slide(browser, "slider", 300)
-    old = _text(browser, "at-time")
+    old = text_of(browser, "at-time")
     slider.send_keys(Keys.ARROW_RIGHT)
-    assert _text(browser, "at-time") != old
-    body(f"#{_fragment(browser)}")
+    assert text_of(browser, "at-time") != old
+    body(f"#{fragment(browser)}")
     assert slider_position(browser) == "301"
 
 
@@ -141,47 +124,47 @@ def test_the_next_flip_is_a_flip(browser: Chrome, body: Open) -> None:
     times = []
     for _ in range(3):
         browser.find_element(By.ID, "flip").click()
-        middle = float(_text(browser, "at-omega").split(", ")[1])
+        middle = float(text_of(browser, "at-omega").split(", ")[1])
         assert abs(middle) < 1e-6
-        times.append(float(_text(browser, "at-time").removesuffix(" s")))
+        times.append(float(text_of(browser, "at-time").removesuffix(" s")))
     assert np.diff(times) == pytest.approx([flip, flip], rel=1e-9)
 
 
 def test_fields_take_any_body_and_say_what_is_wrong(browser: Chrome, body: Open) -> None:
     body("#body=case-4")
     _enter(browser, "moments", "10, 20, 40")
-    assert _text(browser, "problems") == (
+    assert text_of(browser, "problems") == (
         "moments: 10 + 20 is less than 40; each moment is at most the sum of the other two"
     )
     field = browser.find_element(By.ID, "moments")
     assert field.get_dom_attribute("aria-invalid") == "true"
     _enter(browser, "time", "1e7")
-    assert "time: 10000000; allowed: a number from 0 to 1000000" in _text(browser, "problems")
-    assert _fragment(browser) == "body=case-4"
+    assert "time: 10000000; allowed: a number from 0 to 1000000" in text_of(browser, "problems")
+    assert fragment(browser) == "body=case-4"
     _enter(browser, "moments", "5, 4, 3")
     _enter(browser, "omega0", "-1, 2, 3")
     _enter(browser, "time", "1e5")
-    assert _text(browser, "problems") == ""
+    assert text_of(browser, "problems") == ""
     assert field.get_dom_attribute("aria-invalid") is None
-    assert _fragment(browser) == "moments=5,4,3&omega0=-1,2,3&time=100000"
+    assert fragment(browser) == "moments=5,4,3&omega0=-1,2,3&time=100000"
     assert browser.find_element(By.ID, "body").get_property("value") == ""
     found = solve(Scene("", (-1, 2, 3), moments=(5, 4, 3)), [1e5], "closed-form")
-    shown = [float(x) for x in _text(browser, "at-omega").removesuffix(" rad/s").split(", ")]
+    shown = [float(x) for x in text_of(browser, "at-omega").removesuffix(" rad/s").split(", ")]
     assert shown == pytest.approx(found.omega[0].tolist(), abs=1e-6)
-    assert "moments = [5, 4, 3]" in _text(browser, "scene")
+    assert "moments = [5, 4, 3]" in text_of(browser, "scene")
     assert browser.find_element(By.ID, "scene-file").is_displayed()
 
 
 def test_mistakes_in_the_address_are_told(browser: Chrome, body: Open) -> None:
     body("#body=brick&time=x&spin=1")
-    told = _text(browser, "problems")
+    told = text_of(browser, "problems")
     assert told.startswith("unknown word 'spin'; allowed: ")
     assert "body: unknown 'brick'; allowed: racket" in told
     assert "time: 'x' where a number belongs" in told
-    assert _text(browser, "at-time") == "0 s"
+    assert text_of(browser, "at-time") == "0 s"
     browser.execute_script("location.hash = 'body=cube'")
-    WebDriverWait(browser, 5).until(lambda _: "steady" in _text(browser, "told"))
-    assert _text(browser, "problems") == ""
+    WebDriverWait(browser, 5).until(lambda _: "steady" in text_of(browser, "told"))
+    assert text_of(browser, "problems") == ""
     assert not browser.find_element(By.ID, "flip").is_enabled()
 
 
@@ -201,7 +184,7 @@ def test_special_motions_are_drawn_and_told(
     browser: Chrome, body: Open, words: str, told: str
 ) -> None:
     body(f"#{words}")
-    assert told in _text(browser, "told")
+    assert told in text_of(browser, "told")
     assert "NaN" not in browser.find_element(By.TAG_NAME, "main").text
     for id in CANVASES:
         assert _drawn(browser, id) > 20, id
@@ -212,26 +195,26 @@ def test_it_moves_when_it_is_played(browser: Chrome, body: Open) -> None:
     body("#body=racket")
     still = _picture(browser, "space")
     time.sleep(0.3)
-    assert _text(browser, "at-time") == "0 s"
+    assert text_of(browser, "at-time") == "0 s"
     assert _picture(browser, "space") == still
     Select(browser.find_element(By.ID, "speed")).select_by_value("10")
     play = browser.find_element(By.ID, "play")
     assert play.text == "Play"
     play.click()
     assert play.text == "Pause"
-    assert _text(browser, "status") == "Playing."
-    WebDriverWait(browser, 5).until(lambda _: float(_text(browser, "at-time")[:-2]) > 1.0)
+    assert text_of(browser, "status") == "Playing."
+    WebDriverWait(browser, 5).until(lambda _: float(text_of(browser, "at-time")[:-2]) > 1.0)
     assert _picture(browser, "space") != still
     play.click()
-    stopped = _text(browser, "at-time")
-    assert f"&time={stopped.removesuffix(' s')}" in _fragment(browser)
-    assert stopped in _text(browser, "status")
+    stopped = text_of(browser, "at-time")
+    assert f"&time={stopped.removesuffix(' s')}" in fragment(browser)
+    assert stopped in text_of(browser, "status")
     time.sleep(0.3)
-    assert _text(browser, "at-time") == stopped
+    assert text_of(browser, "at-time") == stopped
     # At a million seconds it stops.
     _enter(browser, "time", "999999.9")
     play.click()
-    WebDriverWait(browser, 5).until(lambda _: _text(browser, "at-time") == "1000000 s")
+    WebDriverWait(browser, 5).until(lambda _: text_of(browser, "at-time") == "1000000 s")
     WebDriverWait(browser, 5).until(lambda _: play.text == "Play")
 
 
@@ -241,18 +224,18 @@ def test_it_starts_only_where_motion_is_welcome(browser: Chrome, body: Open) -> 
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
     try:
         body("#body=case-4")
-        assert _text(browser, "play") == "Pause"
-        WebDriverWait(browser, 5).until(lambda _: _text(browser, "at-time") != "0 s")
+        assert text_of(browser, "play") == "Pause"
+        WebDriverWait(browser, 5).until(lambda _: text_of(browser, "at-time") != "0 s")
         # A drawing that is out of sight does not move.
         browser.execute_script(
             "window.scrollTo({ top: document.body.scrollHeight, behavior: 'instant' })"
         )
         time.sleep(0.7)
-        before = _text(browser, "at-time")
+        before = text_of(browser, "at-time")
         time.sleep(0.5)
-        assert _text(browser, "at-time") == before
+        assert text_of(browser, "at-time") == before
         body("#body=case-4&time=2")
-        assert _text(browser, "play") == "Play"
+        assert text_of(browser, "play") == "Play"
     finally:
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
 
@@ -283,7 +266,7 @@ def test_colours_change_with_the_theme_and_the_viewpoint_turns(browser: Chrome, 
     assert _picture(browser, "space") == before
     _slide(browser, "view", -100)
     assert _picture(browser, "space") != before
-    assert _fragment(browser) == "body=case-4&time=1"
+    assert fragment(browser) == "body=case-4&time=1"
 
 
 def test_a_frame_takes_little_time(

@@ -16,7 +16,7 @@ from pyharness import case_scene, run_program
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, subset
 from pyharness.original.printer import page
-from tests.browser.screen import WIDTHS, errors, screen, too_wide
+from tests.browser.screen import WIDTHS, fragment, opening, screen, text_of, too_wide
 
 Open = Callable[[str], None]
 EXPERIMENTS = facts("experiments")["experiment"]
@@ -26,21 +26,8 @@ _DRAWN = "return document.querySelector('#omega1-chart canvas').toDataURL()"
 @pytest.fixture
 def laboratory(browser: Chrome, site: Path) -> Iterator[Open]:
     """Yield a function that loads the page with a fragment; its console must stay empty."""
-
-    def opened(fragment: str = "") -> None:
-        # Changing only the fragment would not reload the page.
-        browser.get("about:blank")
-        browser.get(f"{(site / 'laboratory.html').as_uri()}{fragment}")
-
-    errors(browser)
-    yield opened
-    assert errors(browser) == []
-
-
-def _text(browser: Chrome, id: str) -> str:
-    return str(
-        browser.execute_script("return document.getElementById(arguments[0]).textContent", id)
-    )
+    with opening(browser, site / "laboratory.html") as opened:
+        yield opened
 
 
 def _rows(browser: Chrome) -> list[list[str]]:
@@ -57,10 +44,6 @@ def _rows(browser: Chrome) -> list[list[str]]:
         if len(found) > 6 or time.monotonic() > deadline:
             return found
         time.sleep(0.02)
-
-
-def _fragment(browser: Chrome) -> str:
-    return browser.current_url.partition("#")[2]
 
 
 def _table(browser: Chrome, selector: str) -> list[list[str]]:
@@ -95,9 +78,9 @@ def test_the_numbers_are_the_twins(browser: Chrome, laboratory: Open) -> None:
     assert len(rows) == 25
     assert [float(row[2]) for row in rows] == twin.omega[:, 0].tolist()
     assert [[float(x) for x in row[5:8]] for row in rows] == twin.velocity.tolist()
-    assert "Stopped at step 25 of 100, at 0.25 s, by V2" in _text(browser, "status")
-    assert _text(browser, "printer-page") == page(case_scene(2), "runge-kutta", twin)
-    assert _text(browser, "problems") == ""
+    assert "Stopped at step 25 of 100, at 0.25 s, by V2" in text_of(browser, "status")
+    assert text_of(browser, "printer-page") == page(case_scene(2), "runge-kutta", twin)
+    assert text_of(browser, "problems") == ""
     assert browser.execute_script("return document.querySelectorAll('canvas').length") == 6
 
 
@@ -106,11 +89,11 @@ def test_a_switch_draws_anew_and_is_in_the_address(browser: Chrome, laboratory: 
     draw = "return document.querySelector('canvas').toDataURL()"
     before = browser.execute_script(draw)
     _click(browser, "input[value=stage-base]")
-    assert _fragment(browser) == "case=2&program=runge-kutta&listing=original&fix=stage-base"
-    assert "step 25 " not in _text(browser, "status")
+    assert fragment(browser) == "case=2&program=runge-kutta&listing=original&fix=stage-base"
+    assert "step 25 " not in text_of(browser, "status")
     twin = run_program(case_scene(2), subset("runge-kutta", fix=["stage-base"]), "python")
     assert [float(row[2]) for row in _rows(browser)] == twin.omega[:, 0].tolist()
-    assert _text(browser, "command").endswith("--listing original --fix stage-base")
+    assert text_of(browser, "command").endswith("--listing original --fix stage-base")
     assert browser.execute_script(draw) != before
 
 
@@ -130,15 +113,15 @@ def test_an_address_restores_its_state(browser: Chrome, laboratory: Open) -> Non
     # Change the fragment without reloading the page.
     browser.execute_script("location.hash = 'case=2&program=runge-kutta&listing=original'")
     deadline = time.monotonic() + 5.0
-    while "step 25" not in _text(browser, "status") and time.monotonic() < deadline:
+    while "step 25" not in text_of(browser, "status") and time.monotonic() < deadline:
         time.sleep(0.02)
-    assert "Stopped at step 25" in _text(browser, "status")
+    assert "Stopped at step 25" in text_of(browser, "status")
     assert browser.find_element(By.ID, "stop-test").is_displayed()
 
 
 def test_the_link_that_skips_the_menu_leaves_the_state(browser: Chrome, laboratory: Open) -> None:
     laboratory("#case=5&program=two-term&listing=corrected")
-    told = _text(browser, "status")
+    told = text_of(browser, "status")
     address = browser.current_url
     _click(browser, "a.skip")
     time.sleep(0.1)
@@ -146,8 +129,8 @@ def test_the_link_that_skips_the_menu_leaves_the_state(browser: Chrome, laborato
     # The address still names the state, so that it can be cited.
     assert browser.current_url == address
     browser.refresh()
-    assert _text(browser, "status") == told
-    assert _text(browser, "problems") == ""
+    assert text_of(browser, "status") == told
+    assert text_of(browser, "problems") == ""
 
 
 def test_what_has_the_focus_is_in_sight(browser: Chrome, laboratory: Open) -> None:
@@ -176,7 +159,7 @@ def test_curves_can_be_hidden_and_the_pointer_tells_numbers(
     over = browser.find_element(By.CSS_SELECTOR, "#omega1-chart .u-over")
     width = over.size["width"]
     ActionChains(browser).move_to_element_with_offset(over, -width // 2 + width // 5, 0).perform()
-    told = _text(browser, "readout")
+    told = text_of(browser, "readout")
     step = round(float(told.split(" s: ")[0]) / 0.01)
     twin = run_program(case_scene(2), subset("runge-kutta"), "python")
     assert twin.velocity is not None
@@ -201,7 +184,7 @@ def test_the_step_slider_shows_numbers_and_cards(browser: Chrome, laboratory: Op
     assert "not reached" in next(row for row in cards if row[0] == "1430")[1]
     before = browser.execute_script(_DRAWN)
     browser.find_element(By.ID, "step").send_keys(Keys.ARROW_LEFT, Keys.ARROW_LEFT)
-    assert _text(browser, "step-told") == "23 of 25, at 0.23 s"
+    assert text_of(browser, "step-told") == "23 of 25, at 0.23 s"
     rows = _table(browser, "#step-numbers tr")
     assert [float(row[1]) for row in rows] == [*twin.omega[22], *twin.velocity[22]]
     cards = _table(browser, ".cards tbody tr")
@@ -215,13 +198,13 @@ def test_the_step_slider_shows_numbers_and_cards(browser: Chrome, laboratory: Op
     ActionChains(browser).move_to_element_with_offset(
         over, -width // 2 + width // 10, 0
     ).click().perform()
-    assert 8 <= int(_text(browser, "step-told").split()[0]) <= 12
+    assert 8 <= int(text_of(browser, "step-told").split()[0]) <= 12
     links = browser.find_elements(By.CSS_SELECTOR, ".cards a")
     targets = {str(link.get_dom_attribute("href")) for link in links}
     assert "listing/runge-kutta.html#860" in targets
     # A step that the next run has stays chosen.
     _click(browser, "input[value=stage-base]")
-    assert 8 <= int(_text(browser, "step-told").split()[0]) <= 12
+    assert 8 <= int(text_of(browser, "step-told").split()[0]) <= 12
     assert "corrected" in next(
         row[1] for row in _table(browser, ".cards tbody tr") if row[0] == "860"
     )
@@ -247,17 +230,17 @@ def test_a_pinned_run_stays_in_charts_and_address(browser: Chrome, laboratory: O
     browser.find_element(By.CSS_SELECTOR, "input[value=stage-base]").click()
     pinned = "pin=case%3D2%26program%3Drunge-kutta%26listing%3Doriginal%26no-stop"
     words = f"case=2&program=runge-kutta&listing=original&fix=stage-base&no-stop&{pinned}"
-    assert _fragment(browser) == words
+    assert fragment(browser) == words
     for _ in range(2):
         assert browser.find_element(By.ID, "difference").is_displayed()
-        assert _text(browser, "pinned-command") == (
+        assert text_of(browser, "pinned-command") == (
             "pyharness run --case 2 --program runge-kutta --listing original --no-stop"
         )
-        assert "Largest error of omega: 2.98 rad/s." in _text(browser, "pinned-ending")
-        assert "Largest error of omega: 0.02 rad/s." in _text(browser, "status")
+        assert "Largest error of omega: 2.98 rad/s." in text_of(browser, "pinned-ending")
+        assert "Largest error of omega: 0.02 rad/s." in text_of(browser, "status")
         over = browser.find_element(By.CSS_SELECTOR, "#omega1-chart .u-over")
         ActionChains(browser).move_to_element(over).perform()
-        told = _text(browser, "readout")
+        told = text_of(browser, "readout")
         step = round(float(told.split(" s: ")[0]) / 0.01)
         first, second = (
             run_program(case_scene(2), subset("runge-kutta", fix=fix), "python", may_stop=False)
@@ -268,7 +251,7 @@ def test_a_pinned_run_stays_in_charts_and_address(browser: Chrome, laboratory: O
         assert f"difference: U1 {own - other:.5g}" in told
         laboratory(f"#{words}")
     browser.find_element(By.ID, "unpin").click()
-    assert _fragment(browser) == words.removesuffix(f"&{pinned}")
+    assert fragment(browser) == words.removesuffix(f"&{pinned}")
     assert not browser.find_element(By.ID, "difference").is_displayed()
     assert browser.switch_to.active_element.get_dom_attribute("id") == "pin"
 
@@ -283,18 +266,18 @@ def test_the_limit_is_told(browser: Chrome, laboratory: Open) -> None:
         ("case=5&program=two-term", "to the solution of another equation", True),
     ):
         laboratory(f"#{words}")
-        assert told in _text(browser, "limit")
+        assert told in text_of(browser, "limit")
         assert browser.find_element(By.ID, "show-limit").is_enabled() == shown
     assert not browser.find_element(By.ID, "quotient").is_displayed()
 
 
 def test_the_end_is_explained(browser: Chrome, laboratory: Open) -> None:
     laboratory("")
-    assert _text(browser, "why-head") == "Why did it stop?"
-    assert "V2 had just passed a turning point" in _text(browser, "why")
+    assert text_of(browser, "why-head") == "Why did it stop?"
+    assert "V2 had just passed a turning point" in text_of(browser, "why")
     browser.find_element(By.ID, "stops").click()
-    assert _text(browser, "why-head") == "Why did it not stop early?"
-    assert "The stop test is switched off." in _text(browser, "why")
+    assert text_of(browser, "why-head") == "Why did it not stop early?"
+    assert "The stop test is switched off." in text_of(browser, "why")
 
 
 def test_a_switch_that_does_nothing_says_so(browser: Chrome, laboratory: Open) -> None:
@@ -331,14 +314,14 @@ def test_an_experiment_is_predicted_run_and_explained(
     right = experiment["choices"][experiment["answer"] - 1]
     assert f"Your prediction was wrong. Right: {right}" in lesson.text
     assert experiment["explanation"] in lesson.text
-    assert _fragment(browser) == experiment["state"]
+    assert fragment(browser) == experiment["state"]
     choices[experiment["answer"] - 1].click()
     run.send_keys(Keys.ENTER)
     assert "Your prediction was right." in lesson.text
     expected = experiment["expect"]
-    assert f"Largest error of omega: {expected['error']} rad/s." in _text(browser, "status")
+    assert f"Largest error of omega: {expected['error']} rad/s." in text_of(browser, "status")
     if expected["ended"] == "stopped":
-        assert f"Stopped at step {expected['steps']} of" in _text(browser, "status")
+        assert f"Stopped at step {expected['steps']} of" in text_of(browser, "status")
 
 
 def test_on_a_phone_the_choices_are_beside_the_chart(browser: Chrome, laboratory: Open) -> None:
@@ -359,7 +342,7 @@ def test_on_a_phone_the_choices_are_beside_the_chart(browser: Chrome, laboratory
         top, bottom = browser.execute_script(where, chart)
         above, _ = browser.execute_script(where, browser.find_element(By.ID, "choices"))
         assert 0 <= top < bottom <= above
-        assert "fix=stage-base" in _fragment(browser)
+        assert "fix=stage-base" in fragment(browser)
         assert too_wide(browser) <= 0
         sheet.click()
         assert not box.is_displayed()
@@ -375,25 +358,25 @@ def test_controls_make_the_address_that_restores_them(browser: Chrome, laborator
         field.send_keys(keys, Keys.TAB)
     _click(browser, "input[value=corrected]")
     expected = "case=2&program=runge-kutta&listing=corrected&omega0=-1,0.5,2&step-size=0.005"
-    assert _fragment(browser) == f"{expected}&steps=40&lipschitz=60"
-    told = _text(browser, "status")
-    laboratory(f"#{_fragment(browser)}")
-    assert _text(browser, "status") == told
+    assert fragment(browser) == f"{expected}&steps=40&lipschitz=60"
+    told = text_of(browser, "status")
+    laboratory(f"#{fragment(browser)}")
+    assert text_of(browser, "status") == told
     _click(browser, "#reset")
-    assert _fragment(browser) == "case=2&program=runge-kutta&listing=original"
+    assert fragment(browser) == "case=2&program=runge-kutta&listing=original"
 
 
 def test_mistakes_are_told_and_the_rest_holds(browser: Chrome, laboratory: Open) -> None:
     laboratory("#case=9&program=runge-kutta&listing=original&spin=1")
-    assert _text(browser, "problems").startswith("unknown word 'spin'; allowed: ")
-    assert "case: unknown '9'; allowed: 1, 2" in _text(browser, "problems")
-    assert "Stopped at step 25" in _text(browser, "status")
+    assert text_of(browser, "problems").startswith("unknown word 'spin'; allowed: ")
+    assert "case: unknown '9'; allowed: 1, 2" in text_of(browser, "problems")
+    assert "Stopped at step 25" in text_of(browser, "status")
     field = browser.find_element(By.ID, "steps")
     field.send_keys("x", Keys.TAB)
-    assert "steps: '100x'; allowed: a whole number" in _text(browser, "problems")
+    assert "steps: '100x'; allowed: a whole number" in text_of(browser, "problems")
     assert field.get_attribute("aria-invalid") == "true"
     field.send_keys(Keys.BACKSPACE, Keys.TAB)
-    assert _text(browser, "problems") == ""
+    assert text_of(browser, "problems") == ""
     assert field.get_attribute("aria-invalid") is None
 
 
@@ -404,17 +387,17 @@ def test_what_is_wrong_stays_until_it_is_mended(browser: Chrome, laboratory: Ope
     # Another control changes the run, and leaves the invalid field unchanged.
     program = Select(browser.find_element(By.ID, "program"))
     program.select_by_visible_text("two-term")
-    assert "steps: '100x'" in _text(browser, "problems")
+    assert "steps: '100x'" in text_of(browser, "problems")
     assert field.get_property("value") == "100x"
     step = browser.find_element(By.ID, "step-size")
     step.send_keys("y", Keys.TAB)
-    assert "steps: '100x'" in _text(browser, "problems")
-    assert "step-size: '0.01y'" in _text(browser, "problems")
+    assert "steps: '100x'" in text_of(browser, "problems")
+    assert "step-size: '0.01y'" in text_of(browser, "problems")
     # The page has kept the switches of the other program.
     program.select_by_visible_text("runge-kutta")
     assert browser.current_url.endswith("listing=original&fix=stage-base")
     _click(browser, "#reset")
-    assert _text(browser, "problems") == ""
+    assert text_of(browser, "problems") == ""
     assert field.get_property("value") == "100"
 
 

@@ -14,7 +14,7 @@ from pyharness import case_scene, run_program
 from pyharness.edition import story
 from pyharness.model.listing import Listing, subset
 from pyharness.truth.reference import reference
-from tests.browser.screen import errors, screen
+from tests.browser.screen import click, errors, screen
 
 pytestmark = pytest.mark.usefixtures("page")
 
@@ -28,13 +28,6 @@ def page(browser: Chrome, site: Path) -> Iterator[None]:
         browser.get((site / "index.html").as_uri())
         yield
     assert errors(browser) == []
-
-
-def _click(browser: Chrome, selector: str) -> None:
-    """Click as a mouse does, where the element can be seen."""
-    element = browser.find_element(By.CSS_SELECTOR, selector)
-    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
-    element.click()
 
 
 def _value(browser: Chrome, slot: str) -> float:
@@ -67,7 +60,7 @@ def _largest(case: int, program: str, listing: Listing, components: slice = slic
 @pytest.mark.parametrize(("letter", "has"), [("A", "two terms"), ("B", "Runge-Kutta")])
 def test_a_reader_chooses_a_program_to_trust(browser: Chrome, letter: str, has: str) -> None:
     assert _text(browser, "claim") == ""
-    _click(browser, f"input[name=trust][value={letter}]")
+    click(browser, f"input[name=trust][value={letter}]")
     assert has in _text(browser, "claim")
     if letter == "B":
         run = run_program(case_scene(2), subset("runge-kutta"), "python")
@@ -85,7 +78,7 @@ def test_a_reader_predicts_before_the_run(browser: Chrome) -> None:
     before = _points(browser, "stop", "prediction")
     slider.send_keys(Keys.ARROW_LEFT * 10)
     assert _points(browser, "stop", "prediction") != before
-    _click(browser, "#run")
+    click(browser, "#run")
     stop = run_program(case_scene(2), subset("runge-kutta"), "python").stop
     assert stop is not None
     assert _value(browser, "predicted") == 40
@@ -106,7 +99,7 @@ def test_v2_turns_and_its_quotient_leaps(browser: Chrome) -> None:
     assert _value(browser, "at-step") == 10
     assert _value(browser, "at-velocity") == run.velocity[9, 1]
     assert 0.0 < _value(browser, "at-quotient") < 500.0
-    _click(browser, "#omega-alone")
+    click(browser, "#omega-alone")
     alone = subset("runge-kutta", fix=["lipschitz-tests-velocity"])
     stop = run_program(case_scene(2), alone, "python").stop
     assert stop is not None
@@ -115,7 +108,7 @@ def test_v2_turns_and_its_quotient_leaps(browser: Chrome) -> None:
     # The slider keeps its step if the run becomes shorter than it.
     slider.send_keys(Keys.END)
     assert _value(browser, "at-step") == stop.step
-    _click(browser, "#omega-alone")
+    click(browser, "#omega-alone")
     assert _value(browser, "at-step") == run.stop.step
 
 
@@ -132,7 +125,7 @@ def test_either_fault_can_be_switched_off(browser: Chrome) -> None:
     fixes: list[str] = []
     for fault, slot in (("stage-base", "one-solution"), ("base-not-restored", "none-solution")):
         fixes.append(fault)
-        _click(browser, f"input[name=fault][value={fault}]")
+        click(browser, f"input[name=fault][value={fault}]")
         listing = subset("runge-kutta", fix=fixes)
         run = run_program(finer, listing, "python", may_stop=False)
         expected = np.abs(run.omega[:, 0] - truth).max()
@@ -145,8 +138,8 @@ def test_either_fault_can_be_switched_off(browser: Chrome) -> None:
 def test_faults_hide_in_case_1_and_show_in_case_5(browser: Chrome) -> None:
     assert _value(browser, "blind-error-1") < 1e-14
     for case, program in ((5, "runge-kutta"), (5, "two-term"), (2, "four-term")):
-        _click(browser, f"input[name=blind-program][value={program}]")
-        _click(browser, f"input[name=blind-case][value='{case}']")
+        click(browser, f"input[name=blind-program][value={program}]")
+        click(browser, f"input[name=blind-case][value='{case}']")
         expected = _largest(case, program, subset(program), slice(0, 1))
         assert _value(browser, f"blind-error-{case}") == pytest.approx(expected, rel=1e-12)
         assert story.NAMES[program] in _text(browser, "blind")
@@ -160,7 +153,7 @@ def test_faults_hide_in_case_1_and_show_in_case_5(browser: Chrome) -> None:
 
 def test_corrected_programs_are_run_beside_the_printed_ones(browser: Chrome) -> None:
     for listing in ("corrected", "original"):
-        _click(browser, f"input[name=race][value={listing}]")
+        click(browser, f"input[name=race][value={listing}]")
         for program in story.NAMES:
             drawn = _points(browser, f"race-{listing}", program)
             assert drawn == _first_points(f"race-{listing}", program)
@@ -181,7 +174,7 @@ def test_all_actions_can_be_reached_with_the_keyboard(browser: Chrome) -> None:
 def test_the_story_can_be_read_in_four_minutes(browser: Chrome) -> None:
     """A reader who takes every action once sees fewer words than 250 a minute."""
     for selector in ("input[name=trust]", "#run", "#omega-alone", "input[value=corrected]"):
-        _click(browser, selector)
+        click(browser, selector)
     script = """
       const words = ".scene :is(p, h2, legend, label, figcaption, button)";
       const shown = [...document.querySelectorAll(words)].filter((each) => each.checkVisibility());

@@ -8,7 +8,7 @@ from selenium.webdriver import Chrome, Keys
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 
-from tests.browser.screen import errors, screen
+from tests.browser.screen import click, errors, screen
 
 
 class Reader:
@@ -20,9 +20,7 @@ class Reader:
 
     def click(self, selector: str) -> None:
         """Click a visible element."""
-        element = self.see(selector)
-        self.browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
-        element.click()
+        click(self.browser, selector)
         self.clicks += 1
 
     def go(self, entry: str) -> None:

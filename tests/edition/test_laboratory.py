@@ -6,7 +6,6 @@ import json
 import math
 import random
 import re
-import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -28,35 +27,18 @@ from pyharness.model.scene_file import case_numbers
 from pyharness.original.printer import page
 from pyharness.scenes.random_scenes import draw
 from pyharness.truth.reference import reference
-from tests.ports import WEB, engine
+from tests.ports import WEB, run_javascript
 
 LABORATORY = WEB / "laboratory"
 
 
 def ask(body: str, given: Any) -> Any:
     """Return the value of the JavaScript `body`, which may use `given` and the laboratory."""
-    names = {"state": "S", "experiment": "E", "reference": "R", "printer-page": "P", "cards": "K"}
-    names |= {"limit": "L", "why": "W", "idle": "I"}
-    imports = [
-        f"import * as {name} from {json.dumps(str(LABORATORY / f'{file}.js'))};"
-        for file, name in names.items()
-    ]
-    equations = json.dumps(str(WEB / "programs/equations.js"))
-    imports.append(f"import * as Q from {equations};")
-    script = (
-        f"{''.join(imports)} import {{ readFileSync }} from 'node:fs';"
-        "const { data, given } = JSON.parse(readFileSync(0));"
-        f"console.log(JSON.stringify((() => {{ {body} }})()));"
-    )
-    done = subprocess.run(
-        [engine(), "--input-type=module", "--eval", script],
-        input=json.dumps({"data": data(), "given": given}),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr[-500:]
-    return json.loads(done.stdout)
+    files = {"S": "state", "E": "experiment", "R": "reference", "P": "printer-page", "K": "cards"}
+    files |= {"L": "limit", "W": "why", "I": "idle"}
+    modules = {name: LABORATORY / f"{file}.js" for name, file in files.items()}
+    modules["Q"] = WEB / "programs/equations.js"
+    return run_javascript(modules, body, data=data(), given=given)
 
 
 def test_printer_pages_are_those_of_the_program() -> None:

@@ -1,8 +1,6 @@
 """The story without a browser: its numbers, curves and words are those of the programs."""
 
-import json
 import random
-import subprocess
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -19,7 +17,7 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, subset, switches
 from pyharness.truth.reference import reference
 from tests.edition.pages import pages
-from tests.ports import WEB, engine
+from tests.ports import WEB, run_javascript
 
 ROOT = Path(__file__).parents[2]
 EDITION = facts("account")["edition"]
@@ -190,16 +188,9 @@ def test_both_languages_write_a_number_alike() -> None:
         (-0.0, 2),
         (0.5, 1),
     ]
-    script = (
-        f"import {{ prose }} from {json.dumps(str(WEB / 'story' / 'numbers.js'))};"
-        "import { readFileSync } from 'node:fs';"
-        "console.log(JSON.stringify(JSON.parse(readFileSync(0)).map(([x, n]) => prose(x, n))));"
-    )
-    done = subprocess.run(
-        [engine(), "--input-type=module", "--eval", script],
-        input=json.dumps(numbers), capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    assert json.loads(done.stdout) == [prose(value, digits) for value, digits in numbers]
+    modules = {"N": WEB / "story/numbers.js"}
+    found = run_javascript(modules, "return given.map(([x, n]) => N.prose(x, n));", given=numbers)
+    assert found == [prose(value, digits) for value, digits in numbers]
 
 
 def test_the_home_page_is_light(built_site: dict[str, bytes]) -> None:

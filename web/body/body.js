@@ -1,9 +1,9 @@
 // The page: from controls and address to motion, drawings, numbers and sentences.
+import { onField } from "../laboratory/address.js";
 import { inSpace, torqueFree } from "./closed-form.js";
 import { amplification } from "./digits.js";
 import { Drawing } from "./drawing.js";
 import {
-  StateError,
   bodyOf,
   commandOf,
   fragmentOf,
@@ -165,32 +165,17 @@ function advance(now) {
   requestAnimationFrame(advance);
 }
 
-// Read a field when it changes. A valid value is used. Otherwise the problem is shown, and the field
-// stays as it is until it is corrected.
-function onField(id, read, taken) {
-  element(id).addEventListener("change", () => {
-    try {
-      const value = read(element(id).value, id);
-      wrong.delete(id);
-      change(taken(value));
-    } catch (error) {
-      if (!(error instanceof StateError)) throw error;
-      wrong.set(id, error.message);
-      tell();
-      element(id).setAttribute("aria-invalid", "true");
-    }
-  });
-}
-
 function fromAddress() {
   wrong.clear();
   const { state: asked, problems } = stateFrom(data, location.hash);
   show(asked, problems);
 }
 
-onField("moments", momentsFrom, (moments) => ({ ...state, moments }));
-onField("omega0", omegaFrom, (omega0) => ({ ...state, omega0 }));
-onField("time", timeFrom(data), (time) => ({ ...state, time }));
+const onNumber = (id, read, taken) =>
+  onField(element(id), wrong, tell, read, (value) => change(taken(value)));
+onNumber("moments", momentsFrom, (moments) => ({ ...state, moments }));
+onNumber("omega0", omegaFrom, (omega0) => ({ ...state, omega0 }));
+onNumber("time", timeFrom(data), (time) => ({ ...state, time }));
 element("body").addEventListener("change", ({ target }) => {
   wrong.clear();
   if (target.value) change(stateOfBody(data, target.value));

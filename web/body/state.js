@@ -2,15 +2,12 @@
 //
 // A state is { moments, omega0, time }, in kg m2, rad/s and s. `data` comes with the page: bodies, and
 // the latest time.
+import { StateError, numberFrom, oneOf, readerOf, threeFrom, wordsIn } from "../laboratory/address.js";
 
 const WORDS = ["body", "moments", "omega0", "time"];
-const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
 // Within these limits no product overflows or underflows.
 const MOMENTS = [1e-6, 1e6];
 const OMEGA = [1e-9, 1000];
-
-// An error whose message says in a line what is wrong with a value.
-export class StateError extends Error {}
 
 export function stateOfBody(data, id) {
   const { moments, omega } = data.bodies.find((body) => body.id === id);
@@ -52,59 +49,14 @@ export function commandOf(data, { moments, omega0, time }) {
 // the default replaces such a word.
 export function stateFrom(data, fragment) {
   const problems = [];
-  const given = new Map();
-  for (const part of fragment.replace(/^#/, "").split("&").filter((each) => each !== "")) {
-    const [word, ...values] = decoded(part).split("=");
-    if (WORDS.includes(word)) given.set(word, values.join("="));
-    else problems.push(`unknown word '${shown(word)}'; allowed: ${WORDS.join(", ")}`);
-  }
-  const read = (word, reader, otherwise) => {
-    if (!given.has(word)) return otherwise;
-    try {
-      return reader(given.get(word), word);
-    } catch (error) {
-      if (!(error instanceof StateError)) throw error;
-      problems.push(error.message);
-      return otherwise;
-    }
-  };
-  const idFrom = (text) => {
-    const ids = data.bodies.map((body) => body.id);
-    if (ids.includes(text)) return text;
-    throw new StateError(`body: unknown '${shown(text)}'; allowed: ${ids.join(", ")}`);
-  };
+  const read = readerOf(wordsIn(fragment, problems, WORDS), problems);
+  const ids = data.bodies.map((body) => body.id);
+  const idFrom = (text) => oneOf("body", text, ids);
   const state = stateOfBody(data, read("body", idFrom, data.first));
   state.moments = read("moments", momentsFrom, state.moments);
   state.omega0 = read("omega0", omegaFrom, state.omega0);
   state.time = read("time", timeFrom(data), 0);
   return { state, problems };
-}
-
-// Decode an address. A text with a percent sign that begins no character is returned unchanged.
-function decoded(text) {
-  try {
-    return decodeURIComponent(text);
-  } catch {
-    return text;
-  }
-}
-
-// Return the beginning of a typed text, short enough for a line.
-function shown(text) {
-  return [...text].slice(0, 40).join("");
-}
-
-function numberFrom(text, word) {
-  const trimmed = text.trim();
-  // No -0.
-  if (NUMBER.test(trimmed)) return Number(trimmed) + 0;
-  throw new StateError(`${word}: '${shown(text)}' where a number belongs`);
-}
-
-function threeFrom(text, word) {
-  const parts = text.split(",");
-  if (parts.length === 3) return parts.map((part) => numberFrom(part, word));
-  throw new StateError(`${word}: ${parts.length} numbers; allowed: three, as in 40,30,20`);
 }
 
 function check(word, values, isAllowed, allowed) {
@@ -113,7 +65,7 @@ function check(word, values, isAllowed, allowed) {
 }
 
 export function momentsFrom(text, word = "moments") {
-  const moments = threeFrom(text, word);
+  const moments = threeFrom(text, word, "40,30,20");
   const [least, most] = MOMENTS;
   check(word, moments, (x) => x >= least && x <= most, `numbers from ${least} to ${most}`);
   const [low, middle, high] = [...moments].sort((a, b) => a - b);
@@ -123,7 +75,8 @@ export function momentsFrom(text, word = "moments") {
 }
 
 export function omegaFrom(text, word = "omega0") {
-  const omega = threeFrom(text, word);
+  // No -0.
+  const omega = threeFrom(text, word, "40,30,20").map((x) => x + 0);
   const [least, most] = OMEGA;
   const isAllowed = (x) => x === 0 || (Math.abs(x) >= least && Math.abs(x) <= most);
   check(word, omega, isAllowed, `0, or numbers from ${least} to ${most} of either sign`);
@@ -132,7 +85,7 @@ export function omegaFrom(text, word = "omega0") {
 
 export function timeFrom(data) {
   return (text, word = "time") => {
-    const time = numberFrom(text, word);
+    const time = numberFrom(text, word) + 0;
     const isAllowed = (x) => x >= 0 && x <= data.longest;
     check(word, [time], isAllowed, `a number from 0 to ${data.longest}`);
     return time;

@@ -1,6 +1,7 @@
 // The page: from controls and address to charts, table, printer page and sentences.
 //
 // Every change makes a complete new state, and every state is shown completely.
+import { onField } from "./address.js";
 import { panelsOf, readout } from "./chart-data.js";
 import { Charts } from "./charts.js";
 import { startCopying } from "./copying.js";
@@ -10,7 +11,6 @@ import { idleSwitches } from "./idle.js";
 import { limitOf } from "./limit.js";
 import { printerPage } from "./printer-page.js";
 import {
-  StateError,
   activeIn,
   commandOf,
   defaultState,
@@ -193,23 +193,6 @@ function change(next) {
   history.replaceState(null, "", `#${fragmentOf(data, state, pinned)}`);
 }
 
-// Read a field of numbers when it changes. A valid value is used. Otherwise the problem is shown,
-// and the field stays as it is until it is corrected.
-function onNumber(id, read, taken) {
-  element(id).addEventListener("change", () => {
-    try {
-      const value = read(element(id).value, id);
-      wrong.delete(id);
-      change(taken(value));
-    } catch (error) {
-      if (!(error instanceof StateError)) throw error;
-      wrong.set(id, error.message);
-      tell();
-      element(id).setAttribute("aria-invalid", "true");
-    }
-  });
-}
-
 function onChange(id, taken) {
   element(id).addEventListener("change", () => change(taken(element(id))));
 }
@@ -224,6 +207,8 @@ function fromAddress() {
 onChange("case", ({ value }) => ({ ...state, case: Number(value), omega0: null }));
 onChange("program", ({ value }) => ({ ...state, program: value }));
 onChange("stops", ({ checked }) => ({ ...state, stops: checked }));
+const onNumber = (id, read, taken) =>
+  onField(element(id), wrong, tell, read, (value) => change(taken(value)));
 onNumber("omega0", omegaFrom, (omega) => {
   const own = sceneOfCase(data, state.case).initial.omega;
   return { ...state, omega0: omega.every((x, axis) => Object.is(x, own[axis])) ? null : omega };

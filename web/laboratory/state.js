@@ -5,10 +5,10 @@
 // the listing that was chosen. `active` has the names of all active switches, for every program
 // that has them. `omega0` is null if it is that of the case. `data` comes with the page: cases,
 // programs, flags, limits.
+import { StateError, numberFrom, oneOf, readerOf, shown, threeFrom, wordsIn } from "./address.js";
 
 const LISTINGS = ["original", "corrected"];
 const KINDS = ["defect", "reading", "conjecture"];
-const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
 
 // Return the state of a page whose address specifies nothing.
 export function defaultState(data) {
@@ -116,16 +116,7 @@ export function stateFrom(data, fragment) {
 }
 
 function stateOfWords(data, given, problems) {
-  const read = (word, reader, otherwise) => {
-    if (!given.has(word)) return otherwise;
-    try {
-      return reader(given.get(word), word);
-    } catch (error) {
-      if (!(error instanceof StateError)) throw error;
-      problems.push(error.message);
-      return otherwise;
-    }
-  };
+  const read = readerOf(given, problems);
   const { case: number, program: usual } = data.defaults;
 
   const cases = data.scenes.map((scene) => String(scene.case));
@@ -182,38 +173,6 @@ const WORDS = [
   ...["steps", "lipschitz", "no-stop"],
 ];
 
-// An error whose message says in a line what is wrong with a value.
-export class StateError extends Error {}
-
-function wordsIn(fragment, problems, allowed) {
-  const given = new Map();
-  for (const part of fragment.replace(/^#/, "").split("&").filter((each) => each !== "")) {
-    const [word, ...values] = decoded(part).split("=");
-    if (allowed.includes(word)) given.set(word, values.length ? values.join("=") : null);
-    else problems.push(`unknown word '${shown(word)}'; allowed: ${allowed.join(", ")}`);
-  }
-  return given;
-}
-
-// Decode an address. A text with a percent sign that begins no character is returned unchanged.
-function decoded(text) {
-  try {
-    return decodeURIComponent(text);
-  } catch {
-    return text;
-  }
-}
-
-// Return the beginning of a typed text, short enough for a line.
-function shown(text) {
-  return [...(text ?? "")].slice(0, 40).join("");
-}
-
-function oneOf(word, text, allowed) {
-  if (allowed.includes(text)) return text;
-  throw new StateError(`${word}: unknown '${shown(text)}'; allowed: ${allowed.join(", ")}`);
-}
-
 function namesIn(text, word, kind, allowed) {
   const names = (text ?? "").split(",").map((name) => name.trim());
   for (const name of names) {
@@ -225,21 +184,8 @@ function namesIn(text, word, kind, allowed) {
   return names;
 }
 
-// Read a finite number, as the command line does.
-function numberFrom(text, word) {
-  const trimmed = (text ?? "").trim();
-  if (!NUMBER.test(trimmed)) throw new StateError(`${word}: '${shown(text)}' where a number belongs`);
-  const value = Number(trimmed);
-  if (Number.isFinite(value)) return value;
-  throw new StateError(`${word}: '${shown(text)}' is not finite; allowed: finite numbers`);
-}
-
 export function omegaFrom(text, word = "omega0") {
-  const parts = (text ?? "").split(",");
-  if (parts.length !== 3) {
-    throw new StateError(`${word}: ${parts.length} numbers; allowed: three, as in 0,1,10`);
-  }
-  return parts.map((part) => numberFrom(part, word));
+  return threeFrom(text, word, "0,1,10");
 }
 
 export function positiveFrom(text, word) {

@@ -17,6 +17,7 @@ import yaml
 
 import pyharness
 from pyharness.model.distribution import DISTRIBUTION
+from pyharness.model.facts import facts
 
 ROOT = Path(__file__).parent.parent
 SCRIPT = ROOT / "tests/user_script.py"
@@ -196,7 +197,8 @@ def test_the_citation_is_that_of_the_project() -> None:
     version = re.search(r"^  version: '(.*)'", (ROOT / "meson.build").read_text(), re.MULTILINE)
     assert version is not None
     assert citation["cff-version"] == "1.2.0"
-    assert citation["title"] == PROJECT["name"]
+    edition = facts("account")["edition"]["name"]
+    assert citation["title"] == f"{PROJECT['name']}. {edition}"
     assert citation["version"] == version.group(1)
     assert citation["license"] == PROJECT["license"]
     assert citation["abstract"].split() == PROJECT["description"].split()

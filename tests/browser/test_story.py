@@ -72,13 +72,15 @@ def test_a_reader_chooses_a_program_to_trust(browser: Chrome, letter: str, has: 
 
 
 def test_a_reader_predicts_before_the_run(browser: Chrome) -> None:
-    assert _points(browser, "stop", "runge-kutta") == ""
+    curve = browser.find_element(By.CSS_SELECTOR, "#chart-stop [data-curve=runge-kutta]")
+    assert curve.value_of_css_property("visibility") == "hidden"
     assert not browser.find_element(By.CSS_SELECTOR, "#stop .answer").is_displayed()
     slider = browser.find_element(By.ID, "prediction")
     before = _points(browser, "stop", "prediction")
     slider.send_keys(Keys.ARROW_LEFT * 10)
     assert _points(browser, "stop", "prediction") != before
     click(browser, "#run")
+    assert curve.value_of_css_property("visibility") == "visible"
     stop = run_program(case_scene(2), subset("runge-kutta"), "python").stop
     assert stop is not None
     assert _value(browser, "predicted") == 40
@@ -182,6 +184,24 @@ def test_the_story_can_be_read_in_four_minutes(browser: Chrome) -> None:
     """
     words = " ".join(browser.execute_script(script)).split()
     assert 600 < len(words) < 1000, len(words)
+
+
+def test_on_paper_every_answer_is_shown(browser: Chrome) -> None:
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        text = browser.find_element(By.TAG_NAME, "main").text
+        curve = browser.find_element(By.CSS_SELECTOR, "#chart-stop [data-curve=runge-kutta]")
+        assert curve.value_of_css_property("visibility") == "visible"
+    finally:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+    for told in (
+        "Program B is Runge-Kutta",
+        "ended at step 25 of 100.",
+        "to step 62",
+        "Case 5, Runge",
+    ):
+        assert told in text
+    assert "you predicted" not in text
 
 
 def test_without_scripts_the_story_can_be_read(browser: Chrome, site: Path) -> None:

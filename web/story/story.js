@@ -87,6 +87,7 @@ function predict() {
   fill("quotient", found.stop.quotient);
   say("variable", found.stop.variable);
   show("stop", "predicted");
+  delete chart.dataset.waiting;
   const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
   let shown = still ? steps.length : 1;
   const advance = () => {
@@ -127,8 +128,10 @@ function turn() {
   fill("at-step", step);
   fill("at-velocity", velocity[step]);
   fill("at-quotient", quotients[step - 1]);
-  fill("alone-step", found.stop.step);
-  say("alone-variable", found.stop.variable);
+  if (alone) {
+    fill("alone-step", found.stop.step);
+    say("alone-variable", found.stop.variable);
+  }
   show("turning-point", "at-step", alone ? "alone" : "");
 }
 
@@ -188,7 +191,7 @@ function race() {
 
 onChange(["trust"], claim);
 answer.hidden = true;
-draw(element("chart-stop"), "runge-kutta", [], []);
+element("chart-stop").dataset.waiting = "";
 choosePrediction();
 element("prediction").addEventListener("input", choosePrediction);
 element("run").addEventListener("click", predict);

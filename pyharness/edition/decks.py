@@ -11,9 +11,17 @@ from typing import Any, NamedTuple
 
 from pyharness.history.ablation import entries
 from pyharness.model.facts import facts
-from pyharness.original.cards import Card, Place, deck, numbers, parallels, switch_at, tight
+from pyharness.original.cards import Card, deck, numbers, parallels, tight
 from pyharness.original.collation import witness_lines
 from pyharness.original.decks import corrected_cards, corrections
+from pyharness.original.port_lines import Place, switch_at
+
+TITLES = {
+    "two-term": "Two-term collocation",
+    "four-term": "Four-term collocation",
+    "runge-kutta": "Runge-Kutta",
+}
+"""The names of the three programs in headings."""
 
 # Kinds of apparatus entries in order of precedence. A card with entries of several kinds has the
 # colour of the first of these kinds.

@@ -123,9 +123,9 @@ def _statements(program: str, first: int, last: int) -> list[tuple[int, str]]:
     found: list[tuple[int, str]] = []
     for number, card in deck(program).cards.items():
         text = card.text.rstrip()
-        if not first <= number <= last or text.startswith("C"):
+        if not first <= number <= last or card.is_comment:
             continue
-        if text[5:6].strip():
+        if card.continues:
             if number - 10 == found[-1][0]:
                 found[-1] = (found[-1][0], found[-1][1] + text[6:])
         elif not re.match(r"DO |CONTINUE|FORMAT", text[6:]):

@@ -72,8 +72,6 @@ MENU = {
         ("Search", "search.html"),
     ),
 }
-_DECKS = {"two-term": "Two-term collocation", "four-term": "Four-term collocation",
-          "runge-kutta": "Runge-Kutta"}  # fmt: skip
 
 
 class Found(NamedTuple):
@@ -197,7 +195,7 @@ def _listing() -> Iterator[Page]:
         views = [each for page in pages for each in page.cards]
         path = f"listing/{program}.html"
         context = {
-            "program": program, "programs": _DECKS, "sheets": pages, "cards": views,
+            "program": program, "programs": decks.TITLES, "sheets": pages, "cards": views,
             "kinds": decks.kinds_of(views), "notes": decks.notes(program),
         }  # fmt: skip
         found = [
@@ -205,12 +203,14 @@ def _listing() -> Iterator[Page]:
                   "".join(run.text for run in each.card).strip())
             for each in views
         ]  # fmt: skip
-        yield Page(path, f"{_DECKS[program]}: the program as printed", "deck.html", context, found)
+        yield Page(
+            path, f"{decks.TITLES[program]}: the program as printed", "deck.html", context, found
+        )
     yield Page("listing/collation.html", "The three decks compared", "collation.html",
-               {"programs": _DECKS, "operations": parallel_decks.operations()})  # fmt: skip
+               {"programs": decks.TITLES, "operations": parallel_decks.operations()})  # fmt: skip
     counts = {
         program: (title, len(deck(program).cards), len(decks.sheets(program)))
-        for program, title in _DECKS.items()
+        for program, title in decks.TITLES.items()
     }
     context = {"decks": counts, "scan": facts("cards/scan")}
     yield Page("listing/index.html", "The three programs", "listing.html", context)
@@ -258,7 +258,7 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
     for file in sorted((web / "site").iterdir()):
         content[f"assets/{file.name}"] = file.read_bytes()
     content["assets/story.js"] = bundle(web / "story" / "story.js").encode()
-    content["assets/story-data.js"] = script("storyData", story.data())
+    content["assets/story-data.js"] = script("storyData", story.context()["data"])
     content["assets/laboratory.js"] = bundle(web / "laboratory" / "laboratory.js").encode()
     content["assets/laboratory-data.js"] = script("laboratoryData", laboratory.context()["data"])
     content["assets/body.js"] = bundle(web / "body" / "body.js").encode()

@@ -6,13 +6,15 @@ and replaces them when a visitor changes something.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from pyharness.checks.port_protocol import requested_scene
+from pyharness.edition.decks import TITLES
+from pyharness.history.claims.stories import power_of_ten
 from pyharness.history.limits import limit_solution
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, switches
@@ -21,19 +23,13 @@ from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
-NAMES = {
-    "two-term": "two-term collocation",
-    "four-term": "four-term collocation",
-    "runge-kutta": "Runge-Kutta",
-}
 # The programs under the letters of the first scene, which does not tell their names at once.
 LETTERS = {"A": "two-term", "B": "runge-kutta", "C": "four-term"}
 BLIND_CASES = (1, 2, 5)
 RACE_CASES = (2, 3, 4, 5, 6, 7)
 # The plot area of every chart in the units of its picture: left, top, right, bottom.
 BOX = (40, 10, 350, 196)
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_DOUBLED = (0.01, 0.005, 0.0025, 0.00125)  # s
+STEP_SIZES = (0.01, 0.005, 0.0025, 0.00125)  # s
 _LOG_STEP = 2  # powers of ten from one label to the next
 
 
@@ -81,46 +77,49 @@ def context() -> dict[str, Any]:
     The numbers are those of the programs as printed and as corrected, each in 100 steps of 0.01 s.
     """
     stopped = _run(2, "runge-kutta")
-    limit = _chart_of_case("half-speed", 2, ["runge-kutta"], (-1.6, 2.2), may_stop=False)
+    endless = _run(2, "runge-kutta", may_stop=False)
     scene = case_scene(2)
-    towards = limit_solution("runge-kutta", scene, scene.times(), _truth(2))[:, 0]
-    limit = limit._replace(curves=[*limit.curves, _curve(limit, "limit", scene.times(), towards)])
-    errors = {case: {name: _largest_error(case, name) for name in PROGRAMS} for case in RACE_CASES}
+    limit = limit_solution("runge-kutta", scene, scene.times(), _truth(2))
+    half_speed = _chart_of_case("half-speed", 2, {"runge-kutta": endless}, (-1.6, 2.2))
+    curve = _curve(half_speed, "limit", scene.times(), limit[:, 0])
+    by_letter = {name: _run(2, name) for name in LETTERS.values()}
     charts = [
-        _chart_of_case("claim", 2, LETTERS.values(), (-1.2, 1.5)),
-        _chart_of_case("stop", 2, ["runge-kutta"], (-1.2, 1.5))._replace(
-            axes=("step", "ω₁, rad/s"), x=(0.0, 100.0), x_ticks=_step_ticks()
-        ),
+        _chart_of_case("claim", 2, by_letter, (-1.2, 1.5)),
+        _chart_of_case("stop", 2, {"runge-kutta": stopped}, (-1.2, 1.5), in_steps=True),
         _velocity_chart(stopped),
         _chart("quotient", ("step", "quotient, 1/s"), (0, 100), (0, 5), _powers(0, 5), is_log=True),
-        limit,
-        *(_chart_of_case(f"blind-{n}", n, ["runge-kutta"], _span(n)) for n in BLIND_CASES),
+        half_speed._replace(curves=[*half_speed.curves, curve]),
+        *(
+            _chart_of_case(f"blind-{n}", n, {"runge-kutta": _run(n, "runge-kutta")}, _span(n))
+            for n in BLIND_CASES
+        ),
         *(_race_chart(listing) for listing in ("original", "corrected")),
     ]
-    ratios = _ratios(errors)
+    ratios = {case: _ratios(case) for case in RACE_CASES}
+    others = [ratio for case in RACE_CASES if case != 7 for ratio in ratios[case].values()]
+    corrected = {name: _run(2, name, "corrected") for name in PROGRAMS}
     return {
         "charts": {each.name: each for each in charts},
         "box": BOX,
-        "names": NAMES,
+        "titles": TITLES,
         "letters": LETTERS,
-        "step_sizes": _DOUBLED,
+        "step_sizes": STEP_SIZES,
         "stopped": stopped,
-        "stop_error": _first_error(2, "runge-kutta", "original"),
         "peak": _second_velocity(stopped)[-2],
         "after": _second_velocity(stopped)[-1],
-        "limits": _distances(),
-        "alone": _run(2, "runge-kutta", without=["lipschitz-tests-velocity"]),
-        "right": _run(2, "runge-kutta", without=facts("account")["mechanism"]["alone"]),
+        "collocation_error": _first_error(2, "two-term"),
+        "stop_error": _first_error(2, "runge-kutta"),
+        "corrected_error": _first_error(2, "runge-kutta", "corrected"),
+        "from_solution": _distance(endless, _truth(2).omega),
+        "from_limit": _distance(endless, limit),
+        "alone": _run(2, "runge-kutta", without=("lipschitz-tests-velocity",)),
+        "right": _run(2, "runge-kutta", without=tuple(facts("account")["mechanism"]["alone"])),
         "in_48_bits": run_program(scene, Listing.original("runge-kutta"), "python", word="cdc48"),
-        "sine": {
-            listing: {name: _first_error(2, name, listing) for name in PROGRAMS}
-            for listing in ("original", "corrected")
-        },
-        "blind": {n: {p: _first_error(n, p, "original") for p in PROGRAMS} for n in BLIND_CASES},
-        "blind_runs": {n: {p: _run(n, p) for p in PROGRAMS} for n in BLIND_CASES},
-        "evaluations": {name: _run(2, name, "corrected").evaluations // 100 for name in PROGRAMS},
-        "ratios": ratios,
-        "seven": {p: errors[7][p] / errors[7]["runge-kutta"] for p in PROGRAMS},
+        "blind": {n: (_run(n, "runge-kutta"), _first_error(n, "runge-kutta")) for n in BLIND_CASES},
+        "evaluations": {name: run.evaluations // run.steps for name, run in corrected.items()},
+        "ratio": min(ratios[2].values()),
+        "ratios": (min(others), max(others)),
+        "case_7": ratios[7],
         "data": data(),
     }
 
@@ -135,11 +134,12 @@ def _truth(case: int) -> Reference:
     return reference(scene, scene.times())
 
 
+@cache
 def _run(
     case: int,
     program: str,
     listing: str = "original",
-    without: Iterable[str] = (),
+    without: tuple[str, ...] = (),
     may_stop: bool = True,
 ) -> Trajectory:
     """Run the twin of a program in a case: as printed, less some defects, or as corrected."""
@@ -147,43 +147,30 @@ def _run(
     return run_program(case_scene(case), Listing(program, active), "python", may_stop=may_stop)
 
 
-def _errors(case: int, program: str, listing: str = "corrected") -> Array:
-    run = _run(case, program, listing)
-    return np.abs(run.omega - _truth(case).omega[: run.steps])
+def _distance(run: Trajectory, goal: Array) -> float:
+    """Return the largest distance (rad/s) of omega1 from a goal, at the steps that were run."""
+    return float(np.abs(run.omega - goal[: run.steps])[:, 0].max())
 
 
-def _largest_error(case: int, program: str, listing: str = "corrected") -> float:
-    """Return the largest error of any component of omega (rad/s) at the steps that were run."""
-    return float(_errors(case, program, listing).max())
-
-
-def _first_error(case: int, program: str, listing: str) -> float:
+def _first_error(case: int, program: str, listing: str = "original") -> float:
     """Return the largest error of omega1 (rad/s) at the steps that were run."""
-    return float(_errors(case, program, listing)[:, 0].max())
+    return _distance(_run(case, program, listing), _truth(case).omega)
 
 
-def _ratios(errors: dict[int, dict[str, float]]) -> dict[int, tuple[float, float]]:
-    """Return, by case, the smaller and the larger ratio of collocation's error to Runge-Kutta's."""
-    found = {}
-    for case, of_program in errors.items():
-        both = sorted(of_program[name] / of_program["runge-kutta"] for name in NAMES
-                      if name != "runge-kutta")  # fmt: skip
-        found[case] = (both[0], both[1])
-    return found
+def _largest_error(case: int, program: str, listing: str) -> float:
+    """Return the largest error of any component of omega (rad/s) at the steps that were run."""
+    run = _run(case, program, listing)
+    return float(np.abs(run.omega - _truth(case).omega[: run.steps]).max())
 
 
-def _distances() -> dict[str, float]:
-    """Return the largest distances of the printed program from the solution and from its limit.
+def _ratios(case: int) -> dict[str, float]:
+    """Return how many times larger the error of each corrected collocation program is in a case.
 
-    The distances are those of omega1 (rad/s) in Case 2, without the stop test.
+    The errors are compared with that of the corrected Runge-Kutta program.
     """
-    scene = case_scene(2)
-    run = _run(2, "runge-kutta", may_stop=False)
-    towards = limit_solution("runge-kutta", scene, scene.times(), _truth(2))
-    return {
-        name: float(np.abs(run.omega - goal)[:, 0].max())
-        for name, goal in (("solution", _truth(2).omega), ("limit", towards))
-    }
+    errors = {name: _largest_error(case, name, "corrected") for name in PROGRAMS}
+    least = errors.pop("runge-kutta")
+    return {name: error / least for name, error in errors.items()}
 
 
 def _span(case: int) -> tuple[float, float]:
@@ -195,22 +182,26 @@ def _span(case: int) -> tuple[float, float]:
 
 
 def _chart_of_case(
-    name: str, case: int, programs: Iterable[str], y: tuple[float, float], may_stop: bool = True
+    name: str,
+    case: int,
+    runs: Mapping[str, Trajectory],
+    y: tuple[float, float],
+    in_steps: bool = False,
 ) -> Chart:
-    """Return a chart of the true omega1 of a case over time, and of programs as printed."""
+    """Return a chart of the true omega1 of a case over time, or over steps, and that of runs.
+
+    `runs` has the runs by the name of their program.
+    """
     scene = case_scene(case)
     times = [0.0, *scene.times()]
-    found = _chart(name, ("time, s", "ω₁, rad/s"), (0.0, times[-1]), y, _even(*y))
-    curves = [_curve(found, "solution", times, [scene.omega[0], *_truth(case).omega[:, 0]])]
-    for program in programs:
-        omega = [scene.omega[0], *_run(case, program, may_stop=may_stop).omega[:, 0]]
-        curves.append(_curve(found, program, times[: len(omega)], omega))
+    x = list(range(len(times))) if in_steps else times
+    axis = "step" if in_steps else "time, s"
+    found = _chart(name, (axis, "ω₁, rad/s"), (0.0, float(x[-1])), y, _even(*y))
+    curves = [_curve(found, "solution", x, [scene.omega[0], *_truth(case).omega[:, 0]])]
+    for program, run in runs.items():
+        omega = [scene.omega[0], *run.omega[:, 0]]
+        curves.append(_curve(found, program, x[: len(omega)], omega))
     return found._replace(curves=curves)
-
-
-def _step_ticks() -> list[tuple[str, str]]:
-    steps = _chart("stop", ("", ""), (0.0, 100.0), (0.0, 1.0), ())
-    return steps.x_ticks
 
 
 def _velocity_chart(run: Trajectory) -> Chart:
@@ -263,11 +254,7 @@ def _even(low: float, high: float) -> list[tuple[float, str]]:
 
 def _powers(low: int, high: int) -> list[tuple[float, str]]:
     """Return some powers of ten of a range, by their exponents, with their labels."""
-    return [
-        (n, f"10{str(n).translate(_SUPERSCRIPTS)}" if n else "1")
-        for n in range(low, high + 1)
-        if n % _LOG_STEP == 0
-    ]
+    return [(n, power_of_ten(n) if n else "1") for n in range(low, high + 1) if n % _LOG_STEP == 0]
 
 
 def _across(chart: Chart, x: float) -> float:

@@ -15,7 +15,8 @@ from xml.etree import ElementTree as xml
 import pyharness
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.original.cards import Card, Place, deck, numbers, parallels
+from pyharness.original.cards import Card, deck, numbers, parallels
+from pyharness.original.port_lines import Place
 
 TITLE = "A Digital Computer Approach to the Unsymmetric Rigid Body Problem"
 AUTHOR = "Richard Jacobs"

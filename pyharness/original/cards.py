@@ -10,17 +10,14 @@ scan from our text.
 import re
 from collections.abc import Iterable, Iterator
 from functools import cache, cached_property
-from pathlib import Path
 from typing import NamedTuple
 
 from pyharness.model.errors import InputError, unknown
-from pyharness.model.facts import facts, shipped
+from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
+from pyharness.original.port_lines import Place, port_lines, twin_line
 
-_MARGIN = re.compile(r"^(.*?)\s*!\s*(\d+(?:[-,\s]+\d+)*)\s*$")
 _SPECIFICATION = re.compile(r"PROGRAM |DIMENSION |REAL |FORMAT\(|END$")
-_PACKAGE = Path(__file__).parent.parent
-_PORT = "fortran/original"
 
 
 class Difference(NamedTuple):
@@ -34,14 +31,6 @@ class Difference(NamedTuple):
     ours: str
     scans: str
     entry: str
-
-
-class Place(NamedTuple):
-    """A line of a source file: the file's name, the line number from 1, and the text."""
-
-    file: str
-    line: int
-    text: str
 
 
 class Card(NamedTuple):
@@ -190,7 +179,7 @@ class Deck:
 
         The comment at the end of a line of the port names the cards of this line.
         """
-        return _by_card((cards, place) for place, cards in margin(self.program))
+        return _by_card((cards, place) for place, cards in port_lines(self.program))
 
     @cached_property
     def twin(self) -> dict[int, list[Place]]:
@@ -199,7 +188,7 @@ class Deck:
         The twin is the Python version of the program.
         """
         places = self._places["twin"]
-        return _by_card((cards, _line_of(file, text)) for cards, file, text in places)
+        return _by_card((cards, twin_line(file, text)) for cards, file, text in places)
 
 
 @cache
@@ -318,38 +307,6 @@ def _cards_of(asked: str) -> list[Card]:
     return found
 
 
-def margin(program: str) -> Iterator[tuple[Place, str]]:
-    """Yield each line of a program's Fortran port that corresponds to cards, with their numbers.
-
-    A card is a line of the printed program. The Fortran port names the cards in a comment at the
-    end of the line. Their numbers are yielded as text, as in ``750-770, 800``.
-    """
-    file = f"{program.replace('-', '_')}.fypp"
-    for number, text in enumerate(_lines(shipped(_PORT) / file), 1):
-        if match := _MARGIN.match(text):
-            yield Place(file, number, match[1].strip()), match[2]
-
-
-def switch_at(place: Place) -> tuple[str, bool] | None:
-    """Return the switch of the Fortran port that decides whether a line of the port is executed.
-
-    A switch selects between a defect, or a reading, of the printed program and its correction. The
-    result is the name of the defect or reading, and whether it is active where the line is
-    executed. It is None for a line that does not depend on a single switch.
-    """
-    lines = _lines(shipped(_PORT) / place.file)
-    depth = _indentation(lines[place.line - 1])
-    beyond_else = False
-    for line in filter(str.strip, reversed(lines[: place.line - 1])):
-        text, here = line.strip(), _indentation(line)
-        # The line opens a block around the place, or the branch before the `else` around it.
-        if here < depth or (beyond_else and here == depth and text.startswith(("if ", "else if "))):
-            if match := re.fullmatch(r"if \(listing%(\w+)\) then", text):
-                return match[1].replace("_", "-"), not beyond_else
-            depth, beyond_else = here, text == "else"
-    return None
-
-
 def passages(
     text: str, differences: Iterable[Difference]
 ) -> Iterator[tuple[str, Difference | None]]:
@@ -383,23 +340,6 @@ def _by_card(places: Iterable[tuple[str, Place]]) -> dict[int, list[Place]]:
         for number in numbers(cards):
             found.setdefault(number, []).append(place)
     return found
-
-
-def _line_of(file: str, text: str) -> Place:
-    folder = _PACKAGE / "original"
-    where = [n for n, line in enumerate(_lines(folder / file), 1) if line.strip() == text]
-    if len(where) != 1:
-        raise ValueError(f"{text!r} stands {len(where)} times in {file}")
-    return Place(file, where[0], text)
-
-
-@cache
-def _lines(path: Path) -> list[str]:
-    return path.read_text(encoding="utf-8").splitlines()
-
-
-def _indentation(line: str) -> int:
-    return len(line) - len(line.lstrip())
 
 
 def tight(text: str) -> str:

@@ -87,3 +87,13 @@ def opening(browser: Chrome, page: Path) -> Iterator[Callable[[str], None]]:
     errors(browser)
     yield opened
     assert errors(browser) == []
+
+
+def unnamed(browser: Chrome) -> list[str]:
+    """Return the ids of the controls that have no label."""
+    script = (
+        "return [...document.querySelectorAll('.controls :is(input, select)')]"
+        ".filter((x) => x.labels.length === 0).map((x) => x.id)"
+    )
+    found: list[str] = browser.execute_script(script)
+    return found

@@ -14,7 +14,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 
 from pyharness import Scene, case_scene, solve
 from pyharness.theory.flips import flip_times
-from tests.browser.screen import WIDTHS, fragment, opening, screen, text_of, too_wide
+from tests.browser.screen import WIDTHS, fragment, opening, screen, text_of, too_wide, unnamed
 
 Open = Callable[[str], None]
 CANVASES = ("space", "polhode", "herpolhode")
@@ -244,11 +244,7 @@ def test_every_control_has_a_name_and_nothing_is_wider_than_the_page(
     browser: Chrome, body: Open
 ) -> None:
     body("")
-    unnamed = (
-        "return [...document.querySelectorAll('.controls :is(input, select)')]"
-        ".filter((x) => x.labels.length === 0).map((x) => x.id)"
-    )
-    assert browser.execute_script(unnamed) == []
+    assert unnamed(browser) == []
     for width in WIDTHS:
         with screen(browser, width):
             body("#moments=40,30,20&omega0=0.123456789,-1,10&time=123456.789")

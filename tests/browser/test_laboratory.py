@@ -16,7 +16,7 @@ from pyharness import case_scene, run_program
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, subset
 from pyharness.original.printer import page
-from tests.browser.screen import WIDTHS, fragment, opening, screen, text_of, too_wide
+from tests.browser.screen import WIDTHS, fragment, opening, screen, text_of, too_wide, unnamed
 
 Open = Callable[[str], None]
 EXPERIMENTS = facts("experiments")["experiment"]
@@ -405,11 +405,7 @@ def test_every_control_has_a_name_and_nothing_is_wider_than_the_page(
     browser: Chrome, laboratory: Open
 ) -> None:
     laboratory("#case=7&program=two-term&listing=original")
-    unnamed = (
-        "return [...document.querySelectorAll('.controls :is(input, select)')]"
-        ".filter((x) => x.labels.length === 0).map((x) => x.id)"
-    )
-    assert browser.execute_script(unnamed) == []
+    assert unnamed(browser) == []
     for width in WIDTHS:
         with screen(browser, width):
             laboratory("#case=7&program=two-term&listing=original")

@@ -12,9 +12,10 @@ from selenium.webdriver.support.select import Select
 
 from pyharness import case_scene, run_program
 from pyharness.edition import story
+from pyharness.edition.decks import TITLES
 from pyharness.model.listing import Listing, subset
 from pyharness.truth.reference import reference
-from tests.browser.screen import click, errors, screen
+from tests.browser.screen import click, opening, screen
 
 pytestmark = pytest.mark.usefixtures("page")
 
@@ -22,12 +23,9 @@ pytestmark = pytest.mark.usefixtures("page")
 @pytest.fixture
 def page(browser: Chrome, site: Path) -> Iterator[None]:
     """Open the story on a wide screen; its console must stay empty."""
-    errors(browser)
-    with screen(browser, 1200):
-        browser.get("about:blank")
-        browser.get((site / "index.html").as_uri())
+    with screen(browser, 1200), opening(browser, site / "index.html") as opened:
+        opened("")
         yield
-    assert errors(browser) == []
 
 
 def _value(browser: Chrome, slot: str) -> float:
@@ -144,7 +142,7 @@ def test_faults_hide_in_case_1_and_show_in_case_5(browser: Chrome) -> None:
         click(browser, f"input[name=blind-case][value='{case}']")
         expected = _largest(case, program, subset(program), slice(0, 1))
         assert _value(browser, f"blind-error-{case}") == pytest.approx(expected, rel=1e-12)
-        assert story.NAMES[program] in _text(browser, "blind")
+        assert TITLES[program] in _text(browser, "blind")
         shown = [
             each.get_dom_attribute("id")
             for each in browser.find_elements(By.CSS_SELECTOR, "#blind .chart")
@@ -156,7 +154,7 @@ def test_faults_hide_in_case_1_and_show_in_case_5(browser: Chrome) -> None:
 def test_corrected_programs_are_run_beside_the_printed_ones(browser: Chrome) -> None:
     for listing in ("corrected", "original"):
         click(browser, f"input[name=race][value={listing}]")
-        for program in story.NAMES:
+        for program in TITLES:
             drawn = _points(browser, f"race-{listing}", program)
             assert drawn == _first_points(f"race-{listing}", program)
     errors = [_largest(2, name, Listing.corrected(name)) for name in ("four-term", "runge-kutta")]

@@ -8,7 +8,7 @@ from selenium.webdriver import Chrome, Keys
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 
-from tests.browser.screen import click, errors, screen
+from tests.browser.screen import click, opening, screen
 
 
 class Reader:
@@ -39,12 +39,9 @@ class Reader:
 @pytest.fixture
 def reader(browser: Chrome, site: Path) -> Iterator[Reader]:
     """Yield a reader on the home page; the console must stay empty."""
-    errors(browser)
-    with screen(browser, 1200):
-        browser.get("about:blank")
-        browser.get((site / "index.html").as_uri())
+    with screen(browser, 1200), opening(browser, site / "index.html") as opened:
+        opened("")
         yield Reader(browser)
-    assert errors(browser) == []
 
 
 def test_why_the_run_stopped(reader: Reader) -> None:

@@ -1,4 +1,5 @@
 // From experiments to the lines of the panels: names, values at the shared times, and ranges.
+import { brief } from "./experiment.js";
 import { quotientsOf } from "./why.js";
 
 const AXES = [0, 1, 2];
@@ -74,16 +75,12 @@ export function readout(shown, index) {
       .filter((line) => line.values[index] !== null)
       .map(({ name, look, values: column }) => {
         const of = look === "pinned" && name !== "pinned" ? " pinned" : "";
-        return `${name}${of} ${fewDigits(column[index])}`;
+        return `${name}${of} ${brief(column[index], 5)}`;
       });
     if (values.length === 0) return [];
     return id.startsWith("omega") ? values.join(", ") : `${id}: ${values.join(", ")}`;
   });
-  return `${fewDigits(shown.times[index])} s: ${told.join("; ")}`;
-}
-
-function fewDigits(value) {
-  return String(Number(value.toPrecision(5)));
+  return `${brief(shown.times[index], 5)} s: ${told.join("; ")}`;
 }
 
 // Times that agree to 12 digits count as one time.

@@ -71,7 +71,7 @@ export function counted(number, what) {
   return `${number} ${what}${number === 1 ? "" : "s"}`;
 }
 
-// Format a number with three digits, for reading.
-export function brief(value) {
-  return String(Number(value.toPrecision(3)));
+// Format a number with few digits, for reading.
+export function brief(value, digits = 3) {
+  return String(Number(value.toPrecision(digits)));
 }

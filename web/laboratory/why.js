@@ -28,7 +28,7 @@ export function whyEnded({ state, scene, run, truth, errors, tests }) {
 function cause(scene, run, tests, step, variable, quotient) {
   const [, change, by] = tests[step - 1].find(([name]) => name === variable);
   const numbers = Number.isFinite(quotient)
-    ? `the quotient is ${exactly(quotient)}`
+    ? `the quotient is ${brief(quotient, 4)}`
     : "the quotient is infinite";
   const axis = NAMES.indexOf(variable);
   if (axis < 0) {
@@ -82,7 +82,7 @@ function complete(state, tests) {
   if (!state.stops && above) {
     return (
       "The stop test is switched off. " +
-      `With it, the run would have ended at step ${above[0]}, where the quotient of ${above[1]} is ${exactly(above[2])}.`
+      `With it, the run would have ended at step ${above[0]}, where the quotient of ${above[1]} is ${brief(above[2], 4)}.`
     );
   }
   const known = found.filter(([, , value]) => value !== null);
@@ -92,9 +92,4 @@ function complete(state, tests) {
     `No quotient exceeded the limit of ${brief(state.lipschitz)} (1/s). ` +
     `The largest was ${brief(most[2])}, in step ${most[0]}, for ${most[1]}.`
   );
-}
-
-// Format a quotient with four digits.
-function exactly(value) {
-  return String(Number(value.toPrecision(4)));
 }

@@ -64,5 +64,9 @@ def prose(x: float, digits: int = 3) -> str:
         rounded = float(f"{x:.{digits}g}") + 0.0  # no sign of zero
         return f"{rounded:,.0f}" if rounded == int(rounded) else f"{rounded:.{digits}g}"
     mantissa, exponent = f"{x:.{digits - 1}e}".split("e")
-    power = str(int(exponent)).translate(_SUPERSCRIPTS)
-    return f"{float(mantissa):g}{_TIMES}10{power}"
+    return f"{float(mantissa):g}{_TIMES}{power_of_ten(int(exponent))}"
+
+
+def power_of_ten(exponent: int) -> str:
+    """Return a power of ten as text, with the exponent in superscript digits."""
+    return f"10{str(exponent).translate(_SUPERSCRIPTS)}"

@@ -1,0 +1,74 @@
+"""Lines of the programs in Fortran (the ports) and in Python (the twins), and their cards.
+
+A card is a line of a printed program. The Fortran port names its cards in comments, and
+`data/cards/places.toml` names the lines of the twin.
+"""
+
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from pyharness.model.facts import shipped
+
+_MARGIN = re.compile(r"^(.*?)\s*!\s*(\d+(?:[-,\s]+\d+)*)\s*$")
+_TWINS = Path(__file__).parent
+_PORT = "fortran/original"
+
+
+class Place(NamedTuple):
+    """A line of a source file: the file's name, the line number from 1, and the text."""
+
+    file: str
+    line: int
+    text: str
+
+
+def port_lines(program: str) -> Iterator[tuple[Place, str]]:
+    """Yield each line of a program's Fortran port that corresponds to cards, with their numbers.
+
+    A card is a line of the printed program. The Fortran port names the cards in a comment at the
+    end of the line. Their numbers are yielded as text, as in ``750-770, 800``.
+    """
+    file = f"{program.replace('-', '_')}.fypp"
+    for number, text in enumerate(_lines(shipped(_PORT) / file), 1):
+        if match := _MARGIN.match(text):
+            yield Place(file, number, match[1].strip()), match[2]
+
+
+def switch_at(place: Place) -> tuple[str, bool] | None:
+    """Return the switch of the Fortran port that decides whether a line of the port is executed.
+
+    A switch selects between a defect, or a reading, of the printed program and its correction. The
+    result is the name of the defect or reading, and whether it is active where the line is
+    executed. It is None for a line that does not depend on a single switch.
+    """
+    lines = _lines(shipped(_PORT) / place.file)
+    depth = _indentation(lines[place.line - 1])
+    beyond_else = False
+    for line in filter(str.strip, reversed(lines[: place.line - 1])):
+        text, here = line.strip(), _indentation(line)
+        # The line opens a block around the place, or the branch before the `else` around it.
+        if here < depth or (beyond_else and here == depth and text.startswith(("if ", "else if "))):
+            if match := re.fullmatch(r"if \(listing%(\w+)\) then", text):
+                return match[1].replace("_", "-"), not beyond_else
+            depth, beyond_else = here, text == "else"
+    return None
+
+
+def twin_line(file: str, text: str) -> Place:
+    """Return the line of a twin's file that has this text; raise ValueError unless it is one."""
+    where = [n for n, line in enumerate(_lines(_TWINS / file), 1) if line.strip() == text]
+    if len(where) != 1:
+        raise ValueError(f"{text!r} occurs {len(where)} times in {file}")
+    return Place(file, where[0], text)
+
+
+@cache
+def _lines(path: Path) -> list[str]:
+    return path.read_text(encoding="utf-8").splitlines()
+
+
+def _indentation(line: str) -> int:
+    return len(line) - len(line.lstrip())

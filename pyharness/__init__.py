@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from pyharness.model.impossible import ImpossibleBodyWarning
     from pyharness.model.listing import Listing, subset
     from pyharness.model.principal import principal
-    from pyharness.model.scene import Scene, TorqueLaw
+    from pyharness.model.scene import Scene
     from pyharness.model.scene_file import case_scene, read_scene
+    from pyharness.model.state_torque import StateTorque, opaque
+    from pyharness.model.torque_law import TorqueLaw
     from pyharness.model.trajectory import Stop, Trajectory
     from pyharness.original.many import ProgramEnsemble, run_many
     from pyharness.original.programs import run_program
@@ -40,11 +42,13 @@ __all__ = [
     "ProgramEnsemble",
     "Scene",
     "Solver",
+    "StateTorque",
     "Stop",
     "TorqueLaw",
     "Trajectory",
     "case_scene",
     "compare_programs",
+    "opaque",
     "prepare",
     "principal",
     "read_scene",
@@ -63,8 +67,10 @@ _SUBMODULES = {
     "model.impossible": ("ImpossibleBodyWarning",),
     "model.listing": ("Listing", "subset"),
     "model.principal": ("principal",),
-    "model.scene": ("Scene", "TorqueLaw"),
+    "model.scene": ("Scene",),
     "model.scene_file": ("case_scene", "read_scene"),
+    "model.state_torque": ("StateTorque", "opaque"),
+    "model.torque_law": ("TorqueLaw",),
     "model.trajectory": ("Stop", "Trajectory"),
     "original.many": ("ProgramEnsemble", "run_many"),
     "original.programs": ("run_program",),

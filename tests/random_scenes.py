@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness import Scene, TorqueLaw
-from pyharness.model.scene import Triple, Wave
+from pyharness.model.scene import Triple
+from pyharness.model.torque_law import Wave
 from pyharness.scenes.rescaled import scaled
 from pyharness.scenes.rotated import rotated
 

@@ -8,7 +8,8 @@ import numpy as np
 from pyharness.bench.contenders import Contender
 from pyharness.methods.many import solve_many
 from pyharness.methods.solve import solve
-from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import exact_coefficients
 

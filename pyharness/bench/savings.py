@@ -83,7 +83,7 @@ def _solver(scene: Scene, method: str, t_end: float, tolerance: float) -> Callab
 def _as_if_varying(scene: Scene) -> Scene:
     # The rate of change of the torque is too small to change a bit of the result, but it forces the
     # kernel to evaluate the torque at each time.
-    return replace(scene, torque=replace(scene.torque, rate=(1e-300, 0.0, 0.0)))
+    return replace(scene, torque=replace(scene.law, rate=(1e-300, 0.0, 0.0)))
 
 
 def _python(code: str) -> None:

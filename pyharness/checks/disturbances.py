@@ -11,7 +11,8 @@ from fractions import Fraction
 import numpy as np
 
 from pyharness.model.listing import Listing
-from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.original import collocation
 from pyharness.original.equations import omega_rate

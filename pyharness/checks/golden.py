@@ -126,7 +126,7 @@ def _compared(
     if now == entry:
         return name.judged(True, "", 0.0, 0.0)
     moved = _moved(entry, now)
-    waves = each.scene.torque.sines + each.scene.torque.cosines
+    waves = each.scene.law.sines + each.scene.law.cosines
     if each.tolerance is not None:
         limit = 2.0 * each.tolerance
     elif waves and not same_library:

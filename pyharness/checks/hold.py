@@ -166,7 +166,7 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     method, scene = tried.method, tried.scene
     if method == "closed-form":
         return closed_form(scene) is None
-    waves = scene.torque.sines + scene.torque.cosines
+    waves = scene.law.sines + scene.law.cosines
     radians = max((abs(frequency * truth.end) for _, frequency in waves), default=0.0)
     return method == "quick" or (method in _SERIES and radians > _TOO_MANY_RADIANS)
 

@@ -219,7 +219,7 @@ def _fastest(scene: Scene, omega: Array) -> float:
     """
     sizes = np.abs(np.vstack([scene.omega, omega]))
     others = np.roll(sizes, -1, axis=1) + np.roll(sizes, -2, axis=1)
-    waves = scene.torque.sines + scene.torque.cosines
+    waves = scene.law.sines + scene.law.cosines
     turning = float((np.abs(scene.euler_coefficients) * others).max())
     return max([turning, *(abs(frequency) for _, frequency in waves)])
 

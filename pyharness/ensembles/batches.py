@@ -76,7 +76,7 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
         sizes = own.get("step_size", np.full(n, scene.step_size))
         t_end = sizes * scene.steps if solver.t_end is None else np.full(n, solver.t_end)
     body, values = _body(scene, own, n)
-    law = scene.torque
+    law = scene.law
     found = {
         "omega0": _omega(scene, own, values if body == "moments" else None, n),
         "torque_constant": _three("torque.constant", law.constant, own, n),

@@ -291,7 +291,7 @@ class Batch:
                 scene = self.scene
                 if "torque_rate" in own:
                     rate = own.pop("torque_rate")[0]
-                    scene = replace(scene, torque=replace(scene.torque, rate=rate))
+                    scene = replace(scene, torque=replace(scene.law, rate=rate))
                 part = self._run(scene, own, at)
             except InputError:  # refuses this scene alone
                 continue

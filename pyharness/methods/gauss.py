@@ -166,7 +166,7 @@ def _first_step(scene: Scene, shortest: float) -> float:
     halved.
     """
     rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
-    for amplitude, frequency in scene.torque.sines + scene.torque.cosines:
+    for amplitude, frequency in scene.law.sines + scene.law.cosines:
         if any(amplitude):
             rate = max(rate, abs(frequency))
     return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))

@@ -39,7 +39,7 @@ def acts_in_space(scene: Scene, arrays: Iterable[object]) -> bool:
     the scene's torque names.
     """
     named = any(each is not None for each in arrays)
-    return scene.torque.in_space or (scene.torque.frame == "space" and named)
+    return scene.torque.in_space or (scene.law.frame == "space" and named)
 
 
 def solve_in_space(
@@ -145,4 +145,4 @@ def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
         own = {**dict.fromkeys(_BODIES), **own}
     if "omega0" in own:
         own["omega"] = own.pop("omega0")
-    return replace(scene, torque=replace(scene.torque, **torque), **own)
+    return replace(scene, torque=replace(scene.law, **torque), **own)

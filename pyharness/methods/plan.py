@@ -103,7 +103,7 @@ def plan(
 
 
 def _decisions(chosen: Plan) -> Iterator[Decision]:
-    scene, law = chosen.scene, chosen.scene.torque
+    scene, law = chosen.scene, chosen.scene.law
     closed = chosen.method == "closed-form"
     if closed:
         yield Decision("integration", False, f"closed form: {chosen.closed_form}")

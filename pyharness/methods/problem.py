@@ -12,7 +12,8 @@ import numpy as np
 
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS, columns
-from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import WITH_ALL_ROWS, Array, Trajectory
 
 _NOT_FINITE = (
@@ -43,7 +44,7 @@ def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
     """
     moments = np.array(scene.moments)
     largest = moments.max()
-    coefficients, *torque = _over(scene, scene.torque, np.full(3, largest))
+    coefficients, *torque = _over(scene, scene.law, np.full(3, largest))
     with np.errstate(over="ignore"):
         ratios = largest / moments
     if not np.isfinite(ratios).all():

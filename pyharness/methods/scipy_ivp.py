@@ -372,7 +372,7 @@ def _pushes(scene: Scene) -> list[tuple[float, float]]:
     moments = scene.moments or (1.0, 1.0, 1.0)
     return [
         (max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True)), abs(frequency))
-        for amplitude, frequency in scene.torque.sines + scene.torque.cosines
+        for amplitude, frequency in scene.law.sines + scene.law.cosines
     ]
 
 

@@ -54,7 +54,7 @@ def torque_noise(
     `omega0` (rad/s), and the omega that the whole torque causes. If the terms do not nearly cancel,
     the result is 0.
     """
-    if not (scene.torque.sines or scene.torque.cosines):
+    if not (scene.law.sines or scene.law.cosines):
         return 0.0
     if scale is None:
         scale = -max(map(abs, omega0))

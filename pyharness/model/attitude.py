@@ -135,3 +135,12 @@ def angle_between(attitude: Array, other: Array) -> Array:
     ])  # fmt: skip
     sine: Array = np.sqrt((vector * vector).sum(axis=0))
     return 2.0 * np.arcsin(np.minimum(1.0, sine))
+
+
+def quaternion_of_axes(axes: Array) -> Quaternion:
+    """Return the attitude of a right-handed frame, whose axes are the columns of a 3 x 3 array."""
+    # SciPy is imported here, because only a full inertia matrix needs it.
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(axes).as_quat().tolist()
+    return w, x, y, z

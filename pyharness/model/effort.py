@@ -88,7 +88,7 @@ def suggested(effort: float, needed: float | None = None) -> str:
 
 def waves(scene: Scene) -> int:
     """Return the number of waves, which are sine and cosine terms, in the torque of a scene."""
-    return len(scene.torque.sines) + len(scene.torque.cosines)
+    return len(scene.law.sines) + len(scene.law.cosines)
 
 
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:

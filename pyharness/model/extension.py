@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import NotBuiltError
-from pyharness.model.scene import Wave
+from pyharness.model.torque_law import Wave
 
 COMPLETE, STOPPED, OVERFLOW = Statuses.COMPLETE, Statuses.STOPPED, Statuses.OVERFLOW
 REFUSED, GAVE_UP, INTERRUPTED = Statuses.REFUSED, Statuses.GAVE_UP, Statuses.INTERRUPTED

@@ -6,9 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
-from pyharness.model.attitude import IDENTITY, product
+from pyharness.model.attitude import IDENTITY, product, quaternion_of_axes
 from pyharness.model.inertia import Exact, PrincipalFrame, nearest_float, principal_frame
 from pyharness.model.scene import Scene, Triple
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.model.waves import exact_law
 
@@ -85,12 +86,14 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
         return scene, np.eye(3)
     frame = principal_frame(scene.inertia)
     attitude = scene.attitude
-    if attitude is None and scene.torque.in_space:
+    if attitude is None and (scene.torque.in_space or scene.torque.needs_attitude):
         attitude = IDENTITY
     if attitude is not None:
-        attitude = product(attitude, _quaternion(frame.axes))
+        attitude = product(attitude, quaternion_of_axes(frame.axes))
     law = scene.torque
-    if not law.in_space:
+    if isinstance(law, StateTorque):
+        law = law.rotated(frame.axes)
+    elif not law.in_space:
         # The torque about an axis of small moment may result from cancellation of large
         # components. Therefore it is rounded only after the transformation.
         law = exact_law(law).turned(frame.into).rounded()
@@ -118,7 +121,7 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
     """
     attitude = found.attitude
     if attitude is not None:
-        w, x, y, z = _quaternion(axes)
+        w, x, y, z = quaternion_of_axes(axes)
         attitude = np.array(product(tuple(attitude.T), (w, -x, -y, -z))).T
     return replace(found, omega=found.omega @ axes.T, attitude=attitude, axes=axes)
 
@@ -127,10 +130,3 @@ def _turned(frame: PrincipalFrame, vector: Triple) -> Triple:
     first, second, third = map(Fraction, vector)
     x, y, z = map(float, frame.into((first, second, third)))
     return x, y, z
-
-
-def _quaternion(axes: Array) -> tuple[float, float, float, float]:
-    from scipy.spatial.transform import Rotation
-
-    x, y, z, w = Rotation.from_matrix(axes).as_quat().tolist()
-    return w, x, y, z

@@ -5,8 +5,9 @@ from typing import Any
 
 from pyharness.model.build import build
 from pyharness.model.listing import Listing
-from pyharness.model.scene import Scene, Wave
+from pyharness.model.scene import Scene
 from pyharness.model.scene_file import body_of
+from pyharness.model.torque_law import Wave
 from pyharness.model.trajectory import Trajectory
 
 
@@ -26,11 +27,11 @@ def scene_record(scene: Scene) -> dict[str, Any]:
             **({} if scene.attitude is None else {"attitude": list(scene.attitude)}),
         },
         "torque": {
-            "constant": list(scene.torque.constant),
-            "rate": list(scene.torque.rate),
-            "sines": [_wave(wave) for wave in scene.torque.sines],
-            "cosines": [_wave(wave) for wave in scene.torque.cosines],
-            **({} if scene.torque.frame == "body" else {"frame": scene.torque.frame}),
+            "constant": list(scene.law.constant),
+            "rate": list(scene.law.rate),
+            "sines": [_wave(wave) for wave in scene.law.sines],
+            "cosines": [_wave(wave) for wave in scene.law.cosines],
+            **({} if scene.law.frame == "body" else {"frame": scene.law.frame}),
         },
         "run": {"step_size": scene.step_size, "steps": scene.steps},
     }

@@ -3,26 +3,24 @@
 Every value is checked when a scene is created.
 """
 
-import itertools
 import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, SupportsIndex
+from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from pyharness.model.attitude import Quaternion, unit_quaternion
-from pyharness.model.errors import InputError, kind_of, printable, unknown
+from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
-from pyharness.model.functions import cosine, sine
 from pyharness.model.impossible import warn_of_impossible
+from pyharness.model.state_torque import StateTorque, checked_torque
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import (
     Matrix,
     Number,
     Numbers,
-    finite,
     integer,
     number,
-    number_list,
     three,
     three_floats,
 )
@@ -30,10 +28,6 @@ from pyharness.model.values import Triple as Triple
 
 if TYPE_CHECKING:
     from pyharness.model.inertia import Exact
-
-Wave = tuple[Triple, float]  # amplitude per axis, frequency in rad/s
-# The waves of a torque law as a user gives them: pairs of three amplitudes and a frequency.
-Waves = Iterable[tuple[Numbers, Number]]
 
 # The bytes of memory for the results of a step: eight binary64 numbers and the error code IER. They
 # are stored twice, in the kernel and in the trajectory.
@@ -46,111 +40,14 @@ FULL_INERTIA = (
     "the scene has a full inertia matrix, and this takes principal axes; allowed: moments, or the "
     "scene of pyharness.principal"
 )
-FRAMES = ("body", "space")
+STATE_TORQUE = (
+    "the torque depends on omega or attitude, and this takes a torque law, which depends on time "
+    "alone; allowed: solve and run, with the methods auto, taylor, reference and those of SciPy"
+)
 SPACE_TORQUE = (
     "the torque is about the axes of space, and this takes one about those of the body; allowed: "
     "methods auto and taylor, with the attitude"
 )
-
-
-@dataclass(frozen=True)
-class TorqueLaw:
-    """A torque law: constant, linear and sinusoidal terms about the axes of the body or of space.
-
-    N(t) = constant + rate t + sum of amplitude sin(frequency t) + sum of amplitude cos(frequency t)
-
-    The unit of N is N m for a body with moments or inertia. It is 1/s2 (torque over moment) for a
-    body with coefficients. Three numbers may be a list, a tuple or an array; the fields of the law
-    are plain tuples of floats.
-
-    Parameters
-    ----------
-    constant : three numbers
-        The constant term, in the unit of N.
-    rate : three numbers
-        The factor of time in the linear term, in the unit of N per second.
-    sines, cosines : iterable of waves
-        The sinusoidal terms. A wave is a pair: an amplitude, three numbers in the unit of N, and a
-        frequency (rad/s).
-    frame : {"body", "space"}
-        The axes of the components. A torque about the axes of space does not rotate with the body.
-
-    Raises
-    ------
-    InputError
-        For a vector that is not three finite numbers, an invalid wave, or an unknown frame.
-
-    Examples
-    --------
-    >>> from pyharness import TorqueLaw
-    >>> law = TorqueLaw((1.0, 0.0, 0.0), cosines=[((0.0, 2.0, 0.0), 0.5)])
-    >>> law.at(0.0)
-    (1.0, 2.0, 0.0)
-    """
-
-    constant: Triple = (0.0, 0.0, 0.0)
-    rate: Triple = (0.0, 0.0, 0.0)
-    sines: tuple[Wave, ...] = ()
-    cosines: tuple[Wave, ...] = ()
-    frame: str = "body"
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            constant: Numbers = ...,
-            rate: Numbers = ...,
-            sines: Waves = ...,
-            cosines: Waves = ...,
-            frame: str = "body",
-        ) -> None: ...
-
-    def __post_init__(self) -> None:
-        """Check the fields of the torque law, and convert its numbers to floats.
-
-        Raise InputError for an invalid value.
-        """
-        for name in ("constant", "rate"):
-            object.__setattr__(self, name, three(f"[torque] {name}", getattr(self, name)))
-        for name in ("sines", "cosines"):
-            object.__setattr__(self, name, _waves(f"[torque] {name}", getattr(self, name)))
-        if not isinstance(self.frame, str) or self.frame not in FRAMES:
-            raise unknown("frame", self.frame, FRAMES, "[torque] frame")
-
-    @property
-    def varies(self) -> bool:
-        """Whether the torque N depends on time."""
-        waves = self.sines + self.cosines
-        return any(self.rate) or any(any(amplitude) for amplitude, _ in waves)
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether the torque N is zero at all times."""
-        return not (self.varies or any(self.constant))
-
-    @property
-    def in_space(self) -> bool:
-        """Whether the torque is not zero and its components are about the axes of space.
-
-        Under such a torque omega depends on the attitude.
-        """
-        return self.frame == "space" and not self.is_zero
-
-    def at(self, time: float) -> Triple:
-        """Return the three components of the torque N at `time` (s).
-
-        The terms are added in the order constant, linear, sines and cosines, so that rounding is
-        always the same.
-        """
-        torque = list(self.constant)
-        if self.varies:
-            for axis in range(3):
-                torque[axis] += self.rate[axis] * time
-                for amplitude, frequency in self.sines:
-                    torque[axis] += amplitude[axis] * sine(frequency * time)
-                for amplitude, frequency in self.cosines:
-                    torque[axis] += amplitude[axis] * cosine(frequency * time)
-        return torque[0], torque[1], torque[2]
 
 
 @dataclass(frozen=True)
@@ -170,8 +67,11 @@ class Scene:
         The principal moments of inertia (kg m2).
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
-    torque : TorqueLaw
-        The torque on the body; zero by default.
+    torque : TorqueLaw, or function of (t, omega) or (t, omega, attitude)
+        The torque on the body; zero by default. A function returns the three components of the
+        torque about the body axes. It is called once, with symbols, and its arithmetic is recorded;
+        `attitude` is a quaternion from body to space, scalar first. A function that can't be
+        recorded is given as ``opaque(function)``.
     step_size : float
         The step size of the programs and of methods with a fixed step (s).
     steps : int
@@ -203,7 +103,7 @@ class Scene:
     omega: Triple
     moments: Triple | None = None
     coefficients: Triple | None = None
-    torque: TorqueLaw = field(default_factory=TorqueLaw)
+    torque: TorqueLaw | StateTorque = field(default_factory=TorqueLaw)
     step_size: float = 0.01
     steps: int = 100
     masses: Triple = field(default_factory=lambda: _deck("masses"))
@@ -222,7 +122,7 @@ class Scene:
             omega: Numbers,
             moments: Numbers | None = None,
             coefficients: Numbers | None = None,
-            torque: TorqueLaw = ...,
+            torque: TorqueLaw | StateTorque | Callable[..., Any] = ...,
             step_size: Number = 0.01,
             steps: SupportsIndex = 100,
             masses: Numbers = ...,
@@ -258,8 +158,7 @@ class Scene:
             unit, length = unit_quaternion("[initial] attitude", self.attitude)
             self._set("attitude", unit)
             self._set("attitude_length", length)
-        if not isinstance(self.torque, TorqueLaw):
-            raise InputError(f"[torque] is {kind_of(self.torque)}; it must be a TorqueLaw")
+        self._set("torque", checked_torque(self.torque))
         if self.torque.in_space and self.coefficients is not None:
             # Torque over moment has components about the axes of the body, which rotate.
             raise InputError(
@@ -343,15 +242,26 @@ class Scene:
         return high > low + middle
 
     @property
+    def law(self) -> TorqueLaw:
+        """The torque law, which depends on time alone.
+
+        Raise InputError if the torque depends on the state. Code that cannot treat such a torque
+        therefore reads this property instead of `torque`.
+        """
+        if isinstance(self.torque, StateTorque):
+            raise InputError(STATE_TORQUE)
+        return self.torque
+
+    @property
     def body_torque(self) -> TorqueLaw:
         """The torque law about the axes of the body.
 
-        Raise InputError if the torque is about the axes of space. Code that cannot treat such a
-        torque therefore reads this property instead of `torque`.
+        Raise InputError if the torque is about the axes of space, or depends on the state. Code
+        that cannot treat such a torque therefore reads this property instead of `torque`.
         """
         if self.torque.in_space:
             raise InputError(SPACE_TORQUE)
-        return self.torque
+        return self.law
 
     def times(self) -> list[float]:
         """Return the times (s) of a program's results, one for each step.
@@ -410,13 +320,17 @@ def _size(steps: int, limit: int) -> str:
     return f"{steps}{size if steps > limit else ''}"
 
 
-def checked_scene(scene: object, any_axes: bool = False, any_torque: bool = False) -> Scene:
+def checked_scene(
+    scene: object, any_axes: bool = False, any_torque: bool = False, any_state: bool = False
+) -> Scene:
     """Return the argument `scene`; raise InputError unless it is a Scene that the caller accepts.
 
-    A full inertia matrix is accepted if `any_axes` is true. A torque about the axes of space is
-    accepted if `any_torque` is true.
+    A full inertia matrix is accepted if `any_axes` is true, a torque about the axes of space if
+    `any_torque` is true, and a torque that depends on the state if `any_state` is true.
     """
     if isinstance(scene, Scene):
+        if isinstance(scene.torque, StateTorque) and not any_state:
+            raise InputError(STATE_TORQUE)
         if scene.torque.in_space and not any_torque:
             raise InputError(SPACE_TORQUE)
         if scene.inertia is not None and not any_axes:
@@ -438,17 +352,3 @@ def _above_zero(where: str, symbol: str, values: object) -> Triple:
                 f"{where}: {symbol}{axis} is {value:g}; allowed: a finite number above 0"
             )
     return found
-
-
-def _waves(where: str, values: object) -> tuple[Wave, ...]:
-    allowed = "allowed: a list of waves, each an amplitude of three numbers and a frequency"
-    waves = []
-    for value in number_list(where, values, allowed):
-        wave = list(itertools.islice(number_list(where, value, allowed), 3))
-        if len(wave) != 2:
-            raise InputError(f"{where}: a wave has an amplitude and a frequency; {allowed}")
-        amplitude, frequency = wave
-        waves.append(
-            (three(f"{where} amplitude", amplitude), finite(f"{where} frequency", frequency))
-        )
-    return tuple(waves)

@@ -10,8 +10,9 @@ from pyharness.model.attitude import of_angles
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.facts import facts
 from pyharness.model.pipes import read_input
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
 from pyharness.model.schema import SCHEMAS, check_schema
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import integer
 
 _LARGEST_FILE = 1_000_000
@@ -158,7 +159,7 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     import json
 
     body, values = body_of(scene)
-    law = scene.torque
+    law = scene.law
     lines = [f"# {line}" for line in comments]
     lines.append(f"schema = {SCHEMAS['scene file']}")
     lines += [f"name = {json.dumps(scene.name, ensure_ascii=False)}", "[body]"]

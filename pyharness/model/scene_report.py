@@ -36,7 +36,7 @@ def heading(scene: Scene) -> list[str]:
 
 
 def _law(scene: Scene) -> str:
-    law = scene.torque
+    law = scene.law
     if not law.varies:
         return _tuple(law.constant)
     parts = [_tuple(law.constant)] if any(law.constant) else []

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from pyharness.model.errors import InputError
 from pyharness.model.inertia import Exact
-from pyharness.model.scene import Scene, TorqueLaw, Wave
+from pyharness.model.scene import Scene
+from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Triple
 
@@ -160,7 +161,7 @@ def with_merged_waves(scene: Scene) -> Scene:
 
     Terms of the same frequency are added exactly, by the function `merged`.
     """
-    law = merged(scene.torque)
+    law = merged(scene.law)
     return scene if law is scene.torque else replace(scene, torque=law)
 
 

@@ -80,7 +80,7 @@ def compiled_words() -> tuple[str, ...]:
 def _check_angles(scene: Scene) -> None:
     # In the collocation programs TIME grows with the square of the number of steps.
     latest = scene.step_size * scene.steps**2
-    law = scene.torque
+    law = scene.law
     for _, frequency in (*law.sines, *law.cosines):
         if not abs(frequency) * latest < 2.0**Waves.ANGLE_BITS:
             raise InputError(

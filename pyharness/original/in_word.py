@@ -9,7 +9,8 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from pyharness.model.listing import Listing
-from pyharness.model.scene import Scene, TorqueLaw, Wave
+from pyharness.model.scene import Scene
+from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.word import WORDS as WORDS
 from pyharness.original.word import Word
@@ -40,7 +41,7 @@ def scene_in(scene: Scene, word: Word) -> Scene:
     A word is a floating-point format. The numbers of the copy are not checked. Therefore `scene`
     itself must have been checked.
     """
-    law = scene.torque
+    law = scene.law
 
     def those(values: Any) -> Any:
         return None if values is None else tuple(word(each) for each in values)

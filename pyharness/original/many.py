@@ -160,7 +160,7 @@ def run_many(
     checked_listing(listing)
     may_stop, velocity = boolean("may_stop", may_stop), boolean("velocity", velocity)
     threads = threads_of(threads)
-    law = scene.torque
+    law = scene.law
     if not kind:
         moments, coefficients = scene.moments, scene.coefficients
         kind = "coefficients" if moments is None else "moments"
@@ -229,7 +229,7 @@ def _run(
     n_rows, status, stop_variable = (np.zeros(n, dtype=np.int32) for _ in range(3))
     quotient = np.full(n, np.nan)
     given_up = np.zeros(1, dtype=np.int32)
-    law = scene.torque
+    law = scene.law
     waves = columns(law.sines), columns(law.cosines)
 
     def some(part: slice) -> None:

@@ -99,7 +99,7 @@ def _torque_cards(scene: Scene) -> tuple[float, float, float]:
     the result is its constant torques.
     """
     cards = {entry["case"]: entry["torque"] for entry in facts("printer")["initial_torque"]}
-    first, second, third = cards.get(scene.case, scene.torque.constant)
+    first, second, third = cards.get(scene.case, scene.law.constant)
     return first, second, third
 
 

@@ -8,7 +8,8 @@ import math
 from collections.abc import Callable
 from random import Random
 
-from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw
 
 MOST_TURNS = 300.0
 WAVES = {"one wave": 1, "three waves": 3, "ten waves": 10}

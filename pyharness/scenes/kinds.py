@@ -8,7 +8,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from random import Random
 
-from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.scenes.rescaled import scaled
 from pyharness.scenes.rotated import rotated
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw
 
 
 def perturbed(scene: Scene, part: float) -> Iterator[Scene]:
@@ -19,7 +20,7 @@ def perturbed(scene: Scene, part: float) -> Iterator[Scene]:
     for name in ("moments", "coefficients", "omega"):
         for triple in _triples(getattr(scene, name), part):
             yield _with(scene, name, triple)
-    law = scene.torque
+    law = scene.law
     for name in ("constant", "rate"):
         for triple in _triples(getattr(law, name), part):
             yield replace(scene, torque=_with(law, name, triple))

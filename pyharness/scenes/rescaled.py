@@ -27,7 +27,7 @@ def scaled(scene: Scene, factor: float) -> Scene:
     If omega(t) is the solution of the given scene, the solution of the returned scene is
     factor * omega(factor * t). If `factor` is a power of 2, no number is rounded.
     """
-    law = scene.torque
+    law = scene.law
 
     def times(values: Triple, power: int) -> Triple:
         # The factor is applied repeatedly, because its square alone may overflow.
@@ -85,7 +85,7 @@ def omega_by_torque(scene: Scene, time: float) -> float:
     products of components of omega in Euler's equations, are neglected. The bound is infinite if it
     is beyond the range of binary64.
     """
-    law, span = scene.torque, abs(time)
+    law, span = scene.law, abs(time)
     moments = scene.moments or (1.0, 1.0, 1.0)
     if law.in_space:
         # Any axis of the body may come to be along the torque.
@@ -111,7 +111,7 @@ def _fits(scene: Scene, time: float, factor: float) -> bool:
     integration of the given scene (s). The result is also False if a rescaled time is so short that
     it is subnormal in binary64, and thus has fewer digits.
     """
-    law = scene.torque
+    law = scene.law
     waves = law.sines + law.cosines
     sizes = [abs(x) * factor * factor for a in (law.constant, *(a for a, _ in waves)) for x in a]
     sizes += [abs(x) * factor * factor * factor for x in law.rate]

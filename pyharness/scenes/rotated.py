@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from pyharness.model.attitude import Quaternion
 from pyharness.model.errors import InputError
-from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.model.trajectory import Array
 
 
@@ -21,7 +22,7 @@ def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
         return tuple((turn(amplitude), frequency) for amplitude, frequency in each)
 
-    law = scene.torque
+    law = scene.law
     if not law.in_space:
         law = TorqueLaw(turn(law.constant), turn(law.rate), waves(law.sines), waves(law.cosines))
     return replace(
@@ -42,7 +43,7 @@ def restarted_at(
     is shifted in time. Raise InputError if the torque is about the axes of space and `attitude` is
     None.
     """
-    law = scene.torque
+    law = scene.law
     if law.in_space and attitude is None:
         raise InputError(
             "a scene with a torque about the axes of space can't be restarted without the "

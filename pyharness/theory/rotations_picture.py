@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pyharness.model.report import Picture, numbers
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.theory.polhodes import growth_of_bodies, polhodes
 from pyharness.theory.rotations import steady_rotations

@@ -33,8 +33,9 @@ from pyharness.cli.main import main
 from pyharness.cli.verbs.bench import chosen
 from pyharness.compare.candidates import End, Ready, not_finite
 from pyharness.model.errors import InputError
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
 from pyharness.views.render import render

@@ -42,7 +42,7 @@ def test_every_kind_comes_in_turn_with_every_body_and_speed(loads: list[Workload
 
 def test_scenes_are_what_their_kinds_say(loads: list[Workload]) -> None:
     for load in loads:
-        scene, law = load.scene, load.scene.torque
+        scene, law = load.scene, load.scene.law
         assert scene.moments is not None
         assert not scene.is_impossible
         least, middle, most = sorted(scene.moments)

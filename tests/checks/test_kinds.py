@@ -35,7 +35,8 @@ from pyharness.methods import problem
 from pyharness.methods.registry import METHODS
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 from pyharness.original import compiled
 from pyharness.original.cells import all_cells, cell_name

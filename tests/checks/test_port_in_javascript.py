@@ -17,7 +17,8 @@ from pyharness.checks.port import differences, port
 from pyharness.checks.port_process import PortProcess
 from pyharness.checks.port_protocol import ENDINGS, read_answer, request
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene import Scene, TorqueLaw, Wave
+from pyharness.model.scene import Scene
+from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.scenes.random_scenes import draw
 from tests.ports import WEB, node, sample
 
@@ -28,7 +29,7 @@ def test_the_javascript_has_the_twins_bits_in_random_scenes() -> None:
     with PortProcess(node(WEB)) as process:
         for number in range(200):
             drawn = draw("port", number)
-            if drawn.scene.torque.sines or drawn.scene.torque.cosines:
+            if drawn.scene.law.sines or drawn.scene.law.cosines:
                 continue
             lipschitz, may_stop = drawn.lipschitz, drawn.may_stop
             line = process.ask(request(drawn.scene, drawn.listing, lipschitz, may_stop))

@@ -16,8 +16,9 @@ from pyharness.compare.orders import Order, measured_order, order_of
 from pyharness.compare.report import comparison_report
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.programs import PROGRAM_REGISTRY, Program
 from pyharness.scenes.rescaled import scaled

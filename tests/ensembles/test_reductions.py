@@ -14,7 +14,8 @@ from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.sweep import Sweep, points
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.codes import Statuses
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import STOP_VARIABLES
 from tests.ensembles.claims import CLAIMS
 from tests.ensembles.sweeps import PROGRAM, TILT, text, written

@@ -12,7 +12,8 @@ from random import Random
 import numpy as np
 
 from pyharness.model.errors import InputError
-from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
 from pyharness.scenes.rotated import rotated
 from tests.estimates.truth import Truth, truth_of
@@ -107,7 +108,7 @@ def _dressed(source: Random, scene: Scene) -> tuple[Scene, list[str]]:
         scene = replace(scene, attitude=(w, x, y, z))
         if scene.moments and not scene.torque.is_zero and source.random() < 0.4:
             kinds.append(IN_SPACE)
-            scene = replace(scene, torque=replace(scene.torque, frame="space"))
+            scene = replace(scene, torque=replace(scene.law, frame="space"))
     if scene.moments and source.random() < 0.25:
         kinds.append(INERTIA)
         scene = _about_other_axes(source, scene)
@@ -124,7 +125,7 @@ def _about_other_axes(source: Random, scene: Scene) -> Scene:
 
     matrix = axes @ np.diag(scene.moments or ()) @ axes.T
     bare = replace(scene, moments=None, inertia=(0.5 * (matrix + matrix.T)).tolist())
-    if scene.torque.frame == "space":
+    if scene.law.frame == "space":
         return replace(bare, omega=turn(scene.omega))
     return rotated(bare, turn, body=False)
 
@@ -195,7 +196,7 @@ def _cancelling(source: Random, scene: Scene) -> Scene:
     amplitude = moments * large * np.array([source.uniform(-1.0, 1.0) for _ in range(3)])
     rest = 1.0 + 10.0 ** -source.uniform(6.0, 14.0) * source.choice((-1.0, 1.0))
     frequency = speed * 10.0 ** source.uniform(-1.0, 0.5)
-    law, one, other = scene.torque, triple(amplitude), triple(-amplitude * rest)
+    law, one, other = scene.law, triple(amplitude), triple(-amplitude * rest)
     if source.random() < 0.3:
         # The two torques alone, from rest or from an omega of the size that they can produce.
         law = TorqueLaw()

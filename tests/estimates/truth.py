@@ -93,7 +93,7 @@ def truth_of(
     until = np.atleast_1d(np.asarray(times, dtype=np.float64))
     unit = math.ulp(until[-1])
     assert all(Fraction(t) % Fraction(unit) == 0 for t in until.tolist())
-    law = scene.torque
+    law = scene.law
     body = _body(scene)
     waves: list[float] = []
     for cosine, some in ((0.0, law.sines), (1.0, law.cosines)):

@@ -15,7 +15,8 @@ from pyharness import InputError, Scene, TorqueLaw
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solver import PREPARED
 from pyharness.model.listing import PROGRAMS, names_of
-from pyharness.model.scene import Triple, Wave
+from pyharness.model.scene import Triple
+from pyharness.model.torque_law import Wave
 from pyharness.scenes.random_scenes import Draw, draw
 
 _CORNERS = (
@@ -165,7 +166,7 @@ def _pointing(random: Random, found: Scene) -> tuple[Scene, bool]:
         q = tuple(number(random, 0.2) for _ in range(4))
         found = replace(found, attitude=(q[0], q[1], q[2], q[3]) if any(q) else None)
     if found.moments is not None and random.random() < 0.3:
-        found = replace(found, torque=replace(found.torque, frame="space"))
+        found = replace(found, torque=replace(found.law, frame="space"))
     return found, random.random() < 0.9
 
 
@@ -259,7 +260,7 @@ def scene_text(random: Random) -> str:
     elif random.random() < 0.1:
         lines += [f"angles_deg = {_list(found.omega)}", 'sequence = "3-2-1"']
     if random.random() < 0.6:
-        law = found.torque
+        law = found.law
         frame = ['frame = "space"'] * (random.random() < 0.1)
         lines += [
             "[torque]",

@@ -242,7 +242,7 @@ def test_extreme_motion_ends_in_time_and_says_how(
     if scene is RUNAWAY:
         assert len(found.time) == 0
     elif end == "complete":
-        wanted = np.array(scene.omega) + times[0] * np.array(scene.torque.constant)
+        wanted = np.array(scene.omega) + times[0] * np.array(scene.law.constant)
         np.testing.assert_allclose(found.omega[0], wanted, rtol=1e-7, atol=1e157)
 
 

@@ -78,7 +78,7 @@ def test_torque_of_case_7_falls_and_is_sampled_once_a_radian() -> None:
     moments = np.array(scene.moments)
     law = np.array([scene.normalized_torque(t) for t in scene.times()]) * moments
     assert np.abs(law).max() <= 1.0 + 1e-12
-    assert max(f for _, f in scene.torque.sines + scene.torque.cosines) * scene.step_size == 1.0
+    assert max(f for _, f in scene.law.sines + scene.law.cosines) * scene.step_size == 1.0
     gained = np.abs(np.cumsum(law / moments * scene.step_size, axis=0)).max()
     assert gained < 0.05
 

@@ -147,7 +147,7 @@ def test_momentum_in_space_is_what_torque_made_of_it() -> None:
     def torque_in_space(time: float, axis: int) -> float:
         found = solve(scene, [time], "taylor", 1e-13, attitude=True)
         assert found.attitude is not None
-        return float(turned_to_space(found.attitude, np.array([scene.torque.at(time)]))[0, axis])
+        return float(turned_to_space(found.attitude, np.array([scene.law.at(time)]))[0, axis])
 
     end = solve(scene, [0.0, 1.0], "taylor", 1e-13, attitude=True)
     momentum = end.angular_momentum("space")

@@ -58,7 +58,7 @@ def _angle_errors(scene: Scene, times: Array | list[float], attitudes: Array) ->
     """Return the angle (rad) from the true attitude at each time, for a spin about one axis."""
     assert scene.attitude is not None
     assert scene.moments is not None
-    law = scene.torque
+    law = scene.law
     vectors = [scene.omega, law.constant, law.rate, *(amplitude for amplitude, _ in law.sines)]
     axis = int(np.argmax(np.abs(vectors).max(axis=0)))
     found = []

@@ -13,7 +13,8 @@ import pytest
 
 from pyharness import Scene, TorqueLaw, prepare, solve, solve_many
 from pyharness.methods.sensitivity import torque_noise
-from pyharness.model.scene import Triple, Wave
+from pyharness.model.scene import Triple
+from pyharness.model.torque_law import Wave
 from pyharness.truth.reference import reference
 
 _ROUNDING = 2.0**-53
@@ -73,7 +74,7 @@ def _truth(scene: Scene) -> tuple[np.ndarray, float]:
 def test_every_entry_point_is_right_or_says_that_it_is_not(kind: str, number: int) -> None:
     scene = _scene(kind, number)
     truth, largest = _truth(scene)
-    law = scene.torque
+    law = scene.law
 
     def rows(waves: tuple[Wave, ...]) -> np.ndarray:
         return np.array([[[*amplitude, frequency] for amplitude, frequency in waves]] * 3)

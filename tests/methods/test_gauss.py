@@ -82,7 +82,7 @@ _STEPS = {
 def test_order_is_twice_the_stages(case: int, stages: int, steps: tuple[int, int]) -> None:
     law = TorqueLaw()
     if case == 7:
-        rate = case_scene(7).torque.rate
+        rate = case_scene(7).law.rate
         law = TorqueLaw(rate=rate, sines=(((9.0, 9.0, 0.0), 3.0),))
     scene = replace(case_scene(case), torque=law)
     end = 3.0

@@ -20,7 +20,8 @@ from pyharness.methods.solve import solve
 from pyharness.model import extension as room
 from pyharness.model.extension import extension
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene import Scene, TorqueLaw, Wave
+from pyharness.model.scene import Scene
+from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.original.compiled import run
 from pyharness.original.many import run_many
 from tests.cli.interrupts import hearing

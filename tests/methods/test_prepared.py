@@ -439,7 +439,7 @@ def test_what_the_kernel_chose_comes_back(
 def test_wave_without_effect_is_not_packed(solver: Solver) -> None:
     """However fast the wave is, the bits are those of a scene without it."""
     idle = (((0.0, 0.0, 0.0), 1e200),)
-    same = replace(PUSHED, torque=TorqueLaw(PUSHED.torque.constant, sines=idle, cosines=idle))
+    same = replace(PUSHED, torque=TorqueLaw(PUSHED.law.constant, sines=idle, cosines=idle))
     wanted = solver(_omega(PUSHED), 3.0)
     np.testing.assert_array_equal(prepare(same)(_omega(PUSHED), 3.0), wanted)
     for method in ("gauss-4", "dop853"):

@@ -72,7 +72,7 @@ def by_scipy(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
 
     def rates(t: float, y: Array) -> Array:
         omega, q = y[:3], y[3:]
-        push = Rotation.from_quat(q, scalar_first=True).inv().apply(scene.torque.at(t))
+        push = Rotation.from_quat(q, scalar_first=True).inv().apply(scene.law.at(t))
         turned = np.linalg.solve(inertia, push - np.cross(omega, inertia @ omega))
         rest = q[0] * omega + np.cross(q[1:], omega)
         return np.concatenate([turned, [-0.5 * q[1:] @ omega], 0.5 * rest])
@@ -85,7 +85,7 @@ def by_scipy(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
 def momentum(scene: Scene, times: Array) -> Array:
     """Return the angular momentum in space at `times` (s), which the torque alone changes."""
     start = matrix(scene) @ np.array(scene.omega)
-    law, t = scene.torque, times[:, None]
+    law, t = scene.law, times[:, None]
     attitude = np.array([scene.attitude or IDENTITY])
     found = turned_to_space(attitude, start[None]) + t * law.constant + t * t / 2.0 * law.rate
     for amplitude, frequency in law.sines:
@@ -125,7 +125,7 @@ def test_momentum_on_random_scenes() -> None:
         scene = drawn.scene
         if scene.moments is None or scene.torque.is_zero:
             continue
-        scene = replace(scene, torque=replace(scene.torque, frame="space"), attitude=TURNED)
+        scene = replace(scene, torque=replace(scene.law, frame="space"), attitude=TURNED)
         found = solve(scene, [drawn.time], tolerance=1e-13, attitude=True)
         true = momentum(scene, np.array([drawn.time]))
         # The angle of a wave may be rounded.
@@ -143,7 +143,7 @@ def test_energy_is_the_work_of_the_torque() -> None:
     found = solve(scene, [0.0, *times, 2.0], tolerance=1e-13, attitude=True)
     assert found.attitude is not None
     omega = turned_to_space(found.attitude, found.omega)[1:-1]
-    torque = np.array([scene.torque.at(t) for t in times])
+    torque = np.array([scene.law.at(t) for t in times])
     energy = found.energy()
     assert energy[-1] - energy[0] == pytest.approx(weights @ (torque * omega).sum(1), rel=1e-12)
 
@@ -174,7 +174,7 @@ def test_torque_along_the_axis_of_a_spin_is_one_of_the_body(axis: int) -> None:
 
 
 def test_another_axis_of_space_is_another_motion() -> None:
-    body = replace(PUSHED, torque=replace(PUSHED.torque, frame="body"))
+    body = replace(PUSHED, torque=replace(PUSHED.law, frame="body"))
     found = [solve(each, [2.0], attitude=True).omega for each in (PUSHED, body)]
     assert np.abs(found[0] - found[1]).max() > 0.1
 
@@ -186,7 +186,7 @@ def test_tolerance_holds_on_random_scenes() -> None:
         drawn = draw("attitude", number)
         if drawn.scene.moments is None or drawn.scene.torque.is_zero:
             continue
-        law = replace(drawn.scene.torque, frame="space")
+        law = replace(drawn.scene.law, frame="space")
         scene, times = replace(drawn.scene, torque=law), [0.4 * drawn.time, drawn.time]
         try:
             true = solve(scene, times, "taylor", 1e-15, attitude=True)
@@ -261,7 +261,7 @@ def test_no_torque_in_space_is_none() -> None:
 
 @pytest.mark.parametrize("factor", [2.0**-500, 2.0**-400, 2.0**400, 2.0**500])
 def test_motion_far_from_one_is_the_same(factor: float) -> None:
-    push = factor * factor * np.array(PUSHED.torque.constant)
+    push = factor * factor * np.array(PUSHED.law.constant)
     omega = factor * np.array(PUSHED.omega)
     scene = Scene("", omega, BODY, torque=TorqueLaw(push, frame="space"))
     wanted, found = solve(PUSHED, [2.0], attitude=True), solve(scene, [2.0 / factor], attitude=True)
@@ -307,7 +307,7 @@ def test_giving_up_says_what_would_do() -> None:
 def test_giving_up_in_the_first_integration_counts_the_second() -> None:
     """The number of steps per second is constant, so that the first integration shows the work."""
     calm = replace(
-        PUSHED, omega=(0.0, 1.0, 10.0), torque=replace(PUSHED.torque, constant=(0.0, 0.0, 1e-9))
+        PUSHED, omega=(0.0, 1.0, 10.0), torque=replace(PUSHED.law, constant=(0.0, 0.0, 1e-9))
     )
     with pytest.raises(InputError, match=r"--effort") as refused:
         solve(calm, [1000.0], attitude=True, effort=1e-4)

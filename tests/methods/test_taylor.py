@@ -13,7 +13,7 @@ from pyharness.methods.problem import normalized
 from pyharness.methods.solve import solve
 from pyharness.model.build import build
 from pyharness.model.extension import extension
-from pyharness.model.scene import TorqueLaw
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference

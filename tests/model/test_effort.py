@@ -18,7 +18,8 @@ from pyharness.methods.solver import PREPARED
 from pyharness.model.effort import suggested
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.listing import Listing
-from pyharness.model.scene import Scene, TorqueLaw, Wave
+from pyharness.model.scene import Scene
+from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.programs import run_program
 from pyharness.truth.reference import reference

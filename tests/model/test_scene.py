@@ -91,11 +91,11 @@ def test_torque_about_the_axes_of_space_stays_as_the_axes_of_the_body_turn() -> 
     # By default the body starts along the axes of space, and its principal axes do not.
     assert about_principal.attitude is not None
     assert matrices(np.array([about_principal.attitude]))[0] == pytest.approx(axes)
-    faster = scaled(scene, 4.0).torque
+    faster = scaled(scene, 4.0).law
     assert (faster.frame, faster.constant) == ("space", (16, 32, 48))
     later = restarted_at(scene, np.ones(3), 0.5, (0.0, 0.0, 1.0, 0.0))
-    assert later.torque.at(0.25) == pytest.approx(law.at(0.75))
-    assert (later.torque.frame, later.attitude) == ("space", (0.0, 0.0, 1.0, 0.0))
+    assert later.law.at(0.25) == pytest.approx(law.at(0.75))
+    assert (later.law.frame, later.attitude) == ("space", (0.0, 0.0, 1.0, 0.0))
     with pytest.raises(InputError, match="can't be restarted without the attitude"):
         restarted_at(scene, np.ones(3), 0.5)
 
@@ -172,8 +172,8 @@ def test_files_that_are_no_scene(tmp_path: Path) -> None:
 def test_cases_are_those_of_table_1() -> None:
     assert case_scene(3).euler_coefficients == ((39 - 20) / 41, (20 - 41) / 39, (41 - 39) / 20)
     assert [case_scene(n).is_impossible for n in range(1, 8)] == [False] * 5 + [True, False]
-    assert case_scene(7).torque.at(0.0) == (0.0, 1.0, 0.0)
-    assert case_scene(7).torque.at(0.25) == (math.sin(25.0), math.cos(25.0), 0.25)
+    assert case_scene(7).law.at(0.0) == (0.0, 1.0, 0.0)
+    assert case_scene(7).law.at(0.25) == (math.sin(25.0), math.cos(25.0), 0.25)
     with pytest.raises(InputError, match="unknown case '8'"):
         case_scene(8)
 
@@ -183,7 +183,7 @@ def test_right_hand_side_is_the_normalized_form() -> None:
     scene = case_scene(7)
     inertia = np.array(scene.moments)
     for t, omega in ((0.0, (1.0, 2.0, 3.0)), (0.7, (-0.3, 5.0, 0.1))):
-        torque = np.array(scene.torque.at(t))
+        torque = np.array(scene.law.at(t))
         wanted = (torque - np.cross(omega, inertia * omega)) / inertia
         np.testing.assert_allclose(scene.right_hand_side()(t, omega), wanted, rtol=1e-14)
     scene = case_scene(5)

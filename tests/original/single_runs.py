@@ -32,7 +32,7 @@ def single_scene(scene: Scene, options: Options, row: int) -> Scene:
         if name in options
     }
     if "torque_constant" in given:
-        scene = replace(scene, torque=replace(scene.torque, constant=given["torque_constant"]))
+        scene = replace(scene, torque=replace(scene.law, constant=given["torque_constant"]))
     if "moments" in given:
         scene = replace(scene, moments=given["moments"], coefficients=None, inertia=None)
     if "coefficients" in given:

@@ -17,8 +17,9 @@ from pyharness.compare.comparison import compare_programs
 from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, REFUSED, extension
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 from pyharness.original import compiled_in_word, in_word
 from pyharness.original.cells import all_listings

@@ -35,7 +35,7 @@ def random_ensemble(number: int, n: int) -> tuple[Scene, Listing, Options]:
         body = "moments" if source.random() < 0.7 else "coefficients"
         options[body] = source.uniform(0.5, 50.0, (n, 3))
     if source.random() < 0.3:
-        size = np.abs(scene.torque.constant).max() + 1.0
+        size = np.abs(scene.law.constant).max() + 1.0
         options["torque_constant"] = source.normal(size=(n, 3)) * size
     if source.random() < 0.5:
         # Extremes among others: bodies that overflow, do not move, or vanish.
@@ -130,7 +130,7 @@ def test_stops_of_the_thesis() -> None:
     found = run_many(
         cases[1], Listing.original("runge-kutta"), omega0=[case.omega for case in cases],
         moments=[case.moments or () for case in cases], at=[25, 26, 100],
-        torque_constant=[case.torque.constant for case in cases],
+        torque_constant=[case.law.constant for case in cases],
     )  # fmt: skip
     assert (found.n_rows[1], found.status[1], found.stop_variable[1]) == (25, 1, 5)
     assert found.ended[1] == "stopped"

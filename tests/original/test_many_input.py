@@ -11,8 +11,9 @@ import pytest
 
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing
-from pyharness.model.scene import Scene, TorqueLaw, most_steps
+from pyharness.model.scene import Scene, most_steps
 from pyharness.model.scene_file import case_scene
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.original import compiled
 from pyharness.original.many import run_many
 from tests.original.single_runs import Options, assert_same, same_bits

@@ -12,8 +12,9 @@ from pyharness.compare.agreement import differences, distance
 from pyharness.compare.orders import measured_order
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable, switches
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.original import compiled, runge_kutta
 from pyharness.original.cells import all_cells, all_listings, cell_name
 from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY, run_program

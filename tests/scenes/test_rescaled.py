@@ -195,6 +195,6 @@ def test_bound_of_what_torque_gives_holds_on_a_sphere(axis: int, time: float) ->
 def test_bound_of_what_torque_gives_is_of_the_smallest_moment_for_a_torque_in_space() -> None:
     scene = Scene("", (0.0, 0.0, 0.0), moments=(4.0, 3.0, 2.0), torque=TorqueLaw((6.0, 0.0, 0.0)))
     assert omega_by_torque(scene, -2.0) == 3.0
-    in_space = replace(scene, torque=replace(scene.torque, frame="space"))
+    in_space = replace(scene, torque=replace(scene.law, frame="space"))
     assert omega_by_torque(in_space, -2.0) == 6.0
     assert omega_by_torque(replace(scene, moments=(1e-300, 3.0, 2.0)), 1e10) == math.inf

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from pyharness.methods import linearised
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.truth.reference import reference

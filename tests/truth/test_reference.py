@@ -11,8 +11,9 @@ import pytest
 
 from pyharness import solve
 from pyharness.model.errors import InputError
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.truth import reference as room
 from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.integer_series import integer_series

@@ -22,7 +22,8 @@ from pyharness.methods.registry import FIXED_STEP, METHODS, SCIPY_METHODS
 from pyharness.methods.solve import finest, solve
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.scenes.random_scenes import random_scene
 from pyharness.scenes.rescaled import scaled

@@ -15,7 +15,8 @@ from pyharness.checks.tolerances import MIDDLING
 from pyharness.compare.candidates import End, not_finite
 from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
 from pyharness.model.errors import InputError
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.scenes.extreme import ORDINARY, ORDINARY_TIME, TWOS, in_steps
 from pyharness.scenes.rescaled import scaled
 from pyharness.theory.conditioning import Conditioning, conditioning

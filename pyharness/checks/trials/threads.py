@@ -23,8 +23,9 @@ from pyharness.methods.solver import PREPARED, Solver
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
 from pyharness.model.listing import Listing
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.original.programs import IMPLEMENTATIONS
 
 THREADS = 8

@@ -24,7 +24,8 @@ from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest_and_middling
 from pyharness.compare.candidates import Candidate, method_candidate, prepared_candidate, unstopped
 from pyharness.methods.registry import FIXED_STEP
-from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.theory import brouwer
 from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.truth.axial_top import axial_top
@@ -67,7 +68,7 @@ def axial(scene: Scene, time: float) -> Truth:
     4 sqrt(n) of them (Hoeffding 1963).
     """
     flow = conditioning(scene, time)
-    waves = scene.torque.sines + scene.torque.cosines
+    waves = scene.law.sines + scene.law.cosines
     periods = max(frequency * time for _, frequency in waves) / (2.0 * math.pi)
     chance = min(1.0, 4.0 / math.sqrt(periods))
     omega = np.array([[float(w) for w in axial_top(scene, [time])[0]]])
@@ -82,9 +83,9 @@ def averaged(scene: Scene, time: float) -> Truth:
     is added to the error bound of the solution.
     """
     moments = np.array(scene.moments)
-    waves = scene.torque.sines + scene.torque.cosines
+    waves = scene.law.sines + scene.law.cosines
     moved = sum(float((2.0 * np.abs(a) / moments).max()) / f for a, f in waves)
-    free = truth_of(replace(scene, torque=replace(scene.torque, sines=(), cosines=())), time)
+    free = truth_of(replace(scene, torque=replace(scene.law, sines=(), cosines=())), time)
     return replace(free, error=free.error + moved * free.flow.amplification)
 
 

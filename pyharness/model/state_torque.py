@@ -1,0 +1,248 @@
+"""Torques that depend on the state: recorded from a Python function, or evaluated by calling it."""
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from inspect import Parameter, signature
+from typing import Any
+
+import numpy as np
+
+from pyharness.model.attitude import product, quaternion_of_axes
+from pyharness.model.errors import InputError, kind_of, printable
+from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, refusal
+from pyharness.model.tape import FLOATS, N_INPUTS, TIME, Tape, evaluate
+from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.trajectory import Array
+from pyharness.model.values import Triple, three_floats
+
+Function = Callable[..., Any]
+_ARGUMENTS = "allowed: a function of (t, omega), or of (t, omega, attitude)"
+
+
+@dataclass(frozen=True)
+class StateTorque:
+    """A torque about the body axes that depends on time, omega and attitude.
+
+    Its unit is N m for a body with moments or inertia, and 1/s2 (torque over moment) for a body
+    with coefficients. Scenes create it from a function that the user gives as their torque.
+
+    Attributes
+    ----------
+    tape : Tape or None
+        The recorded function; None for an opaque torque.
+    function : callable or None
+        The function of an opaque torque, else None.
+    needs_attitude : bool
+        Whether the torque depends on the attitude.
+    expression : tuple of str
+        The three expressions of a scene file from which the tape was recorded; empty if it was
+        recorded from a Python function.
+    constants : tuple of pairs
+        The names and values of the constants in `expression`.
+    """
+
+    tape: Tape | None
+    function: Function | None = None
+    needs_attitude: bool = False
+    expression: tuple[str, ...] = ()
+    constants: tuple[tuple[str, float], ...] = ()
+    # A torque law has these attributes too.
+    is_zero: bool = field(default=False, init=False, repr=False)
+    varies: bool = field(default=True, init=False, repr=False)
+    in_space: bool = field(default=False, init=False, repr=False)
+
+    def at(self, time: float, omega: Sequence[float], attitude: Sequence[float]) -> Triple:
+        """Return the three components of the torque at `time` (s).
+
+        `omega` has three components (rad/s), and `attitude` is a quaternion, scalar first. A
+        component is NaN where the torque is singular. Raise InputError if an opaque function does
+        not return three numbers.
+        """
+        if self.tape is None:
+            return _called(self.function, self.needs_attitude, time, omega, attitude)
+        try:
+            first, second, third = evaluate(self.tape, [time, *omega, *attitude], FLOATS)
+        except ZeroDivisionError:
+            return math.nan, math.nan, math.nan
+        return first, second, third
+
+    def rotated(self, axes: Array) -> "StateTorque":
+        """Return the torque about other body axes.
+
+        The columns of `axes`, shape (3, 3), are the new axes in components about the old ones. The
+        attitude of the result is that of the new axes.
+        """
+        if self.tape is None:
+            raise InputError(
+                "an opaque torque can't be transformed to principal axes; allowed: a torque that "
+                "can be recorded, or a body with moments"
+            )
+        old = self.tape
+        return replayed(lambda t, omega, q: axes.T @ torque_of(old, t, axes @ omega, _old(q, axes)))
+
+
+def torque_of(tape: Tape, time: Any, omega: Any, attitude: Any) -> Array:
+    """Return the three outputs of a tape in symbols, as an array, for symbols as its inputs."""
+    return np.array(evaluate(tape, [time, *omega, *attitude], SYMBOLS), dtype=object)
+
+
+def replayed(function: Function) -> StateTorque:
+    """Return a torque recorded from a function of (t, omega, attitude) of this project."""
+    recorder = Recorder()
+    time, *state = recorder.inputs()
+    omega, attitude = np.array(state[:3], dtype=object), np.array(state[3:], dtype=object)
+    tape = recorder.tape(list(function(time, omega, attitude)))
+    return StateTorque(tape, None, tape.needs_attitude)
+
+
+def recorded(function: Function) -> StateTorque:
+    """Return the torque that a user's function computes, recorded with symbols.
+
+    The function has the arguments t, omega and, optionally, attitude. It is called once. Raise
+    InputError if it can't be recorded, or does not return three numbers.
+    """
+    takes_attitude = _takes_attitude(function)
+
+    def called(time: Symbol, omega: Any, attitude: Any) -> list[Any]:
+        given = (time, omega, attitude) if takes_attitude else (time, omega)
+        try:
+            found = function(*given)
+            components = list(found)
+        except InputError:
+            raise
+        except Exception as error:
+            missing = re.search(r"no callable (\w+) method", str(error))
+            if missing:
+                raise refusal(f"{missing[1]} of the state") from None
+            raise InputError(
+                f"torque: the function raised {type(error).__name__}: {printable(str(error))}; "
+                "allowed: a function that returns three components in N m"
+            ) from error
+        if len(components) != 3:
+            raise InputError(f"torque: {len(components)} components; allowed: three")
+        return components
+
+    return replayed(called)
+
+
+def opaque(function: Function) -> StateTorque:
+    """Return a torque that is evaluated by calling a Python function at each time step.
+
+    Only SciPy's methods solve a scene with such a torque.
+
+    Parameters
+    ----------
+    function : callable
+        A function of (t, omega) or of (t, omega, attitude), which are a float and NumPy arrays. It
+        returns the three components of the torque about the body axes (N m).
+
+    Returns
+    -------
+    StateTorque
+        The torque, for the argument `torque` of `Scene`.
+
+    Raises
+    ------
+    InputError
+        If `function` is not a function of two or three arguments.
+
+    Examples
+    --------
+    >>> from pyharness import Scene, opaque, solve
+    >>> def brake(t, omega):
+    ...     return [-0.1 if omega[0] > 0.5 else 0.0, 0.0, 0.0]
+    >>> scene = Scene("brake", (1.0, 0.0, 0.0), moments=(1.0, 2.0, 3.0), torque=opaque(brake))
+    >>> solve(scene, 1.0, "dop853").omega.round(6)
+    array([[0.9, 0. , 0. ]])
+    """
+    return StateTorque(None, function, _takes_attitude(function))
+
+
+def checked_torque(value: object) -> TorqueLaw | StateTorque:
+    """Return a user's torque as a TorqueLaw or a StateTorque; a function is recorded.
+
+    Raise InputError for any other type, and for a function that can't be recorded.
+    """
+    if isinstance(value, (TorqueLaw, StateTorque)):
+        return value
+    if not callable(value):
+        raise InputError(
+            f"[torque] is {kind_of(value)}; it must be a TorqueLaw, or a function of (t, omega) or "
+            "(t, omega, attitude)"
+        )
+    torque = recorded(value)
+    return law_of(torque) or torque
+
+
+def law_of(torque: StateTorque) -> TorqueLaw | None:
+    """Return the torque law that equals a recorded torque, or None if it is no such law.
+
+    The torque must be a sum of a constant, a term linear in time, and sines and cosines of angles
+    proportional to time. The methods for torque laws are faster.
+    """
+    tape = torque.tape
+    if tape is None or tape.inputs - {TIME}:
+        return None
+    frequencies, waves = {TIME: 1.0}, {}
+    for slot, (kind, operands, linear) in enumerate(tape.operations, N_INPUTS):
+        if linear is not None and len(linear.terms) == 1 and not linear.constant:
+            ((_, frequencies[slot]),) = linear.terms
+        elif kind in ("sine", "cosine") and operands[0] in frequencies:
+            waves[slot] = kind, frequencies[operands[0]]
+        else:
+            return None
+    terms = [dict(output.terms) for output in tape.outputs]
+    if not {slot for each in terms for slot in each} <= {TIME, *waves}:
+        return None
+
+    def amplitude(slot: int) -> list[float]:
+        return [each.get(slot, 0.0) for each in terms]
+
+    def those(wanted: str) -> list[tuple[list[float], float]]:
+        return [(amplitude(slot), f) for slot, (kind, f) in waves.items() if kind == wanted]
+
+    constant = [output.constant for output in tape.outputs]
+    return TorqueLaw(constant, amplitude(TIME), those("sine"), those("cosine"))
+
+
+def _takes_attitude(function: object) -> bool:
+    if not callable(function):
+        raise InputError(f"torque is {kind_of(function)}; {_ARGUMENTS}")
+    try:
+        parameters = signature(function).parameters.values()
+    except (TypeError, ValueError):
+        raise InputError(f"torque: the function's arguments are unknown; {_ARGUMENTS}") from None
+    places = [each for each in parameters if each.kind in _POSITIONAL]
+    required = [each for each in places if each.default is Parameter.empty]
+    keywords = [
+        each
+        for each in parameters
+        if each.kind is Parameter.KEYWORD_ONLY and each.default is Parameter.empty
+    ]
+    many = any(each.kind is Parameter.VAR_POSITIONAL for each in parameters)
+    if keywords or len(required) > 3 or not (many or len(places) >= 2):
+        raise InputError(f"torque: the function has {len(places)} arguments; {_ARGUMENTS}")
+    return len(required) == 3 or (len(required) < 2 and many)
+
+
+_POSITIONAL = (Parameter.POSITIONAL_ONLY, Parameter.POSITIONAL_OR_KEYWORD)
+
+
+def _called(
+    function: Function | None,
+    needs_attitude: bool,
+    time: float,
+    omega: Sequence[float],
+    attitude: Sequence[float],
+) -> Triple:
+    assert function is not None
+    given = [time, np.array(omega)] + ([np.array(attitude)] if needs_attitude else [])
+    return three_floats("torque", function(*given))
+
+
+def _old(attitude: Any, axes: Array) -> list[Any]:
+    """Return the attitude of the old axes from that of the new, in symbols."""
+    w, x, y, z = quaternion_of_axes(axes)
+    return list(product(tuple(attitude), (w, -x, -y, -z)))

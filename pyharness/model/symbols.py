@@ -1,0 +1,324 @@
+"""Symbols, with which a function is called once so that its arithmetic is recorded on a tape.
+
+A symbol is a linear combination of the slots of a tape. Sums, and products with numbers, only
+change its coefficients. Any other operation is recorded on the tape, but only the first time: the
+same operation on the same slots returns the same slot.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from pyharness.model.errors import InputError
+from pyharness.model.tape import N_INPUTS, Functions, Linear, Operation, Tape, slots_of
+from pyharness.model.values import converted
+
+# Largest number of operations and of terms of a linear combination; the kernel's memory and time
+# are proportional to their number.
+MOST_OPERATIONS = 2000
+_MOST_POWER = 1000
+_ALLOWED = (
+    "allowed: + - * /, integer powers, sqrt, sin, cos, tan, exp, sinh, cosh, tanh of NumPy, or "
+    "opaque(function), which SciPy's methods solve"
+)
+
+
+def refusal(what: str) -> InputError:
+    """Return the exception for an operation that can't be recorded; `what` names it."""
+    return InputError(f"torque: {what} can't be recorded; {_ALLOWED}")
+
+
+class Recorder:
+    """A tape while it is being recorded."""
+
+    def __init__(self) -> None:
+        self._operations: list[Operation] = []
+        self._slots: dict[Operation, int] = {}
+
+    def inputs(self) -> list["Symbol"]:
+        """Return a symbol for each of the eight inputs: time, omega and attitude."""
+        return [Symbol(self, 0.0, {slot: 1.0}) for slot in range(N_INPUTS)]
+
+    def number(self, value: float) -> "Symbol":
+        """Return a constant as a symbol."""
+        return Symbol(self, value, {})
+
+    def slot(self, operation: Operation) -> int:
+        """Return the slot of the result of `operation`, which is recorded if it is new."""
+        if operation not in self._slots:
+            if len(self._operations) == MOST_OPERATIONS:
+                raise InputError(
+                    f"torque: more than {MOST_OPERATIONS} operations; use fewer, or a table"
+                )
+            self._slots[operation] = N_INPUTS + len(self._operations)
+            self._operations.append(operation)
+        return self._slots[operation]
+
+    def tape(self, outputs: Sequence[Any]) -> Tape:
+        """Return the tape that computes `outputs`, which are symbols and real numbers.
+
+        Operations on which no output depends are removed.
+        """
+        linear = [self._output(axis, each) for axis, each in enumerate(outputs, 1)]
+        return _without_unused(self._operations, linear)
+
+    def _output(self, axis: int, value: Any) -> Linear:
+        if isinstance(value, np.ndarray) and value.shape == ():
+            value = value.item()
+        if isinstance(value, Symbol):
+            return value.linear()
+        number = converted(value)
+        if not isinstance(number, float):
+            raise InputError(f"torque: component {axis} is {number}; allowed: a number")
+        if not math.isfinite(number):
+            raise InputError(f"torque: component {axis} is {number:g}; allowed: a finite number")
+        return Linear(number, ())
+
+
+class Symbol:
+    """A linear combination of slots of a tape, which records what is done to it."""
+
+    __slots__ = ("_constant", "_recorder", "_terms")
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self, recorder: Recorder, constant: float, terms: dict[int, float]) -> None:
+        if not (math.isfinite(constant) and all(map(math.isfinite, terms.values()))):
+            raise InputError("torque: a constant overflows or is not a number; use finite numbers")
+        if len(terms) > MOST_OPERATIONS:
+            raise InputError(f"torque: a sum of more than {MOST_OPERATIONS} terms; use fewer")
+        self._recorder, self._constant, self._terms = recorder, constant, terms
+
+    def linear(self) -> Linear:
+        """Return the linear combination as data."""
+        return Linear(self._constant, tuple(sorted(self._terms.items())))
+
+    def _slot(self) -> tuple[int, float]:
+        """Return a slot and a factor, whose product is the value of this symbol."""
+        if len(self._terms) == 1 and not self._constant:
+            ((slot, factor),) = self._terms.items()
+            return slot, factor
+        return self._recorder.slot(Operation("linear", (), self.linear())), 1.0
+
+    def _other(self, value: Any) -> "Symbol | None":
+        """Return the other operand of an operator as a symbol, or None if it is no number."""
+        if isinstance(value, Symbol):
+            return value
+        if isinstance(value, np.ndarray):
+            return None
+        number = converted(value)
+        return Symbol(self._recorder, number, {}) if isinstance(number, float) else None
+
+    def _scaled(self, factor: float) -> "Symbol":
+        if factor == 0.0:
+            return Symbol(self._recorder, 0.0, {})
+        terms = {slot: factor * each for slot, each in self._terms.items()}
+        return Symbol(self._recorder, factor * self._constant, terms)
+
+    def __add__(self, value: Any) -> "Symbol":
+        """Return the sum with a symbol or a real number."""
+        other = self._other(value)
+        if other is None:
+            return NotImplemented
+        terms = dict(self._terms)
+        for slot, coefficient in other._terms.items():
+            total = terms.pop(slot, 0.0) + coefficient
+            if total != 0.0:
+                terms[slot] = total
+        return Symbol(self._recorder, self._constant + other._constant, terms)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> "Symbol":
+        """Return the negative."""
+        return self._scaled(-1.0)
+
+    def __pos__(self) -> "Symbol":
+        """Return the symbol itself."""
+        return self
+
+    def __sub__(self, value: Any) -> "Symbol":
+        """Return the difference from a symbol or a real number."""
+        other = self._other(value)
+        if other is None:
+            return NotImplemented
+        difference: Symbol = self + -other
+        return difference
+
+    def __rsub__(self, value: Any) -> "Symbol":
+        """Return a real number minus the symbol."""
+        return (-self).__add__(value)
+
+    def __mul__(self, value: Any) -> "Symbol":
+        """Record and return the product with a symbol or a real number."""
+        other = self._other(value)
+        if other is None:
+            return NotImplemented
+        if not other._terms:
+            return self._scaled(other._constant)
+        if not self._terms:
+            return other._scaled(self._constant)
+        (a, factor), (b, second) = self._slot(), other._slot()
+        product = self._recorder.slot(Operation("product", (min(a, b), max(a, b))))
+        return Symbol(self._recorder, 0.0, {product: factor * second})
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, value: Any) -> "Symbol":
+        """Record and return the quotient; raise InputError for a division by the constant 0."""
+        other = self._other(value)
+        if other is None:
+            return NotImplemented
+        if not other._terms:
+            if other._constant == 0.0:
+                raise InputError("torque: division by the constant 0")
+            quotient = {slot: each / other._constant for slot, each in self._terms.items()}
+            return Symbol(self._recorder, self._constant / other._constant, quotient)
+        if not (self._terms or self._constant):
+            return self
+        (b, divisor) = other._slot()
+        if self._terms:
+            a, factor = self._slot()
+        else:
+            one = Linear(1.0, ())
+            a, factor = self._recorder.slot(Operation("linear", (), one)), self._constant
+        slot = self._recorder.slot(Operation("quotient", (a, b)))
+        return Symbol(self._recorder, 0.0, {slot: factor / divisor})
+
+    def __rtruediv__(self, value: Any) -> "Symbol":
+        """Record and return a real number divided by the symbol."""
+        other = self._other(value)
+        if other is None:
+            return NotImplemented
+        return other / self
+
+    def __pow__(self, power: Any) -> "Symbol":
+        """Record and return an integer power, or the square root as the power 0.5."""
+        exponent = converted(power) if not isinstance(power, Symbol) else None
+        if not isinstance(exponent, float):
+            raise refusal("a power that is not a number")
+        if exponent == 0.5:
+            return self.sqrt()
+        if exponent != int(exponent) or abs(exponent) > _MOST_POWER:
+            raise refusal(f"the power {exponent:g}")
+        result, square, left = self._recorder.number(1.0), self, abs(int(exponent))
+        while left:
+            if left % 2:
+                result = result * square
+            left //= 2
+            if left:
+                square = square * square
+        return 1.0 / result if exponent < 0.0 else result
+
+    def __rpow__(self, base: Any) -> "Symbol":
+        """Refuse a power whose exponent is a symbol."""
+        raise refusal("a power that is not a number")
+
+    def _of(self, kind: str, function: Callable[[float], float]) -> "Symbol":
+        if not self._terms:
+            return Symbol(self._recorder, function(self._constant), {})
+        slot, factor = self._slot()
+        if factor != 1.0:
+            slot = self._recorder.slot(Operation("linear", (), self.linear()))
+        return Symbol(self._recorder, 0.0, {self._recorder.slot(Operation(kind, (slot,))): 1.0})
+
+    # NumPy calls the methods with these names for np.sqrt(symbol) and so on.
+    def sqrt(self) -> "Symbol":
+        """Return the square root."""
+        if not self._terms and self._constant < 0.0:
+            raise InputError(f"torque: square root of the constant {self._constant:g}")
+        return self._of("sqrt", math.sqrt)
+
+    def exp(self) -> "Symbol":
+        """Return the exponential."""
+        return self._of("exp", lambda x: math.exp(min(x, 710.0)))
+
+    def sin(self) -> "Symbol":
+        """Return the sine."""
+        return self._of("sine", math.sin)
+
+    def cos(self) -> "Symbol":
+        """Return the cosine."""
+        return self._of("cosine", math.cos)
+
+    def tan(self) -> "Symbol":
+        """Return the tangent."""
+        return self.sin() / self.cos()
+
+    def sinh(self) -> "Symbol":
+        """Return the hyperbolic sine."""
+        return 0.5 * (self.exp() - (-self).exp())
+
+    def cosh(self) -> "Symbol":
+        """Return the hyperbolic cosine."""
+        return 0.5 * (self.exp() + (-self).exp())
+
+    def tanh(self) -> "Symbol":
+        """Return the hyperbolic tangent."""
+        return 1.0 - 2.0 / ((2.0 * self).exp() + 1.0)
+
+    def conjugate(self) -> "Symbol":
+        """Return the symbol itself, because it is real."""
+        return self
+
+    def __eq__(self, other: object) -> bool:
+        """Refuse a comparison."""
+        raise refusal("a comparison of the state")
+
+    def __lt__(self, other: object) -> bool:
+        """Refuse a comparison."""
+        raise refusal("a comparison of the state")
+
+    __le__ = __gt__ = __ge__ = __lt__
+
+    def __bool__(self) -> bool:
+        """Refuse the use as a condition."""
+        raise refusal("a branch that depends on the state")
+
+    def __abs__(self) -> "Symbol":
+        """Refuse the absolute value, which has no derivative at 0."""
+        raise refusal("an absolute value")
+
+    def __float__(self) -> float:
+        """Refuse the conversion to a number."""
+        raise refusal("a conversion of the state to a float, as in functions of math,")
+
+    __int__ = __index__ = __complex__ = __round__ = __float__
+
+    def __mod__(self, other: object) -> "Symbol":
+        """Refuse the remainder."""
+        raise refusal("a remainder")
+
+    __rmod__ = __floordiv__ = __rfloordiv__ = __mod__
+
+    def __getattr__(self, name: str) -> Any:
+        """Refuse functions that can't be recorded; NumPy looks them up by name."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        raise refusal(f"{name} of the state")
+
+
+# The functions with which a tape is evaluated in symbols of a recorder. A constant stays a float.
+SYMBOLS: Functions[Any] = Functions(
+    float, lambda x: np.sqrt(x), lambda x: np.exp(x), lambda x: np.sin(x), lambda x: np.cos(x)
+)
+
+
+def _without_unused(operations: Sequence[Operation], outputs: Sequence[Linear]) -> Tape:
+    used = {slot for output in outputs for slot, _ in output.terms}
+    for number in range(len(operations) - 1, -1, -1):
+        if N_INPUTS + number in used:
+            used.update(slots_of(operations[number]))
+    places = {slot: slot for slot in range(N_INPUTS)}
+    kept: list[Operation] = []
+    for number, (kind, operands, linear) in enumerate(operations):
+        if N_INPUTS + number in used:
+            places[N_INPUTS + number] = N_INPUTS + len(kept)
+            moved = None if linear is None else _moved(linear, places)
+            kept.append(Operation(kind, tuple(places[slot] for slot in operands), moved))
+    return Tape(tuple(kept), tuple(_moved(each, places) for each in outputs))
+
+
+def _moved(linear: Linear, places: dict[int, int]) -> Linear:
+    return Linear(linear.constant, tuple((places[slot], x) for slot, x in linear.terms))

@@ -1,0 +1,126 @@
+"""The tape: a function of time, omega and attitude, recorded as a list of arithmetic operations.
+
+A tape is recorded once, with symbols in place of numbers (`pyharness.model.symbols`). The same tape
+is then evaluated in every arithmetic: floats, decimal numbers, Taylor series, or symbols again.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from pyharness.model.functions import cosine, sine
+
+T = TypeVar("T")
+
+# The slots of the inputs. The result of operation number n of a tape is in slot N_INPUTS + n.
+TIME = 0
+OMEGA = (1, 2, 3)
+ATTITUDE = (4, 5, 6, 7)
+N_INPUTS = 8
+
+
+class Linear(NamedTuple):
+    """A linear combination of slots: a constant plus the sum of coefficient times slot.
+
+    `terms` are pairs of a slot and its coefficient, in ascending order of the slots.
+    """
+
+    constant: float
+    terms: tuple[tuple[int, float], ...]
+
+
+class Operation(NamedTuple):
+    """An operation of a tape.
+
+    `kind` is "product", "quotient", "sqrt", "exp", "sine" or "cosine", and `operands` are its one
+    or two slots; or it is "linear", and `linear` is a linear combination of slots.
+    """
+
+    kind: str
+    operands: tuple[int, ...]
+    linear: Linear | None = None
+
+
+@dataclass(frozen=True)
+class Tape:
+    """A recorded function: its operations in order of execution, and its results."""
+
+    operations: tuple[Operation, ...]
+    outputs: tuple[Linear, ...]
+
+    @property
+    def inputs(self) -> frozenset[int]:
+        """The slots of the inputs on which an operation or an output depends."""
+        used = {slot for each in self.operations for slot in slots_of(each)}
+        used |= {slot for output in self.outputs for slot, _ in output.terms}
+        return frozenset(slot for slot in used if slot < N_INPUTS)
+
+    @property
+    def needs_attitude(self) -> bool:
+        """Whether the function depends on the attitude."""
+        return not self.inputs.isdisjoint(ATTITUDE)
+
+
+def slots_of(operation: Operation) -> tuple[int, ...]:
+    """Return the slots that an operation reads."""
+    if operation.linear is None:
+        return operation.operands
+    return tuple(slot for slot, _ in operation.linear.terms)
+
+
+@dataclass(frozen=True)
+class Functions(Generic[T]):
+    """The functions of an arithmetic that a tape needs beside the operators + - * and /."""
+
+    number: Callable[[float], T]  # converts a constant of the tape
+    sqrt: Callable[[T], T]
+    exp: Callable[[T], T]
+    sine: Callable[[T], T]
+    cosine: Callable[[T], T]
+
+
+def evaluate(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T]:
+    """Return the outputs of a tape in the arithmetic of `functions`.
+
+    `inputs` are the values of the eight input slots: the time, three components of omega, and four
+    of the attitude.
+    """
+    values: list[Any] = list(inputs)
+
+    def combined(linear: Linear) -> Any:
+        total: Any = None
+        for slot, coefficient in linear.terms:
+            term = values[slot]
+            if coefficient != 1.0:
+                term = functions.number(coefficient) * term
+            total = term if total is None else total + term
+        if total is None:
+            return functions.number(linear.constant)
+        return total + functions.number(linear.constant) if linear.constant else total
+
+    for kind, operands, linear in tape.operations:
+        if linear is not None:
+            values.append(combined(linear))
+        elif kind == "product":
+            values.append(values[operands[0]] * values[operands[1]])
+        elif kind == "quotient":
+            values.append(values[operands[0]] / values[operands[1]])
+        else:
+            values.append(getattr(functions, kind)(values[operands[0]]))
+    return [combined(each) for each in tape.outputs]
+
+
+def _sqrt(x: float) -> float:
+    return math.sqrt(x) if x >= 0.0 else math.nan
+
+
+def _exp(x: float) -> float:
+    try:
+        return math.exp(x)
+    except OverflowError:
+        return math.inf
+
+
+# For arguments of type float. A division by zero raises ZeroDivisionError.
+FLOATS: Functions[float] = Functions(float, _sqrt, _exp, sine, cosine)

@@ -1,0 +1,134 @@
+"""The torque law: a torque that depends on time alone, as constant, linear and sinusoidal terms."""
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.functions import cosine, sine
+from pyharness.model.values import Number, Numbers, Triple, finite, number_list, three
+
+Wave = tuple[Triple, float]  # amplitude per axis, frequency in rad/s
+# The waves of a torque law as a user gives them: pairs of three amplitudes and a frequency.
+Waves = Iterable[tuple[Numbers, Number]]
+FRAMES = ("body", "space")
+
+
+@dataclass(frozen=True)
+class TorqueLaw:
+    """A torque law: constant, linear and sinusoidal terms about the axes of the body or of space.
+
+    N(t) = constant + rate t + sum of amplitude sin(frequency t) + sum of amplitude cos(frequency t)
+
+    The unit of N is N m for a body with moments or inertia. It is 1/s2 (torque over moment) for a
+    body with coefficients. Three numbers may be a list, a tuple or an array; the fields of the law
+    are plain tuples of floats.
+
+    Parameters
+    ----------
+    constant : three numbers
+        The constant term, in the unit of N.
+    rate : three numbers
+        The factor of time in the linear term, in the unit of N per second.
+    sines, cosines : iterable of waves
+        The sinusoidal terms. A wave is a pair: an amplitude, three numbers in the unit of N, and a
+        frequency (rad/s).
+    frame : {"body", "space"}
+        The axes of the components. A torque about the axes of space does not rotate with the body.
+
+    Raises
+    ------
+    InputError
+        For a vector that is not three finite numbers, an invalid wave, or an unknown frame.
+
+    Examples
+    --------
+    >>> from pyharness import TorqueLaw
+    >>> law = TorqueLaw((1.0, 0.0, 0.0), cosines=[((0.0, 2.0, 0.0), 0.5)])
+    >>> law.at(0.0)
+    (1.0, 2.0, 0.0)
+    """
+
+    constant: Triple = (0.0, 0.0, 0.0)
+    rate: Triple = (0.0, 0.0, 0.0)
+    sines: tuple[Wave, ...] = ()
+    cosines: tuple[Wave, ...] = ()
+    frame: str = "body"
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            constant: Numbers = ...,
+            rate: Numbers = ...,
+            sines: Waves = ...,
+            cosines: Waves = ...,
+            frame: str = "body",
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        """Check the fields of the torque law, and convert its numbers to floats.
+
+        Raise InputError for an invalid value.
+        """
+        for name in ("constant", "rate"):
+            object.__setattr__(self, name, three(f"[torque] {name}", getattr(self, name)))
+        for name in ("sines", "cosines"):
+            object.__setattr__(self, name, _waves(f"[torque] {name}", getattr(self, name)))
+        if not isinstance(self.frame, str) or self.frame not in FRAMES:
+            raise unknown("frame", self.frame, FRAMES, "[torque] frame")
+
+    @property
+    def needs_attitude(self) -> bool:
+        """Whether the torque about the body axes depends on the attitude."""
+        return self.in_space
+
+    @property
+    def varies(self) -> bool:
+        """Whether the torque N depends on time."""
+        waves = self.sines + self.cosines
+        return any(self.rate) or any(any(amplitude) for amplitude, _ in waves)
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether the torque N is zero at all times."""
+        return not (self.varies or any(self.constant))
+
+    @property
+    def in_space(self) -> bool:
+        """Whether the torque is not zero and its components are about the axes of space.
+
+        Under such a torque omega depends on the attitude.
+        """
+        return self.frame == "space" and not self.is_zero
+
+    def at(self, time: float) -> Triple:
+        """Return the three components of the torque N at `time` (s).
+
+        The terms are added in the order constant, linear, sines and cosines, so that rounding is
+        always the same.
+        """
+        torque = list(self.constant)
+        if self.varies:
+            for axis in range(3):
+                torque[axis] += self.rate[axis] * time
+                for amplitude, frequency in self.sines:
+                    torque[axis] += amplitude[axis] * sine(frequency * time)
+                for amplitude, frequency in self.cosines:
+                    torque[axis] += amplitude[axis] * cosine(frequency * time)
+        return torque[0], torque[1], torque[2]
+
+
+def _waves(where: str, values: object) -> tuple[Wave, ...]:
+    allowed = "allowed: a list of waves, each an amplitude of three numbers and a frequency"
+    waves = []
+    for value in number_list(where, values, allowed):
+        wave = list(itertools.islice(number_list(where, value, allowed), 3))
+        if len(wave) != 2:
+            raise InputError(f"{where}: a wave has an amplitude and a frequency; {allowed}")
+        amplitude, frequency = wave
+        waves.append(
+            (three(f"{where} amplitude", amplitude), finite(f"{where} frequency", frequency))
+        )
+    return tuple(waves)

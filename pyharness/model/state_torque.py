@@ -117,11 +117,11 @@ def recorded(function: Function) -> StateTorque:
             if missing:
                 raise refusal(f"{missing[1]} of the state") from None
             raise InputError(
-                f"torque: the function raised {type(error).__name__}: {printable(str(error))}; "
+                f"[torque]: the function raised {type(error).__name__}: {printable(str(error))}; "
                 "allowed: a function that returns three components in N m"
             ) from error
         if len(components) != 3:
-            raise InputError(f"torque: {len(components)} components; allowed: three")
+            raise InputError(f"[torque]: {len(components)} components; allowed: three")
         return components
 
     return replayed(called)
@@ -209,11 +209,11 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
 
 def _takes_attitude(function: object) -> bool:
     if not callable(function):
-        raise InputError(f"torque is {kind_of(function)}; {_ARGUMENTS}")
+        raise InputError(f"[torque] is {kind_of(function)}; {_ARGUMENTS}")
     try:
         parameters = signature(function).parameters.values()
     except (TypeError, ValueError):
-        raise InputError(f"torque: the function's arguments are unknown; {_ARGUMENTS}") from None
+        raise InputError(f"[torque]: the function's arguments are unknown; {_ARGUMENTS}") from None
     places = [each for each in parameters if each.kind in _POSITIONAL]
     required = [each for each in places if each.default is Parameter.empty]
     keywords = [
@@ -223,7 +223,7 @@ def _takes_attitude(function: object) -> bool:
     ]
     many = any(each.kind is Parameter.VAR_POSITIONAL for each in parameters)
     if keywords or len(required) > 3 or not (many or len(places) >= 2):
-        raise InputError(f"torque: the function has {len(places)} arguments; {_ARGUMENTS}")
+        raise InputError(f"[torque]: the function has {len(places)} arguments; {_ARGUMENTS}")
     return len(required) == 3 or (len(required) < 2 and many)
 
 
@@ -239,7 +239,7 @@ def _called(
 ) -> Triple:
     assert function is not None
     given = [time, np.array(omega)] + ([np.array(attitude)] if needs_attitude else [])
-    return three_floats("torque", function(*given))
+    return three_floats("[torque]", function(*given))
 
 
 def _old(attitude: Any, axes: Array) -> list[Any]:

@@ -27,7 +27,7 @@ _ALLOWED = (
 
 def refusal(what: str) -> InputError:
     """Return the exception for an operation that can't be recorded; `what` names it."""
-    return InputError(f"torque: {what} can't be recorded; {_ALLOWED}")
+    return InputError(f"[torque]: {what} can't be recorded; {_ALLOWED}")
 
 
 class Recorder:
@@ -50,7 +50,7 @@ class Recorder:
         if operation not in self._slots:
             if len(self._operations) == MOST_OPERATIONS:
                 raise InputError(
-                    f"torque: more than {MOST_OPERATIONS} operations; use fewer, or a table"
+                    f"[torque]: more than {MOST_OPERATIONS} operations; use fewer, or a table"
                 )
             self._slots[operation] = N_INPUTS + len(self._operations)
             self._operations.append(operation)
@@ -71,9 +71,9 @@ class Recorder:
             return value.linear()
         number = converted(value)
         if not isinstance(number, float):
-            raise InputError(f"torque: component {axis} is {number}; allowed: a number")
+            raise InputError(f"[torque]: component {axis} is {number}; allowed: a number")
         if not math.isfinite(number):
-            raise InputError(f"torque: component {axis} is {number:g}; allowed: a finite number")
+            raise InputError(f"[torque]: component {axis} is {number:g}; allowed: a finite number")
         return Linear(number, ())
 
 
@@ -85,9 +85,11 @@ class Symbol:
 
     def __init__(self, recorder: Recorder, constant: float, terms: dict[int, float]) -> None:
         if not (math.isfinite(constant) and all(map(math.isfinite, terms.values()))):
-            raise InputError("torque: a constant overflows or is not a number; use finite numbers")
+            raise InputError(
+                "[torque]: a constant overflows or is not a number; use finite numbers"
+            )
         if len(terms) > MOST_OPERATIONS:
-            raise InputError(f"torque: a sum of more than {MOST_OPERATIONS} terms; use fewer")
+            raise InputError(f"[torque]: a sum of more than {MOST_OPERATIONS} terms; use fewer")
         self._recorder, self._constant, self._terms = recorder, constant, terms
 
     def linear(self) -> Linear:
@@ -172,7 +174,7 @@ class Symbol:
             return NotImplemented
         if not other._terms:
             if other._constant == 0.0:
-                raise InputError("torque: division by the constant 0")
+                raise InputError("[torque]: division by the constant 0")
             quotient = {slot: each / other._constant for slot, each in self._terms.items()}
             return Symbol(self._recorder, self._constant / other._constant, quotient)
         if not (self._terms or self._constant):
@@ -227,7 +229,7 @@ class Symbol:
     def sqrt(self) -> "Symbol":
         """Return the square root."""
         if not self._terms and self._constant < 0.0:
-            raise InputError(f"torque: square root of the constant {self._constant:g}")
+            raise InputError(f"[torque]: square root of the constant {self._constant:g}")
         return self._of("sqrt", math.sqrt)
 
     def exp(self) -> "Symbol":

@@ -17,10 +17,12 @@ typedef void runner(void *ensemble);
   free_solver solve_many_free_##level;                                                         \
   series_solver solve_many_taylor_##level;                                                     \
   fixed_solver solve_many_fixed_##level;                                                       \
-  runner run_lanes_##level;
+  runner run_lanes_##level;                                                                    \
+  solver solve_tape_##level;
 #define TAKEN(level)                                                                           \
   {taylor_solve_##level,       quick_solve_##level,      solve_many_free_##level,              \
-   solve_many_taylor_##level,  solve_many_fixed_##level, run_lanes_##level}
+   solve_many_taylor_##level,  solve_many_fixed_##level, run_lanes_##level,                    \
+   solve_tape_##level}
 
 DECLARED(plain)
 #ifdef WITH_LEVELS
@@ -35,6 +37,7 @@ static struct {
   series_solver *series;
   fixed_solver *fixed;
   runner *lanes;
+  solver *tape;
 } chosen, known[] = {
   TAKEN(plain),
 #ifdef WITH_LEVELS
@@ -91,6 +94,11 @@ void many_taylor(const void *bodies, int n, double *omega, int8_t *status, int *
 void many_fixed(const void *bodies, int method, int n, double *omega, int8_t *status, int *interrupted)
 {
   chosen.fixed(bodies, method, n, omega, status, interrupted);
+}
+
+void tape_solve(const void *tape, const void *request, void *solution)
+{
+  chosen.tape(tape, request, solution);
 }
 
 void run_lanes(void *ensemble) { chosen.lanes(ensemble); }

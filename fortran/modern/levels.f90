@@ -7,7 +7,7 @@ module levels
   private
 
   public :: choose_level, many_fixed, many_free, many_taylor, quick_solve, run_lanes, &
-            taylor_solve
+            tape_solve, taylor_solve
 
   interface
     integer(c_int) function choose_level(highest) bind(c, name="choose_level")
@@ -23,6 +23,13 @@ module levels
       type(*), intent(in) :: problem, request
       type(*), intent(inout) :: solution
     end subroutine taylor_solve
+
+    subroutine tape_solve(tape, request, solution) bind(c, name="tape_solve")
+      !! Call solve_tape of tape_solve.f90 at the chosen level.
+      implicit none(type, external)
+      type(*), intent(in) :: tape, request
+      type(*), intent(inout) :: solution
+    end subroutine tape_solve
 
     subroutine quick_solve(problem, request, contest, solution) bind(c, name="quick_solve")
       !! Call quick_solve of scaled_runge_kutta.f90 at the chosen level.

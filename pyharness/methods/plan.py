@@ -8,6 +8,8 @@ from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import REGISTRY, check_torque, requested_tolerance
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.torque_law import TorqueLaw
 
 FINEST = REGISTRY["auto"].finest
 # For large tolerances Runge-Kutta may take fewer operations than a Taylor series. The kernel
@@ -83,13 +85,15 @@ def plan(
     if not finest <= tolerance <= 1.0:
         place = " for quick" if method == "quick" else ""
         raise InputError(f"tolerance is {tolerance:g}; allowed{place}: {finest:g} to 1")
-    form = closed_form(checked_scene(scene, any_torque=True))
+    form = closed_form(checked_scene(scene, any_torque=True, any_state=True))
     # The plan includes the attitude if the torque needs it.
     check_torque(scene, method, attitude=True)
     fallback = None
     if method == "auto":
-        few_digits = not scene.torque.in_space and tolerance >= (
-            _WAVES_DIGITS if scene.torque.varies else FEW_DIGITS
+        few_digits = (
+            isinstance(scene.torque, TorqueLaw)
+            and not scene.torque.in_space
+            and tolerance >= (_WAVES_DIGITS if scene.torque.varies else FEW_DIGITS)
         )
         # Runge-Kutta has no intermediate output.
         method = "closed-form" if form else RK4_OR_TAYLOR if few_digits and not rows else "taylor"
@@ -103,7 +107,7 @@ def plan(
 
 
 def _decisions(chosen: Plan) -> Iterator[Decision]:
-    scene, law = chosen.scene, chosen.scene.law
+    scene = chosen.scene
     closed = chosen.method == "closed-form"
     if closed:
         yield Decision("integration", False, f"closed form: {chosen.closed_form}")
@@ -123,15 +127,12 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
         else:
             # The kernels sum three products side by side in one register.
             yield Decision(name, True, f"{product}: zero; costs no time beside the others")
-    yield Decision("torque", not law.is_zero, "zero" if law.is_zero else "acts")
-    for name, waves in (("sines", law.sines), ("cosines", law.cosines)):
-        acts = any(any(amplitude) for amplitude, _ in waves)
-        yield Decision(name, acts, f"{len(waves)} in the law" if acts else "none act")
-    varies = "the law varies" if law.varies else "constant: read once"
-    yield Decision("torque of time", law.varies, varies)
+    yield from _of_torque(scene.torque)
     for part, wanted in (("velocity", chosen.velocity), ("attitude", scene.attitude is not None)):
-        if part == "attitude" and law.in_space:
-            yield Decision(part, True, "the torque is fixed in space")
+        if part == "attitude" and scene.torque.needs_attitude:
+            fixed = scene.torque.in_space
+            why = "the torque is fixed in space" if fixed else "the torque depends on it"
+            yield Decision(part, True, why)
         else:
             yield Decision(part, wanted, "requested" if wanted else "not requested")
     wanted, why = chosen.rows, "intermediate output requested" if chosen.rows else "only the end"
@@ -143,7 +144,22 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
     yield Decision("SciPy", False, "our own kernels solve it")
 
 
+def _of_torque(torque: TorqueLaw | StateTorque) -> Iterator[Decision]:
+    if isinstance(torque, StateTorque):
+        count = "opaque" if torque.tape is None else f"{len(torque.tape.operations)} operations"
+        yield Decision("torque", True, f"depends on the state: {count}")
+        return
+    yield Decision("torque", not torque.is_zero, "zero" if torque.is_zero else "acts")
+    for name, waves in (("sines", torque.sines), ("cosines", torque.cosines)):
+        acts = any(any(amplitude) for amplitude, _ in waves)
+        yield Decision(name, acts, f"{len(waves)} in the law" if acts else "none act")
+    varies = "the law varies" if torque.varies else "constant: read once"
+    yield Decision("torque of time", torque.varies, varies)
+
+
 def _why_no_form(scene: Scene) -> str:
+    if isinstance(scene.torque, StateTorque):
+        return "its torque depends on the state"
     if scene.torque.is_zero:
         return "its coefficients let it grow without bound"
     if scene.torque.in_space:

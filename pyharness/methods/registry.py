@@ -10,6 +10,7 @@ from pyharness.methods.scipy_ivp import FINEST, scipy_method
 from pyharness.model.effort import Integrator
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, tolerance_of
 
@@ -47,6 +48,7 @@ class Method:
     any_scale: bool = False  # rescales the scene itself, or forms no products in binary64
     attitude: bool = False  # propagates the attitude together with omega
     space_torque: bool = False  # takes a torque about the axes of space, together with attitude
+    state_torque: bool = False  # takes a torque that depends on omega or attitude
     scipy: str = ""  # SciPy's name of the method; empty for our own methods
 
     @property
@@ -98,6 +100,7 @@ def _scipy(scipy: str, title: str, source: str) -> Method:
         _SCIPY_DEFAULT,
         scipy_method(scipy),
         attitude=True,
+        state_torque=True,
         scipy=scipy,
     )
 
@@ -132,6 +135,7 @@ REGISTRY = {
             _from("solve", "by_plan"),
             attitude=True,
             space_torque=True,
+            state_torque=True,
         ),
         _scipy("DOP853", "Runge-Kutta 8(5,3)", "Hairer, Norsett and Wanner 1993, II.5"),
         _scipy("RK45", "Runge-Kutta 5(4)", "Dormand and Prince 1980"),
@@ -146,6 +150,7 @@ REGISTRY = {
             _from("taylor", "taylor"),
             attitude=True,
             space_torque=True,
+            state_torque=True,
         ),
         Method(
             "reference",
@@ -156,6 +161,7 @@ REGISTRY = {
             _reference,
             any_scale=True,
             attitude=True,
+            state_torque=True,
         ),
         Method(
             "closed-form",
@@ -209,23 +215,26 @@ def check_attitude(method: str) -> None:
 
 
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
-    """Raise InputError if a torque about the axes of space acts and the method can't solve it.
+    """Raise InputError if the method with this name can't solve a scene because of its torque.
 
-    `method` is a name in the registry of methods. The error is also raised for such a torque if
-    `attitude` is false, which means that the attitude is not computed. Its components about the
-    body axes are then unknown, because they depend on the attitude. A scene without such a torque
-    raises no error.
+    Not every method takes a torque about the axes of space, or one that depends on omega or
+    attitude. The error is also raised if the torque depends on the attitude and `attitude` is
+    false, which means that the attitude is not computed.
     """
-    if not scene.torque.in_space:
-        return
-    if not REGISTRY[method].space_torque:
-        able = ", ".join(each.name for each in REGISTRY.values() if each.space_torque)
+    torque, chosen = scene.torque, REGISTRY[method]
+    kind = "a torque about the axes of space" if torque.in_space else "a torque that depends on "
+    able: list[str] = []
+    if isinstance(torque, StateTorque):
+        kind += "the attitude" if torque.needs_attitude else "omega"
+        if torque.tape is None and not chosen.scipy:
+            kind, able = "an opaque torque", list(SCIPY_METHODS)
+        elif not chosen.state_torque:
+            able = [each.name for each in REGISTRY.values() if each.state_torque]
+    elif torque.in_space and not chosen.space_torque:
+        able = [each.name for each in REGISTRY.values() if each.space_torque]
+    if able:
         raise InputError(
-            f"method {method} can't solve a scene with a torque about the axes of space; "
-            f"allowed: {able}"
+            f"method {method} can't solve a scene with {kind}; allowed: {', '.join(able)}"
         )
-    if not attitude:
-        raise InputError(
-            "a torque about the axes of space needs the attitude; give attitude=True, or "
-            "--attitude FORM"
-        )
+    if torque.needs_attitude and not attitude:
+        raise InputError(f"{kind} needs the attitude; give attitude=True, or --attitude FORM")

@@ -27,6 +27,7 @@ from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, unknown
 from pyharness.model.principal import in_scene_axes, principal
 from pyharness.model.scene import Scene, checked_scene, most_steps
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, Numbers, number, number_list
 from pyharness.model.waves import with_merged_waves
@@ -66,8 +67,8 @@ def solve(
     attitude : bool
         Whether the attitude is computed too. At time 0 it is the attitude of the scene. If the
         scene has none, the body's axes are parallel to the axes of space at time 0. The tolerance
-        then also applies to the attitude's angle (rad). A torque about the axes of space requires
-        the attitude.
+        then also applies to the attitude's angle (rad). A torque that depends on the attitude, or
+        is about the axes of space, requires the attitude.
 
     Returns
     -------
@@ -81,7 +82,7 @@ def solve(
     ------
     InputError
         If the method is unknown, or can't take the scene or propagate its attitude; if a torque
-        about the axes of space comes without attitude; if the times are not in order; if the method
+        that needs the attitude comes without it; if the times are not in order; if the method
         can't meet the tolerance, or needs more work for it than `effort` allows.
     NotBuiltError
         If the method needs the extension, and it is not built.
@@ -93,7 +94,7 @@ def solve(
     array([[3.5, 3.5, 3.5],
            [6. , 6. , 6. ]])
     """
-    checked_scene(scene, any_axes=True, any_torque=True)
+    checked_scene(scene, any_axes=True, any_torque=True, any_state=True)
     if not isinstance(method, str) or method not in METHODS:
         raise unknown("method", method, METHODS)
     chosen = METHODS[method]
@@ -116,7 +117,8 @@ def solve(
         scene = replace(scene, attitude=start)
     is_full = scene.inertia is not None
     scene, axes = principal(scene)
-    if method != "reference":  # the reference rounds no amplitude
+    # The reference rounds no amplitude.
+    if method != "reference" and isinstance(scene.torque, TorqueLaw):
         scene = with_merged_waves(scene)
     effort = checked_effort(effort)
     values, turned = _ascending(times)

@@ -5,11 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from pyharness.methods.problem import known, series_kernel, trajectory_of
+from pyharness.methods.recorded import recorded_series
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import advice
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Trajectory
 
 
@@ -26,8 +28,11 @@ def taylor(
     number of steps of all integrations, because each step computes one Taylor series. Under a
     torque about the axes of space there are at least two integrations, the later ones with a
     smaller local tolerance. The difference of the integrations is the estimate of the error, and
-    the error amplification (`growth`) is unknown.
+    the error amplification (`growth`) is unknown. A torque that depends on the state has a kernel
+    of its own, for which see `recorded_series`.
     """
+    if isinstance(scene.torque, StateTorque):
+        return recorded_series(scene, times, tolerance, effort)
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     # The first column is the attitude at time 0. A column for each time follows.
     n_attitudes = 0 if scene.attitude is None else len(times)

@@ -85,3 +85,18 @@ class Blocks:
     """
 
     LANE_COUNT = 32  # several vector registers, so that some compute while others wait
+
+
+class Operations:
+    """The operations of a tape, which records a torque that depends on the state.
+
+    The kernel evaluates the Taylor series of each operation in a slot of its own, except for those
+    that need further slots.
+    """
+
+    LINEAR = 1  # a constant plus a sum of coefficients times slots
+    PRODUCT = 2
+    QUOTIENT = 3
+    SQRT = 4
+    EXP = 5  # slots: the exponential, and the weighted terms of its argument
+    SINE_COSINE = 6  # slots: the sine, the cosine, and the weighted terms of their argument

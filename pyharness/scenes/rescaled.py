@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 
 # Omegas from the inverse of this value to this value (rad/s) are so far from the limits of
@@ -63,10 +64,10 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
     The function `scaled` uses this factor to rescale the time of the scene. Omega is the larger of
     the initial omega and the omega that the torque may cause until `time` (s), the end of the
-    integration. The result is 1 if the scene needs no rescaling, or if the rescaled scene would
-    overflow or underflow.
+    integration. The result is 1 if the scene needs no rescaling, if the rescaled scene would
+    overflow or underflow, or if the torque depends on the state.
     """
-    if is_ordinary(scene):
+    if is_ordinary(scene) or not isinstance(scene.torque, TorqueLaw):
         return 1.0
     # The omega that the torque may add counts like the initial omega.
     largest = max(max(map(abs, scene.omega)), omega_by_torque(scene, time))

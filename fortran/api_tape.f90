@@ -1,0 +1,46 @@
+! The interface that f2py reads for scenes whose equations of motion are a tape.
+
+subroutine tape_rows(n_unknowns, n_slots, n_operations, operations, n_combinations, starts, n_terms, &
+                     slots, coefficients, constants, omega0, n_times, times, tolerance, &
+                     n_attitudes, attitudes, effort, rows, n_rows, status, steps)
+  ! Integrate a tape by Taylor series: omega and, if n_attitudes > 0, the attitude at `times`, which
+  ! have one sign and are ordered away from 0.
+  !f2py threadsafe
+  use levels, only: tape_solve
+  use problem, only: request_t, solution_t
+  use tape, only: tape_t
+  implicit none
+  integer(4), intent(in) :: n_unknowns          ! 3, or 7 with attitude
+  integer(4), intent(in) :: n_slots
+  integer(4), intent(in) :: n_operations
+  integer(4), intent(in), target :: operations(4, n_operations) ! kind, two operands, result
+  integer(4), intent(in) :: n_combinations
+  integer(4), intent(in), target :: starts(n_combinations + 1)  ! of the terms, from 1
+  integer(4), intent(in) :: n_terms
+  integer(4), intent(in), target :: slots(n_terms)
+  real(8), intent(in), target :: coefficients(n_terms)
+  real(8), intent(in), target :: constants(n_combinations)
+  real(8), intent(in) :: omega0(3)              ! rad/s
+  integer(4), intent(in) :: n_times
+  real(8), intent(in), target :: times(n_times) ! s
+  real(8), intent(in) :: tolerance              ! allowed error: relative, and of the angle in rad
+  integer(4), intent(in) :: n_attitudes         ! n_times, or 0 without attitude
+  real(8), intent(inout), target :: attitudes(4, n_attitudes + 1) ! column 1: the attitude at time 0
+  real(8), intent(inout) :: effort(5) ! (1) factor on the work limit; out: (2) factor required,
+  ! (3) estimated error, (4) error amplification, (5) steps of all integrations
+  real(8), intent(out), target :: rows(3, n_times)      ! rad/s; n_rows columns are set
+  integer(4), intent(out) :: n_rows
+  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 work limit, 6 sensitive
+  integer(8), intent(out) :: steps
+  type(solution_t) :: solution
+
+  solution%rows => rows
+  if (n_attitudes > 0) solution%attitudes(1:4, 0:n_attitudes) => attitudes
+  call tape_solve(tape_t(n_unknowns, n_slots, n_operations, operations, starts, slots, &
+                         coefficients, constants), &
+                  request_t(omega0, tolerance, effort(1), times), solution)
+  n_rows = solution%n_rows
+  status = solution%status
+  steps = solution%steps
+  effort(2:) = [solution%needed, solution%error, solution%growth, solution%spent]
+end subroutine tape_rows

@@ -1,0 +1,157 @@
+module tape_growth
+  !! The error amplification of an integration of a tape: the largest norm of the state-transition
+  !! matrices from earlier times to the requested ones, which are formed in blocks of steps.
+  use kinds, only: dp
+  implicit none(type, external)
+  private
+
+  integer, parameter :: MOST_UNKNOWNS = 7
+  integer, parameter :: STEPS_IN_BLOCK = 4
+  integer, parameter :: MOST_BLOCKS = 64 ! even
+  ! A larger norm would have no further meaning; the square of a product of two such is in range.
+  real(dp), parameter :: LARGEST = 1e75_dp
+
+  ! Matrices of blocks of steps; element (i, j) is the derivative of unknown i at a block's end by
+  ! unknown j at its beginning. Blocks are merged in pairs when the array is full.
+  type, public :: transitions_t
+    real(dp) :: matrices(MOST_UNKNOWNS, MOST_UNKNOWNS, MOST_BLOCKS)
+    logical :: has_row(MOST_BLOCKS) !! whether it has a row of the output before the last
+    integer :: n                    !! number of unknowns
+    integer :: steps                !! steps in the open block
+    integer :: closed
+    integer :: steps_a_block
+  end type transitions_t
+
+  public :: begin, count_step, growth_of, MOST_UNKNOWNS
+
+contains
+
+  pure subroutine begin(n, transitions)
+    !! Start with no block.
+    integer, intent(in) :: n
+    type(transitions_t), intent(inout) :: transitions
+
+    transitions%n = n
+    transitions%steps = 0
+    transitions%closed = 0
+    transitions%steps_a_block = STEPS_IN_BLOCK
+    transitions%has_row(1) = .false.
+  end subroutine begin
+
+  pure subroutine count_step(with_row, matrix, transitions, is_full)
+    !! Count one more step. When its block is full, store the matrix of the block.
+    logical, intent(in) :: with_row        !! whether the step has a row before the last
+    real(dp), intent(in) :: matrix(:, :)   !! of the open block
+    type(transitions_t), intent(inout) :: transitions
+    logical, intent(out) :: is_full        !! the caller then starts a new matrix
+    integer :: m, n
+
+    associate (t => transitions)
+      n = t%n
+      t%steps = t%steps + 1
+      t%has_row(t%closed + 1) = t%has_row(t%closed + 1) .or. with_row
+      is_full = t%steps >= t%steps_a_block
+      if (.not. is_full) return
+      t%steps = 0
+      t%closed = t%closed + 1
+      t%matrices(:n, :n, t%closed) = bounded(matrix(:n, :n))
+      if (t%closed == MOST_BLOCKS) then
+        do m = 1, MOST_BLOCKS/2
+          t%matrices(:n, :n, m) = bounded(composed(n, t%matrices(:, :, 2*m), &
+                                                   t%matrices(:, :, 2*m - 1)))
+          t%has_row(m) = t%has_row(2*m - 1) .or. t%has_row(2*m)
+        end do
+        t%closed = MOST_BLOCKS/2
+        t%steps_a_block = 2*t%steps_a_block
+      end if
+      t%has_row(t%closed + 1) = .false.
+    end associate
+  end subroutine count_step
+
+  pure real(dp) function growth_of(matrix, sizes, transitions)
+    !! Return the largest norm from the beginning of any block to any requested time.
+    real(dp), intent(in) :: matrix(:, :) !! of the open block
+    real(dp), intent(in) :: sizes(:)     !! of the unknowns, to which perturbations are relative
+    type(transitions_t), intent(in) :: transitions
+    real(dp) :: unit(MOST_UNKNOWNS, MOST_UNKNOWNS), open_block(MOST_UNKNOWNS, MOST_UNKNOWNS)
+    integer :: i, m
+
+    unit = 0.0_dp
+    do i = 1, MOST_UNKNOWNS
+      unit(i, i) = 1.0_dp
+    end do
+    open_block = unit
+    associate (n => transitions%n)
+      open_block(:n, :n) = bounded(matrix(:n, :n))
+    end associate
+    growth_of = growth_until(transitions%closed, open_block, sizes, transitions)
+    do m = 1, transitions%closed
+      if (transitions%has_row(m)) then
+        growth_of = max(growth_of, growth_until(m, unit, sizes, transitions))
+      end if
+    end do
+  end function growth_of
+
+  pure real(dp) function growth_until(last, behind, sizes, transitions)
+    !! Return the largest norm of the derivative by the unknowns at the beginning of any block up to
+    !! `last`.
+    integer, intent(in) :: last
+    real(dp), intent(in) :: behind(MOST_UNKNOWNS, MOST_UNKNOWNS) !! from the end of block `last`
+    real(dp), intent(in) :: sizes(:)
+    type(transitions_t), intent(in) :: transitions
+    real(dp) :: matrix(MOST_UNKNOWNS, MOST_UNKNOWNS)
+    integer :: m, n
+
+    n = transitions%n
+    matrix = behind
+    growth_until = norm(n, matrix, sizes)
+    do m = last, 1, -1
+      if (growth_until >= LARGEST) exit
+      matrix(:n, :n) = composed(n, matrix, transitions%matrices(:, :, m))
+      growth_until = max(growth_until, norm(n, matrix, sizes))
+    end do
+  end function growth_until
+
+  pure real(dp) function norm(n, a, sizes)
+    !! Return nearly the largest singular value of a matrix of relative perturbations; 1 for a
+    !! rotation, and for damped motions.
+    integer, intent(in) :: n
+    real(dp), intent(in) :: a(MOST_UNKNOWNS, MOST_UNKNOWNS)
+    real(dp), intent(in) :: sizes(:)
+    integer :: i, j
+
+    norm = real(1 - n, dp)
+    do j = 1, n
+      do i = 1, n
+        norm = norm + (a(i, j)*(sizes(j)/sizes(i)))**2
+      end do
+    end do
+    norm = min(LARGEST, sqrt(max(1.0_dp, norm)))
+  end function norm
+
+  elemental real(dp) function bounded(x)
+    !! Limit an element of a derivative to LARGEST, which also replaces NaN.
+    real(dp), intent(in) :: x
+
+    bounded = LARGEST
+    if (abs(x) <= LARGEST) bounded = x
+  end function bounded
+
+  pure function composed(n, a, b) result(c)
+    !! Compute the product of two matrices: the motion of b, then that of a.
+    integer, intent(in) :: n
+    real(dp), intent(in) :: a(MOST_UNKNOWNS, MOST_UNKNOWNS), b(MOST_UNKNOWNS, MOST_UNKNOWNS)
+    real(dp) :: c(n, n)
+    integer :: i, j, k
+
+    c = 0.0_dp
+    do j = 1, n
+      do k = 1, n
+        do i = 1, n
+          c(i, j) = c(i, j) + a(i, k)*b(k, j)
+        end do
+      end do
+    end do
+  end function composed
+
+end module tape_growth

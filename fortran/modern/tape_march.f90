@@ -1,0 +1,502 @@
+module tape_march
+  !! One integration of a tape by Taylor series, from 0 to the last time. The order is fixed, the
+  !! step is adapted, and the truncation error of the steps is propagated and subtracted.
+  use, intrinsic :: iso_fortran_env, only: int64
+  use interruption, only: interrupt_raised
+  use kinds, only: dp
+  use problem, only: request_t, solution_t
+  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
+  use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
+  use tape_growth, only: begin, count_step, growth_of, MOST_UNKNOWNS, transitions_t
+  use tape_series, only: expand, LAST_TERM, MOST_ORDER, noise_of, propagate
+  use two_words, only: two_sum
+  implicit none(type, external)
+  private
+
+  integer, parameter :: LEAST_ORDER = 8
+  integer, parameter :: MOST_TRIES = 80
+  integer, parameter :: CHECKED = 3  ! last terms checked: from rest a ramp makes only every third
+  integer, parameter :: FITTED = 4   ! last terms from which the truncation error is estimated
+  integer, parameter :: FEW = 3      ! terms whose decay bounds the truncation error
+  real(dp), parameter :: LONGER = 16.0_dp  ! largest factor on the step that was tried
+  real(dp), parameter :: SHORTER = 0.5_dp  ! least factor on the first step that was tried
+  real(dp), parameter :: LEAST_LOCAL_TOLERANCE = 1e-18_dp ! below rounding
+  real(dp), parameter :: VARIATION_TOLERANCE = 1e-3_dp    ! of the perturbations, in each step
+  ! If the first step forecasts more than this multiple of the steps allowed, the integration ends.
+  real(dp), parameter :: HOPELESS = 10.0_dp
+  ! If the steps increase with a larger power of time, this is not by chance.
+  real(dp), parameter :: GROWING = 1.3_dp
+  real(dp), parameter :: RIDGE = 1.001_dp  ! makes the fit work for one pole or none
+  real(dp), parameter :: LINEAR_RANGE = 0.1_dp ! largest error for which the linearised equations hold
+  integer, parameter :: ROWS_BETWEEN_LOOKS = 2**17
+
+  ! Working storage of the integrations of a request.
+  type, public :: room_t
+    real(dp), allocatable :: a(:, :), b(:, :)     ! (0:LAST_TERM, slots): terms, ascending and descending
+    real(dp), allocatable :: v(:, :, :, :)        ! (4, 0:MOST_ORDER, slots, 2): of perturbations
+    real(dp), allocatable :: slot_noise(:)        ! (slots): rounding error of terms 0
+    type(transitions_t) :: transitions
+  end type room_t
+
+  ! One integration of a request.
+  type, public :: attempt_t
+    real(dp) :: tolerance      ! of this integration
+    real(dp) :: most_steps
+    integer(int64) :: stride   ! steps between polls for an interrupt
+  end type attempt_t
+
+  ! The outcome of an integration, beside its rows and status.
+  type, public :: outcome_t
+    integer(int64) :: steps = 0
+    real(dp) :: error = 0.0_dp  ! largest of a row before it was subtracted; relative, or rad
+    real(dp) :: least = 0.0_dp  ! lower bound, for estimates that are too small
+    real(dp) :: growth = 1.0_dp ! error amplification until any requested time
+    real(dp) :: noise = 0.0_dp  ! rounding error of all steps, in units, relative
+    real(dp) :: ahead = 0.0_dp  ! estimated steps to the end, if the work limit is exceeded
+    logical :: finest = .false. ! whether the local tolerance is the smallest
+  end type outcome_t
+
+  public :: allocate_room, march
+
+contains
+
+  subroutine allocate_room(tape, room, failed)
+    !! Allocate the working storage; `failed` is not 0 if there is not enough memory.
+    type(tape_t), intent(in) :: tape
+    type(room_t), intent(inout) :: room
+    integer, intent(out) :: failed
+
+    allocate (room%a(0:LAST_TERM, tape%n_slots), stat=failed)
+    if (failed == 0) allocate (room%b(0:LAST_TERM, tape%n_slots), stat=failed)
+    if (failed == 0) allocate (room%v(4, 0:MOST_ORDER, tape%n_slots, 2), stat=failed)
+    if (failed == 0) allocate (room%slot_noise(tape%n_slots), stat=failed)
+  end subroutine allocate_room
+
+  subroutine march(tape, request, attitude, attempt, room, solution, found)
+    !! Integrate once from 0 to the last of the times: rows, their number and the status.
+    type(tape_t), intent(in) :: tape
+    type(request_t), intent(in) :: request
+    real(dp), intent(in) :: attitude(4)       !! at time 0
+    type(attempt_t), intent(in) :: attempt
+    type(room_t), intent(inout) :: room
+    type(solution_t), intent(inout) :: solution
+    type(outcome_t), intent(out) :: found
+    real(dp) :: y(tape%n_unknowns), y_low(tape%n_unknowns) ! unknowns and their rounding errors
+    real(dp) :: left(tape%n_unknowns)         ! truncation error of the step
+    real(dp) :: weights(tape%n_unknowns)      ! which make the unknowns comparable
+    real(dp) :: noise(tape%n_unknowns)
+    real(dp) :: lanes(8, MOST_UNKNOWNS)       ! the error, and a perturbation of each unknown
+    real(dp) :: t(2)                          ! time and its rounding error, s
+    real(dp) :: t_end, rest, h, factor, local_tolerance, scale, power
+    real(dp) :: t_half                        ! the time after half_way steps, s
+    logical :: at_end, from_rest, is_full, has_guess, short
+    integer :: i, k, n, order, n_before, n_blocks, tries, last_terms(2)
+    integer(int64) :: next_look, half_way
+
+    n = tape%n_unknowns
+    n_blocks = merge(1, 2, n == 3)
+    t_end = request%times(size(request%times))
+    y(:3) = request%omega
+    y(4:) = attitude(:n - 3)
+    y_low = 0.0_dp
+    t = 0.0_dp
+    rest = t_end
+    solution%status = COMPLETE
+    solution%n_rows = 0
+    room%a = 0.0_dp
+    room%b = 0.0_dp
+    room%v = 0.0_dp
+    call begin(n, room%transitions)
+    call begin_lanes()
+    scale = maxval(abs(request%omega))
+    from_rest = .not. scale > 0.0_dp
+    local_tolerance = max(LEAST_LOCAL_TOLERANCE, 0.125_dp*attempt%tolerance)
+    order = order_for(local_tolerance)
+    h = t_end
+    next_look = 1
+    half_way = max(1_int64, int(0.5_dp*min(4e18_dp, attempt%most_steps), int64))
+    t_half = 0.0_dp
+    tries = 0
+    has_guess = .false.
+    do
+      call set_unknowns()
+      call expand(tape, t(2), h, order, room%a, room%b)
+      ! The scale of a body at rest is the omega that it is about to reach.
+      if (found%steps == 0 .and. from_rest) scale = largest_terms()
+      call weigh()
+      factor = fitting(tape, order, local_tolerance, weights, room%a)
+      if (.not. factor > 0.0_dp) then
+        ! The terms are not finite.
+        tries = tries + 1
+        if (tries > MOST_TRIES) then
+          solution%status = OVERFLOW
+          exit
+        end if
+        room%a = 0.0_dp
+        room%b = 0.0_dp
+        h = 0.0625_dp*h
+        cycle
+      end if
+      if (found%steps == 0 .and. tries < MOST_TRIES) then
+        ! The first step is a guess, and so is the omega that a body at rest is about to reach.
+        if (factor < SHORTER) then
+          tries = tries + 1
+          h = factor*h
+          cycle
+        end if
+        if (.not. has_guess) then
+          has_guess = .true.
+          local_tolerance = local_tolerance_of(attempt%tolerance, t_end/(factor*h))
+          order = order_for(local_tolerance)
+          found%finest = local_tolerance <= LEAST_LOCAL_TOLERANCE
+          cycle
+        end if
+      end if
+      tries = 0
+      factor = to_end(factor)
+      do k = 1, n_blocks
+        call set_lanes(k)
+        ! The first lane of all is the error, which may be zero.
+        call propagate(tape, h, order, room%a, room%b, factor, weights, VARIATION_TOLERANCE, &
+                       merge(2, 1, k == 1), room%v(:, :, :, k), last_terms(k), short)
+        ! Perturbations may change faster than the motion, as about a steady rotation.
+        if (short) factor = factor*fitting_lanes(k)
+      end do
+      at_end = abs(factor*h) >= abs(rest)*(1.0_dp - epsilon(h))
+      if (at_end) factor = rest/h
+      call estimate_truncation()
+      call noise_of(tape, room%a, noise, room%slot_noise)
+      do i = 1, n
+        found%noise = found%noise + (weights(i)*noise(i)*factor*h)**2
+      end do
+      n_before = solution%n_rows
+      call add_rows()
+      if (solution%status /= COMPLETE) exit
+      call take_step()
+      found%steps = found%steps + 1
+      if (.not. maxval(abs(y)) <= huge(h)) then
+        solution%status = OVERFLOW
+        exit
+      end if
+      scale = max(scale, maxval(abs(y(:3))))
+      if (at_end) then
+        call add_row(y, y_low, lanes(1, :n), solution%n_rows + 1)
+        exit
+      end if
+      call count_step(solution%n_rows > n_before, transposed(lanes), room%transitions, is_full)
+      if (is_full) call begin_block()
+      call two_sum((t(1)), factor*h + t(2), t(1), t(2))
+      rest = (t_end - t(1)) - t(2)
+      h = factor*h
+      if (abs(h) > abs(rest)) h = rest
+      if (found%steps >= next_look) then
+        next_look = max(found%steps + 1, int(min(4e18_dp, attempt%most_steps), int64))
+        next_look = min(found%steps + attempt%stride, next_look)
+        if (found%steps == half_way) t_half = t(1)
+        if (found%steps < half_way) next_look = min(next_look, half_way)
+        ! Extrapolate the steps so far in proportion to the time, or faster if the motion becomes
+        ! faster.
+        power = 1.0_dp
+        if (found%steps > half_way) then
+          power = log(real(found%steps, dp)/real(half_way, dp))/log(t(1)/t_half)
+        end if
+        power = merge(min(3.0_dp, power), 1.0_dp, power > GROWING)
+        found%ahead = real(found%steps, dp)*(1.0_dp + abs(rest/t(1)))**power
+        if (real(found%steps, dp) >= attempt%most_steps &
+            .or. (found%steps == 1 .and. found%ahead > HOPELESS*attempt%most_steps)) then
+          solution%status = GAVE_UP
+          exit
+        end if
+        if (interrupt_raised() /= 0) then
+          solution%status = INTERRUPTED
+          exit
+        end if
+      end if
+    end do
+    call weigh()
+    found%growth = growth_of(transposed(lanes), 1.0_dp/weights, room%transitions)
+    found%noise = sqrt(found%noise)
+    do i = 1, n
+      found%error = max(found%error, weights(i)*abs(lanes(1, i)))
+    end do
+
+  contains
+
+    subroutine begin_lanes()
+      !! Set the error to zero, and the perturbations to the unit vector of each unknown.
+      lanes(1, :) = 0.0_dp
+      call begin_block()
+    end subroutine begin_lanes
+
+    subroutine begin_block()
+      !! Set the perturbations to the unit vector of each unknown.
+      integer :: i
+
+      lanes(2:, :) = 0.0_dp
+      do i = 1, n
+        lanes(i + 1, i) = 1.0_dp
+      end do
+    end subroutine begin_block
+
+    subroutine set_unknowns()
+      !! Set the terms that the expansion begins with.
+      integer :: i
+
+      room%a(0, TIME_SLOT) = t(1)
+      room%a(1, TIME_SLOT) = h
+      room%b(MOST_ORDER, TIME_SLOT) = t(1)
+      room%b(MOST_ORDER - 1, TIME_SLOT) = h
+      do i = 1, n
+        room%a(0, FIRST_UNKNOWN - 1 + i) = y(i)
+        room%b(MOST_ORDER, FIRST_UNKNOWN - 1 + i) = y(i)
+      end do
+    end subroutine set_unknowns
+
+    subroutine set_lanes(k)
+      !! Set term 0 of four perturbations. Those of omega are relative to its scale, so that all
+      !! terms are comparable.
+      integer, intent(in) :: k
+      integer :: i
+
+      do i = 1, n
+        room%v(:, 0, FIRST_UNKNOWN - 1 + i, k) = lanes(4*k - 3:4*k, i)
+      end do
+    end subroutine set_lanes
+
+    real(dp) function fitting_lanes(k)
+      !! Return the factor on the step with which the last terms of the perturbations are small.
+      integer, intent(in) :: k
+      real(dp) :: first, last_term
+      integer :: i
+
+      first = 0.0_dp
+      last_term = 0.0_dp
+      do i = 1, n
+        associate (slot => FIRST_UNKNOWN - 1 + i)
+          first = max(first, weights(i)*maxval(abs(room%v(2:, 0, slot, k))))
+          last_term = max(last_term, weights(i)*maxval(abs(room%v(2:, order, slot, k))), &
+                          weights(i)*maxval(abs(room%v(2:, order - 1, slot, k)))/factor)
+        end associate
+      end do
+      last_term = last_term*factor**order
+      fitting_lanes = 0.25_dp
+      if (last_term <= huge(h) .and. last_term > 0.0_dp .and. first > 0.0_dp) then
+        fitting_lanes = min(1.0_dp, (VARIATION_TOLERANCE*first/last_term)**(1.0_dp/order))
+      end if
+    end function fitting_lanes
+
+    real(dp) function largest_terms()
+      !! Return the largest of the first terms of omega.
+      largest_terms = min(huge(h), maxval(abs(room%a(1:4, FIRST_UNKNOWN:FIRST_UNKNOWN + 2))))
+    end function largest_terms
+
+    subroutine weigh()
+      !! Make errors of omega relative to the scale, and those of the quaternion angles.
+      weights(:3) = 1.0_dp/max(scale, tiny(scale))
+      weights(4:) = 2.0_dp
+    end subroutine weigh
+
+    real(dp) function to_end(factor)
+      !! Return the factor with which the steps near the end are equal.
+      real(dp), intent(in) :: factor
+
+      to_end = factor
+      if (factor*abs(h) >= abs(rest)) then
+        to_end = rest/h
+      else if (abs(rest) < 4.0_dp*factor*abs(h)) then
+        to_end = (rest/h)/ceiling(rest/(factor*h))
+      end if
+    end function to_end
+
+    subroutine estimate_truncation()
+      !! Estimate the sum of the terms that the step leaves out. One pair of poles is fitted to the
+      !! last four terms by least squares: x(k + 1) = p x(k) - q x(k - 1).
+      real(dp) :: uu, vv, uv, ux, vx, p, q, determinant, powers(FITTED), x(FITTED)
+      real(dp) :: near, far
+      integer :: i, k
+
+      powers(FITTED) = factor**order
+      do k = FITTED - 1, 1, -1
+        powers(k) = powers(k + 1)/factor
+      end do
+      uu = 0.0_dp
+      vv = 0.0_dp
+      uv = 0.0_dp
+      ux = 0.0_dp
+      vx = 0.0_dp
+      do i = 1, n
+        x = weights(i)/local_tolerance*powers*room%a(order - FITTED + 1:order, FIRST_UNKNOWN - 1 + i)
+        uu = uu + (x(3)*x(3) + x(2)*x(2))
+        vv = vv + (x(2)*x(2) + x(1)*x(1))
+        uv = uv + (x(3)*x(2) + x(2)*x(1))
+        ux = ux + (x(3)*x(4) + x(2)*x(3))
+        vx = vx + (x(2)*x(4) + x(1)*x(3))
+      end do
+      determinant = (RIDGE*uu)*(RIDGE*vv) - uv*uv
+      p = (RIDGE*vv)*ux - uv*vx
+      q = uv*ux - (RIDGE*uu)*vx
+      ! A series that converges has no poles within the step, or nearly within.
+      determinant = max((determinant - p) + q, abs(p - q), abs(q), tiny(p))
+      p = (p - q)/determinant
+      q = q/determinant
+      do i = 1, n
+        associate (slot => FIRST_UNKNOWN - 1 + i)
+          left(i) = p*(room%a(order, slot)*powers(FITTED)) &
+                    - q*(room%a(order - 1, slot)*powers(FITTED - 1))
+        end associate
+      end do
+      ! The fit may be small by chance.
+      near = 0.0_dp
+      far = 0.0_dp
+      power = factor**(order - 2*FEW + 1)
+      do k = order - 2*FEW + 1, order
+        do i = 1, n
+          if (k > order - FEW) then
+            near = near + weights(i)*abs(room%a(k, FIRST_UNKNOWN - 1 + i))*power
+          else
+            far = far + weights(i)*abs(room%a(k, FIRST_UNKNOWN - 1 + i))*power
+          end if
+        end do
+        power = power*factor
+      end do
+      found%least = max(found%least, near*min(0.5_dp, near/max(far, tiny(far))))
+    end subroutine estimate_truncation
+
+    subroutine take_step()
+      !! Advance the unknowns, the error and the perturbations to the end of the step.
+      real(dp) :: x(4)
+      real(dp) :: change
+      integer :: i, k, m
+
+      do i = 1, n
+        change = 0.0_dp
+        do k = order, 1, -1
+          change = factor*(change + room%a(k, FIRST_UNKNOWN - 1 + i))
+        end do
+        call two_sum((y(i)), change + y_low(i), y(i), y_low(i))
+        do m = 1, n_blocks
+          x = room%v(:, last_terms(m), FIRST_UNKNOWN - 1 + i, m)
+          do k = last_terms(m) - 1, 0, -1
+            x = factor*x + room%v(:, k, FIRST_UNKNOWN - 1 + i, m)
+          end do
+          lanes(4*m - 3:4*m, i) = x
+        end do
+        lanes(1, i) = lanes(1, i) - left(i)
+      end do
+    end subroutine take_step
+
+    subroutine add_rows()
+      !! Compute the rows within the step, except the last row of all.
+      real(dp) :: part, change(tape%n_unknowns), error(tape%n_unknowns)
+      integer :: i, k, last_row
+
+      last_row = size(request%times)
+      if (at_end) last_row = last_row - 1
+      do while (solution%n_rows < last_row)
+        part = ((request%times(solution%n_rows + 1) - t(1)) - t(2))/h
+        if (abs(part) > factor) return
+        do i = 1, n
+          change(i) = 0.0_dp
+          do k = order, 1, -1
+            change(i) = part*(change(i) + room%a(k, FIRST_UNKNOWN - 1 + i))
+          end do
+          error(i) = room%v(1, last_terms(1), FIRST_UNKNOWN - 1 + i, 1)
+          do k = last_terms(1) - 1, 0, -1
+            error(i) = part*error(i) + room%v(1, k, FIRST_UNKNOWN - 1 + i, 1)
+          end do
+        end do
+        call add_row(y, y_low + change, error - (part/factor)**(order + 1)*left, &
+                     solution%n_rows + 1)
+        if (solution%status /= COMPLETE) return
+        if (mod(solution%n_rows, ROWS_BETWEEN_LOOKS) == 0) then
+          if (interrupt_raised() /= 0) then
+            solution%status = INTERRUPTED
+            return
+          end if
+        end if
+      end do
+    end subroutine add_rows
+
+    subroutine add_row(high, low, error, row)
+      !! Compute a row. Its error is subtracted if it is small enough to be known: a wrong estimate
+      !! then costs no more than the tolerance.
+      real(dp), intent(in) :: high(:), low(:), error(:)
+      integer, intent(in) :: row
+      real(dp) :: z(tape%n_unknowns), size_of_error
+
+      size_of_error = maxval(weights*abs(error))
+      if (.not. size_of_error <= found%error) found%error = size_of_error
+      if (size_of_error <= min(LINEAR_RANGE, request%tolerance)) then
+        z = high + (low - error)
+      else
+        z = high + low
+      end if
+      if (.not. maxval(abs(z)) <= huge(h)) then
+        solution%status = OVERFLOW
+        return
+      end if
+      solution%rows(:, row) = z(:3)
+      if (associated(solution%attitudes)) solution%attitudes(:, row) = z(4:7)/norm2(z(4:7))
+      solution%n_rows = row
+    end subroutine add_row
+
+  end subroutine march
+
+  pure function transposed(lanes) result(matrix)
+    !! Compute the matrix of the open block from the perturbations in the lanes.
+    real(dp), intent(in) :: lanes(8, MOST_UNKNOWNS)
+    real(dp) :: matrix(MOST_UNKNOWNS, MOST_UNKNOWNS)
+
+    matrix = transpose(lanes(2:, :))
+  end function transposed
+
+  pure real(dp) function fitting(tape, order, local_tolerance, weights, a)
+    !! Return the factor on the step with which the last terms would be as large as allowed; 0 if
+    !! they are not finite.
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: order
+    real(dp), intent(in) :: local_tolerance
+    real(dp), intent(in) :: weights(:)
+    real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots)
+    real(dp) :: largest
+    integer :: i, k
+
+    fitting = LONGER
+    do k = order - CHECKED + 1, order
+      largest = 0.0_dp
+      do i = 1, tape%n_unknowns
+        ! NaN must not be lost in the maximum.
+        if (.not. weights(i)*abs(a(k, FIRST_UNKNOWN - 1 + i)) <= largest) then
+          largest = weights(i)*abs(a(k, FIRST_UNKNOWN - 1 + i))
+        end if
+        if (.not. largest <= huge(largest)) then
+          fitting = 0.0_dp
+          return
+        end if
+      end do
+      if (largest > local_tolerance*fitting**(-k)) then
+        fitting = exp((log(local_tolerance) - log(largest))/k)
+      end if
+    end do
+  end function fitting
+
+  pure integer function order_for(local_tolerance)
+    !! Return the order with the least work for the requested digits (Jorba and Zou 2005).
+    real(dp), intent(in) :: local_tolerance
+
+    order_for = max(LEAST_ORDER, min(MOST_ORDER, 1 + ceiling(-0.7_dp*log(local_tolerance))))
+  end function order_for
+
+  pure real(dp) function local_tolerance_of(tolerance, steps)
+    !! Return the largest last terms. An error of omega becomes an error of phase, which grows with
+    !! time; the weights are those of the special kernel for 0.4 radians in a step.
+    real(dp), intent(in) :: tolerance
+    real(dp), intent(in) :: steps !! expected number
+    real(dp) :: way
+
+    way = 0.12_dp*abs(steps)
+    local_tolerance_of = max(LEAST_LOCAL_TOLERANCE, &
+                             tolerance/(8.0_dp + way + way*(way/14.0_dp)))
+  end function local_tolerance_of
+
+end module tape_march

@@ -1,0 +1,110 @@
+module tape_solve
+  !! The solution of a scene whose equations of motion are a tape: integrations from 0 to the last
+  !! time, until the error of one is small enough or cannot be reduced.
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_ptr
+  use, intrinsic :: iso_fortran_env, only: int64
+  use kinds, only: dp
+  use problem, only: request_t, solution_t
+  use statuses, only: COMPLETE, GAVE_UP, SENSITIVE
+  use tape, only: tape_t
+  use tape_march, only: allocate_room, attempt_t, march, outcome_t, room_t
+  implicit none(type, external)
+  private
+
+  real(dp), parameter :: MOST_STEPS = 4e6_dp    ! work limit with ten slots; some ten seconds
+  real(dp), parameter :: CHEAP_SLOTS = 10.0_dp
+  real(dp), parameter :: STEPS_BETWEEN_LOOKS = 5e4_dp ! between polls for an interrupt
+  real(dp), parameter :: ANOTHER = 2.2_dp ! cost of this and another integration over this one
+  ! One integration suffices if its error is at most TRUSTED tolerances and its amplification at
+  ! most PLANNED_GROWTH. Otherwise another one with an error smaller by SAFETY follows.
+  real(dp), parameter :: TRUSTED = 0.25_dp
+  real(dp), parameter :: DOUBTED = 256.0_dp ! amplification that halves the trust in an estimate
+  real(dp), parameter :: PLANNED_GROWTH = 2e3_dp
+  real(dp), parameter :: SAFETY = 10.0_dp
+  real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
+  real(dp), parameter :: UNSURE = 0.3_dp ! rounding times amplification, in tolerances
+  real(dp), parameter :: NO_DIGIT = 1e100_dp ! a relative error that leaves no digit
+
+  public :: solve_tape
+
+contains
+
+  subroutine solve_tape(tape_at, request_at, solution_at) bind(c, name="solve_tape_level")
+    !! Compute the solution at the requested times, which have one sign and are ordered away from 0.
+    !! The status is COMPLETE, OVERFLOW, GAVE_UP, INTERRUPTED or SENSITIVE.
+    ! Addresses of a tape_t, a request_t and a solution_t, passed through C.
+    type(c_ptr), intent(in), value :: tape_at, request_at, solution_at
+    type(tape_t), pointer :: tape
+    type(request_t), pointer :: request
+    type(solution_t), pointer :: solution
+    type(room_t), allocatable :: room
+    type(attempt_t) :: attempt
+    type(outcome_t) :: outcome
+    real(dp) :: attitude(4)
+    real(dp) :: most, spent, cost, error, blurred, planned
+    integer :: failed
+    logical :: again
+
+    call c_f_pointer(tape_at, tape)
+    call c_f_pointer(request_at, request)
+    call c_f_pointer(solution_at, solution)
+    solution%status = GAVE_UP
+    solution%n_rows = 0
+    solution%steps = 0
+    solution%needed = 0.0_dp
+    solution%error = 0.0_dp
+    solution%growth = -1.0_dp
+    solution%spent = 0.0_dp
+    attitude = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp]
+    if (associated(solution%attitudes)) attitude = solution%attitudes(:, 0)
+    if (request%times(size(request%times)) == 0.0_dp) then
+      solution%rows(:, 1) = request%omega
+      if (associated(solution%attitudes)) solution%attitudes(:, 1) = attitude
+      solution%n_rows = 1
+      solution%status = COMPLETE
+      solution%growth = 1.0_dp
+      return
+    end if
+    allocate (room, stat=failed)
+    if (failed == 0) call allocate_room(tape, room, failed)
+    if (failed /= 0) return
+    cost = max(1.0_dp, tape%n_slots/CHEAP_SLOTS)
+    most = min(4e18_dp, request%effort*(MOST_STEPS/cost))
+    attempt%stride = 1 + int(STEPS_BETWEEN_LOOKS/cost, int64)
+    attempt%tolerance = request%tolerance
+    spent = 0.0_dp
+    planned = PLANNED_GROWTH
+    do
+      attempt%most_steps = most - spent
+      call march(tape, request, attitude, attempt, room, solution, outcome)
+      spent = spent + real(outcome%steps, dp)
+      if (.not. outcome%error <= NO_DIGIT) outcome%error = NO_DIGIT
+      if (solution%status /= COMPLETE .or. outcome%finest) exit
+      again = outcome%growth > planned
+      ! Where perturbations grow, a few steps cause most of the error; their estimates may be wrong
+      ! by chance.
+      error = max(outcome%error, outcome%least)*(1.0_dp + min(outcome%growth, PLANNED_GROWTH)/DOUBTED)
+      if (.not. again .and. error <= TRUSTED*request%tolerance) exit
+      attempt%tolerance = attempt%tolerance &
+                          *min(1.0_dp, &
+                               TRUSTED*request%tolerance/(SAFETY*max(error, ROUNDING**2)), &
+                               PLANNED_GROWTH/outcome%growth)
+      planned = max(planned, 2.0_dp*outcome%growth)
+    end do
+    blurred = ROUNDING*outcome%growth*(1.0_dp + outcome%noise)
+    solution%steps = outcome%steps
+    solution%error = max(outcome%error, min(outcome%least, UNSURE*request%tolerance)) + blurred
+    solution%growth = outcome%growth
+    solution%spent = spent
+    if (solution%status == COMPLETE .and. blurred > UNSURE*request%tolerance) then
+      solution%status = SENSITIVE
+    end if
+    if (solution%status == GAVE_UP) then
+      ! If the error is too large already, another integration with shorter steps will be needed.
+      if (outcome%error > request%tolerance) outcome%ahead = ANOTHER*outcome%ahead
+      solution%needed = (spent - real(solution%steps, dp) + outcome%ahead)*cost/MOST_STEPS
+      solution%steps = int(spent, int64)
+    end if
+  end subroutine solve_tape
+
+end module tape_solve

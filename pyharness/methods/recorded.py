@@ -1,0 +1,138 @@
+"""Integration of scenes with a recorded torque, by the Taylor series of a tape."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.dynamics.system import system_of
+from pyharness.methods.problem import known, trajectory_of
+from pyharness.model.attitude import IDENTITY
+from pyharness.model.codes import Operations
+from pyharness.model.effort import advice
+from pyharness.model.errors import InputError, TimedError
+from pyharness.model.extension import GAVE_UP, extension
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.tape import N_INPUTS, TIME, Linear, Tape
+from pyharness.model.trajectory import Array, Trajectory
+
+_KINDS = {
+    "linear": (Operations.LINEAR, 1),
+    "product": (Operations.PRODUCT, 1),
+    "quotient": (Operations.QUOTIENT, 1),
+    "sqrt": (Operations.SQRT, 1),
+    "exp": (Operations.EXP, 2),
+    "sine": (Operations.SINE_COSINE, 3),
+}
+
+
+class KernelTape(NamedTuple):
+    """A tape as the arrays that the kernel reads; fortran/modern/tape.f90 describes them."""
+
+    n_unknowns: int
+    n_slots: int
+    operations: NDArray[np.int32]
+    starts: NDArray[np.int32]
+    slots: NDArray[np.int32]
+    coefficients: Array
+    constants: Array
+
+
+def recorded_series(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
+    """Return the trajectory of a scene with a recorded torque at `times` (s) by Taylor series.
+
+    The attitude is computed too if the scene has one. `tolerance` is the largest allowed error,
+    relative to the largest |omega|, and of the attitude's angle (rad). `effort` multiplies the work
+    limit of some ten seconds. If the error of the first integration is too large, the scene is
+    integrated again. `steps` is the number of steps of the last integration, and `evaluations` that
+    of all. Raise InputError for an opaque torque, a torque that is not finite, and if the work
+    limit is exceeded.
+    """
+    tape = kernel_tape(system(scene))
+    work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
+    n_attitudes = 0 if scene.attitude is None else len(times)
+    joint = np.empty((4, n_attitudes + 1), order="F")
+    joint[:, 0] = scene.attitude or IDENTITY
+    rows, n_rows, status, steps = extension().tape_rows(
+        *tape, scene.omega, times, tolerance, joint, work
+    )
+    if status == GAVE_UP:
+        count = "1 step" if steps == 1 else f"{steps} steps"
+        raise TimedError(
+            f"taylor exceeded its work limit before t = {{time}} s after {count}; "
+            + advice("use a shorter time or a larger tolerance", effort, work[1]),
+            times[n_rows],
+        )
+    error, growth = map(known, work[2:4])
+    attitudes = joint[:, 1:] if n_attitudes else None
+    return trajectory_of(times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes)
+
+
+def system(scene: Scene) -> Tape:
+    """Return the equations of motion of a scene with a recorded torque as a tape.
+
+    Raise InputError for an opaque torque.
+    """
+    torque = scene.torque
+    if not isinstance(torque, StateTorque) or torque.tape is None:
+        raise InputError(
+            "an opaque torque can't be solved by series; allowed: the methods dop853, rk45, "
+            "radau, lsoda, or a torque that can be recorded"
+        )
+    return system_of(scene, scene.attitude is not None)
+
+
+@lru_cache(maxsize=64)
+def kernel_tape(tape: Tape) -> KernelTape:
+    """Return a tape as arrays for the kernel.
+
+    Sine and cosine of one angle become one operation, because each recurrence needs the other.
+    """
+    places = {slot: slot + 1 for slot in range(N_INPUTS)}
+    n_slots = N_INPUTS
+    operations: list[tuple[int, int, int, int]] = []
+    combinations: list[tuple[float, list[tuple[int, float]]]] = []
+    frequencies: dict[int, int] = {}  # the combination that is proportional to time, by slot
+    waves: dict[int, int] = {}
+
+    def combined(linear: Linear) -> int:
+        terms = [(places[slot], coefficient) for slot, coefficient in linear.terms]
+        combinations.append((linear.constant, terms))
+        return len(combinations)
+
+    for number, (kind, operands, linear) in enumerate(tape.operations, N_INPUTS):
+        if kind in ("sine", "cosine") and operands[0] in waves:
+            places[number] = waves[operands[0]] + (kind == "cosine")
+            continue
+        code, count = _KINDS["sine" if kind == "cosine" else kind]
+        first, second, *_ = *(places[slot] for slot in operands), 0, 0
+        if linear is not None:
+            first = combined(linear)
+            if not linear.constant and [slot for slot, _ in linear.terms] == [TIME]:
+                frequencies[number] = first
+        if code == Operations.SINE_COSINE:
+            if operands[0] == TIME and TIME not in frequencies:
+                frequencies[TIME] = combined(Linear(0.0, ((TIME, 1.0),)))
+            second = frequencies.get(operands[0], 0)
+            waves[operands[0]] = n_slots + 1
+        operations.append((code, first, second, n_slots + 1))
+        places[number] = n_slots + 1 + (kind == "cosine")
+        n_slots += count
+    for output in tape.outputs:
+        combined(output)
+    terms = [term for _, each in combinations for term in each]
+    starts = np.cumsum([1, *(len(each) for _, each in combinations)])
+    return KernelTape(
+        len(tape.outputs),
+        n_slots,
+        np.array(operations, dtype=np.int32).reshape(-1, 4).T.copy(order="F"),
+        starts.astype(np.int32),
+        np.array([slot for slot, _ in terms], dtype=np.int32),
+        np.array([coefficient for _, coefficient in terms]),
+        np.array([constant for constant, _ in combinations]),
+    )

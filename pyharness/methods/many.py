@@ -24,9 +24,9 @@ from pyharness.methods.many_scenes import (
 )
 from pyharness.methods.many_space import (
     NO_ATTITUDE,
-    acts_in_space,
     inertia_scenes,
-    solve_in_space,
+    is_solved_alone,
+    solve_one_by_one,
 )
 from pyharness.methods.plan import FINEST
 from pyharness.methods.registry import REGISTRY, check_attitude, requested_tolerance
@@ -150,10 +150,9 @@ def solve_many(
         "method": method, "tolerance": tolerance, "effort": effort, "threads": threads,
     }  # fmt: skip
     if isinstance(scene, Scene):
-        if acts_in_space(scene, torques.values()):
+        if is_solved_alone(scene, torques):
             _, asked = _chosen(method, tolerance)
-            checked_scene(scene, any_axes=True, any_torque=True)
-            return solve_in_space(
+            return solve_one_by_one(
                 scene, t_end, {**torques, **kinds, **starts}, out, method=method, tolerance=asked,
                 effort=checked_effort(effort), threads=threads_of(threads),
             )  # fmt: skip
@@ -176,7 +175,7 @@ def solve_many(
             )
         if any(_is_special(each) for each in scene):
             if (len(scene) > 1 and not all(each.inertia is not None for each in scene)) or any(
-                each.torque.in_space for each in scene
+                is_solved_alone(each, {}) for each in scene
             ):
                 return _solve_groups(scene, t_end, step, out, **settings)
             check_alike(scene)
@@ -199,8 +198,8 @@ def solve_many(
 
 
 def _is_special(scene: Scene) -> bool:
-    checked_scene(scene, any_axes=True, any_torque=True)
-    return scene.inertia is not None or scene.torque.in_space
+    checked_scene(scene, any_axes=True, any_torque=True, any_state=True)
+    return scene.inertia is not None or is_solved_alone(scene, {})
 
 
 def _solve_groups(
@@ -210,14 +209,14 @@ def _solve_groups(
     """Solve scenes that one kernel call can't solve together, and return all final states.
 
     Scenes with moments or coefficients are solved in one call, and scenes with a full inertia
-    matrix in another one. Each scene with a torque about the axes of space is solved alone. `t_end`
-    (s) is one time, or one time for each scene. `step` is the step size (s) of Gauss collocation
-    and of the methods with a fixed step. The keyword arguments `settings` are further arguments of
-    `solve_many`. The final states are in the order of `scenes`. They are written into `out` if it
-    is not None.
+    matrix in another one. Each scene with a torque about the axes of space, or one that depends on
+    the state, is solved alone. `t_end` (s) is one time, or one time for each scene. `step` is the
+    step size (s) of Gauss collocation and of the methods with a fixed step. The keyword arguments
+    `settings` are further arguments of `solve_many`. The final states are in the order of `scenes`.
+    They are written into `out` if it is not None.
     """
     check_alike(scenes)
-    if scenes[0].attitude is None and any(each.torque.in_space for each in scenes):
+    if scenes[0].attitude is None and any(each.torque.needs_attitude for each in scenes):
         raise InputError(NO_ATTITUDE)
     times, n = rows_of("t_end", t_end), len(scenes)
     check_rows("t_end", times, n)
@@ -225,8 +224,7 @@ def _solve_groups(
     found = place_for(out, n, scenes[0].attitude is not None)
     groups: dict[int, list[int]] = {}
     for row, each in enumerate(scenes):
-        # A scene with a torque about the axes of space is solved alone, for any kind of body.
-        kind = row if each.torque.in_space else -1 if each.inertia is not None else -2
+        kind = row if is_solved_alone(each, {}) else -1 if each.inertia is not None else -2
         groups.setdefault(kind, []).append(row)
     for kind, rows in groups.items():
         own: Any = scenes[rows[0]] if kind >= 0 else [scenes[row] for row in rows]

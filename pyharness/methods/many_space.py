@@ -1,11 +1,11 @@
 """Conversion of many bodies, given by arrays, to one scene each, for `solve_many`.
 
-This is needed for torques about the axes of space and for full inertia matrices. Bodies under a
-torque about the axes of space are also solved in this module, one after the other, by prepared
+This is needed for torques about the axes of space or that depend on the state, and for full inertia
+matrices. Bodies under such torques are also solved in this module, one after the other, by prepared
 solvers.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -21,56 +21,71 @@ from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS
 from pyharness.model.pieces import for_each_piece
 from pyharness.model.scene import Scene, Triple
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 
 _REST: Triple = (0.0, 0.0, 0.0)
 _BODIES = ("moments", "inertia", "coefficients")
 NO_ATTITUDE = (
-    "the torque is about the axes of space, and no attitude is given; allowed: attitude0, scenes "
-    "with an attitude, or a torque about the axes of the body"
+    "the torque needs the attitude, and none is given; allowed: attitude0, or scenes with an "
+    "attitude"
 )
 
 
-def acts_in_space(scene: Scene, arrays: Iterable[object]) -> bool:
-    """Return whether a torque about the axes of space acts, from the scene or from torque arrays.
+def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
+    """Return whether each body must be solved alone, because no kernel takes several of its kind.
 
-    `arrays` contains the torque arrays of `solve_many`, and None for an array that was not given.
+    This is the case if the torque depends on the state, or is about the axes of space. `arrays`
+    contains the torque arrays of `solve_many` by name, and None for an array that was not given.
     The components in the arrays are about the axes, of the body or of space, that the `frame` of
-    the scene's torque names.
+    the scene's torque names. Raise InputError if an array is given beside a torque that depends on
+    the state.
     """
-    named = any(each is not None for each in arrays)
-    return scene.torque.in_space or (scene.law.frame == "space" and named)
+    named = [name for name, each in arrays.items() if each is not None]
+    if isinstance(scene.torque, StateTorque):
+        for name in named:
+            raise InputError(
+                f"{name} is given beside a torque that depends on the state; allowed: one of both"
+            )
+        return True
+    return scene.torque.in_space or (scene.law.frame == "space" and bool(named))
 
 
-def solve_in_space(
+def solve_one_by_one(
     scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
     method: str, tolerance: float, effort: float, threads: int,
 ) -> Ensemble:  # fmt: skip
-    """Return the final states of many bodies under a torque about the axes of space.
+    """Return the final states of many bodies, each of which is solved alone.
 
     The arguments are the same as in `solve_many`, except that `arrays` contains its arrays by name.
     The value None stands for an array that was not given; the scene then supplies the quantity. A
     body whose numbers are not allowed has NaN and the status REFUSED, and all other bodies are
-    solved. Raise InputError if no initial attitude is given, or if bodies are given by
-    coefficients.
+    solved. Raise InputError if no initial attitude is given and the torque needs one, or if bodies
+    under a torque about the axes of space are given by coefficients.
     """
     check_torque(scene, method, attitude=True)
-    if arrays["coefficients"] is not None or scene.coefficients is not None:
+    by_coefficients = arrays["coefficients"] is not None or scene.coefficients is not None
+    if by_coefficients and not isinstance(scene.torque, StateTorque):
         raise InputError(
             "the torque is about the axes of space, and bodies are given by coefficients; allowed: "
             "moments or inertia"
         )
     attitude0 = scene.attitude if arrays["attitude0"] is None else arrays["attitude0"]
-    if attitude0 is None:
+    if attitude0 is None and scene.torque.needs_attitude:
         raise InputError(NO_ATTITUDE)
+    with_attitude = attitude0 is not None
     omega0 = scene.omega if arrays["omega0"] is None else arrays["omega0"]
     rows = _rows(arrays)
-    starts, attitudes = rows_of("omega0", omega0, 3), rows_of("attitude0", attitude0, 4)
-    times = rows_of("t_end", t_end)
-    n = count_bodies({**rows, "omega0": starts, "attitude0": attitudes, "t_end": times})
+    starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
+    counted = {**rows, "omega0": starts, "t_end": times}
+    if with_attitude:
+        counted["attitude0"] = rows_of("attitude0", attitude0, 4)
+    n = count_bodies(counted)
     at_rest = replace(scene, omega=_REST, attitude=None)
-    found = place_for(out, n, with_attitude=True)
-    assert found.attitude is not None
+    found = place_for(out, n, with_attitude)
+    settings: Any = {"effort": effort, "attitude": with_attitude}
+    # All bodies share one solver if they differ in their starts alone.
+    shared = None if rows else prepare(at_rest, method, tolerance, **settings)
     # `omega0` or `attitude0` may share memory with `out`.
     omega, attitude = np.full((n, 3), np.nan), np.full((n, 4), np.nan)
     found.status[:] = Statuses.REFUSED
@@ -80,16 +95,23 @@ def solve_in_space(
             if given_up[0]:
                 return
             try:
-                body = scene_of_row(at_rest, rows, i)
-                solver = prepare(body, method, tolerance, effort=effort, attitude=True)
-                start, turn = row_of(starts, i), row_of(attitudes, i)
-                omega[i], attitude[i] = solver(start, float(row_of(times, i)), turn)
+                solver: Any = shared or prepare(
+                    scene_of_row(at_rest, rows, i), method, tolerance, **settings
+                )
+                start, time = row_of(starts, i), float(row_of(times, i))
+                if with_attitude:
+                    turn = row_of(counted["attitude0"], i)
+                    omega[i], attitude[i] = solver(start, time, turn)
+                else:
+                    omega[i] = solver(start, time)
             except InputError:
                 continue
             found.status[i] = ENDS.index(solver.status)
 
     for_each_piece(enter, n, threads)
-    found.omega[:], found.attitude[:] = omega, attitude
+    found.omega[:] = omega
+    if found.attitude is not None:
+        found.attitude[:] = attitude
     return found
 
 
@@ -145,4 +167,5 @@ def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
         own = {**dict.fromkeys(_BODIES), **own}
     if "omega0" in own:
         own["omega"] = own.pop("omega0")
-    return replace(scene, torque=replace(scene.law, **torque), **own)
+    law = replace(scene.law, **torque) if torque else scene.torque
+    return replace(scene, torque=law, **own)

@@ -6,7 +6,7 @@ the kernel. Therefore it takes little longer than the kernel itself.
 """
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from pyharness.methods.plan import plan
 from pyharness.methods.registry import check_torque, requested_tolerance
@@ -14,6 +14,7 @@ from pyharness.methods.solver import PREPARED, Solver
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import unknown
 from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.values import Number
 from pyharness.model.waves import with_merged_waves
 
@@ -67,20 +68,22 @@ def prepare(
         Factor on the work limit of a call; 1 means some ten seconds. A call that exceeds the limit
         has the status `gave up`.
     attitude : bool
-        Whether calls return the attitude too. A torque about the axes of space requires it.
+        Whether calls return the attitude too. A torque that depends on the attitude, or is about
+        the axes of space, requires it.
 
     Returns
     -------
     Solver or AttitudeSolver
         A callable. ``solver(omega0, t_end)`` returns omega (rad/s, shape (3,)) at `t_end` (s). If
         `attitude` is true, it returns two arrays: omega, and a quaternion from body to space,
-        scalar first, shape (4,).
+        scalar first, shape (4,). If the torque depends on the state, the solver is called in the
+        same way, but a call takes some ten microseconds longer.
 
     Raises
     ------
     InputError
         If the method is unknown, or can't take the scene or propagate its attitude; if a torque
-        about the axes of space comes without `attitude`; if the tolerance or the effort is out of
+        that needs the attitude comes without `attitude`; if the tolerance or the effort is out of
         range.
     NotBuiltError
         If the extension is not built.
@@ -93,12 +96,19 @@ def prepare(
     >>> np.round(solver(np.array([0.0, 1.0, 10.0]), 1.0), 6) + 0.0
     array([-0.958924,  0.283662, 10.      ])
     """
-    checked_scene(scene, any_axes=True, any_torque=True)
+    checked_scene(scene, any_axes=True, any_torque=True, any_state=True)
     if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)
     tolerance = requested_tolerance(method, tolerance)
     effort = checked_effort(effort)
     check_torque(scene, method, attitude)
+    if isinstance(scene.torque, StateTorque):
+        from pyharness.methods.prepared_recorded import RecordedAttitudeSolver, RecordedSolver
+
+        # They have the attributes of a Solver, but no kernel that is bound in C.
+        kind: Any = RecordedAttitudeSolver if attitude else RecordedSolver
+        recorded: Solver | AttitudeSolver = kind(scene, method, tolerance, effort)
+        return recorded
     if scene.inertia is not None:
         from pyharness.methods.prepared_inertia import prepared_inertia, prepared_inertia_attitude
 

@@ -1,0 +1,301 @@
+"""Tests of the compiled Taylor series for torques that depend on the state."""
+
+import math
+import pickle
+from collections.abc import Callable
+from dataclasses import replace
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import InputError, Scene, TorqueLaw, prepare, solve, solve_many
+from pyharness.methods.recorded import kernel_tape, recorded_series, system
+from pyharness.methods.taylor import taylor
+from pyharness.model.extension import extension
+from pyharness.model.state_torque import replayed
+from pyharness.scenes.random_scenes import draw as draw_law
+from pyharness.truth.reference import reference
+from tests.methods.state_scenes import draw
+
+MOMENTS = (1.0, 2.0, 2.5)
+SPHERE = (2.0, 2.0, 2.0)
+
+
+def scene_of(torque: Callable[..., Any], omega: Any = (1.0, 2.0, 3.0), **own: Any) -> Scene:
+    """Return a scene with moments 1, 2, 2.5 kg m2 unless `own` has others."""
+    return Scene("test", omega, **{"moments": MOMENTS, "torque": torque, **own})
+
+
+def damped(t: Any, omega: Any) -> Any:
+    """Return the torque of viscous damping."""
+    return -0.1 * omega
+
+
+def error_of(scene: Scene, times: list[float], found: Any) -> float:
+    """Return the error of a trajectory: the relative one of omega, or the angle (rad)."""
+    truth = reference(scene, times)
+    assert len(truth.time) == len(found.time) == len(times)
+    scale = max(np.abs(scene.omega).max(), np.abs(truth.omega).max())
+    error = float(np.abs(found.omega - truth.omega).max() / scale)
+    if truth.attitude is not None:
+        sign = np.sign((found.attitude * truth.attitude).sum(axis=1))[:, None]
+        angle = 2.0 * np.linalg.norm(sign * found.attitude - truth.attitude, axis=1).max()
+        error = max(error, float(angle))
+    return error
+
+
+@pytest.mark.parametrize("number", range(24))
+def test_error_is_below_the_tolerance_and_known(number: int) -> None:
+    scene, time = draw(Random(f"recorded {number}"))
+    times = [0.37 * time, time]
+    for tolerance in (1e-4, 1e-8, 1e-12):
+        found = solve(scene, times, tolerance=tolerance, attitude=scene.attitude is not None)
+        error = error_of(scene, times, found)
+        assert found.growth is not None
+        assert found.error is not None
+        assert error <= tolerance + 4e-15 * found.growth
+        assert error <= 10.0 * found.error + 1e-15
+
+
+@pytest.mark.parametrize("number", range(12))
+def test_a_law_as_a_tape_has_the_solution_and_the_growth_of_the_law(number: int) -> None:
+    scene, time = draw_law("recorded", number).scene, 2.0
+    if scene.coefficients is not None or scene.torque.in_space:
+        scene = scene_of(damped, torque=TorqueLaw((0.1, 0.2, -0.3), sines=[((1, 2, 3), 2.0)]))
+    law = scene.law
+    taped = replace(scene, torque=replayed(lambda t, omega, q: _law_in_symbols(law, t)))
+    one = taylor(scene, [time], 1e-13)
+    other = recorded_series(taped, [time], 1e-13)
+    assert one.growth is not None
+    assert other.growth is not None
+    scale = max(np.abs(scene.omega).max(), np.abs(one.omega).max())
+    assert np.abs(one.omega - other.omega).max() <= (2e-13 + 4e-15 * one.growth) * scale
+    # Blocks of steps differ, and so do the earlier times from which perturbations are followed.
+    assert 0.5 * one.growth <= other.growth <= 2.0 * one.growth
+
+
+def _law_in_symbols(law: TorqueLaw, t: Any) -> Any:
+    torque = np.array(law.constant) + t * np.array(law.rate)
+    for amplitude, frequency in law.sines:
+        torque = torque + np.array(amplitude) * np.sin(frequency * t)
+    for amplitude, frequency in law.cosines:
+        torque = torque + np.array(amplitude) * np.cos(frequency * t)
+    return torque
+
+
+@pytest.mark.parametrize("time", [0.0, 3.0, -3.0, 400.0])
+def test_damped_sphere(time: float) -> None:
+    found = solve(scene_of(damped, moments=SPHERE), time)
+    wanted = np.array([1.0, 2.0, 3.0]) * math.exp(-0.05 * time)
+    assert found.omega[0] == pytest.approx(wanted, rel=0.0, abs=3.1e-12)
+
+
+def test_every_function_has_its_series() -> None:
+    # Each component is the derivative of a function of time, by which it is checked.
+    def torque(t: Any, omega: Any) -> Any:
+        x = t + 0.0 * omega[0]
+        first = np.cos(x * x) * 2.0 * x + np.exp(-x)
+        second = 0.5 / np.sqrt(x + 2.0) - np.sin(0.5 * x + 1.0) * 0.5
+        return [first, second, 1.0 / (1.0 + x) - 1.0 / (x + 3.0) ** 2]
+
+    def integral(t: float) -> list[float]:
+        return [
+            math.sin(t * t) - math.exp(-t),
+            math.sqrt(t + 2.0) + math.cos(0.5 * t + 1.0),
+            math.log(1.0 + t) + 1.0 / (t + 3.0),
+        ]
+
+    scene = scene_of(torque, omega=(0.3, 0.2, 0.1), moments=(1.0, 1.0, 1.0))
+    assert not isinstance(scene.torque, TorqueLaw)
+    times = [0.5, 1.0, 2.5]
+    found = solve(scene, times, tolerance=1e-13)
+    change = np.array([integral(t) for t in times]) - np.array(integral(0.0))
+    assert found.omega == pytest.approx(np.array(scene.omega) + change, rel=0.0, abs=5e-13)
+
+
+def test_rows_agree_with_ends() -> None:
+    scene, time = draw(Random("rows"), ("gradient", "damping"))
+    times = [0.1 * time, 0.33 * time, 0.5 * time, time]
+    rows = solve(scene, times, tolerance=1e-11, attitude=True)
+    for number, each in enumerate(times):
+        end = solve(scene, each, tolerance=1e-11, attitude=True)
+        assert rows.omega[number] == pytest.approx(end.omega[0], rel=0.0, abs=1e-10)
+        assert rows.attitude is not None
+        assert end.attitude is not None
+        assert rows.attitude[number] == pytest.approx(end.attitude[0], rel=0.0, abs=1e-10)
+    assert np.linalg.norm(rows.attitude, axis=1) == pytest.approx(1.0, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("torque", "last"),
+    [
+        (lambda t, omega: omega * omega, 0.5),  # infinite at 1 s
+        (lambda t, omega: [1.0 / (1.5 - t), 0.0 * omega[0], 0.0], 1.0),
+        (lambda t, omega: [-np.sqrt(1.2 - t) + 0.0 * omega[1], 0.0, 0.0], 1.0),
+        (lambda t, omega: [1.0 / (omega[0] - 1.0), 0.0, 0.0], None),
+    ],
+)
+def test_singular_torques_end_the_rows(torque: Any, last: float | None) -> None:
+    scene = scene_of(torque, omega=(1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0))
+    found = solve(scene, [0.5, 1.0, 2.0])
+    assert found.ended == "overflow"
+    assert found.error is None
+    assert found.time.tolist() == [t for t in (0.5, 1.0) if last is not None and t <= last]
+
+
+def test_a_motion_that_amplifies_rounding_errors_is_sensitive() -> None:
+    # Negative damping of the perturbation about an unstable rotation.
+    scene = scene_of(lambda t, omega: 0.01 * omega, omega=(1e-9, 1.0, 1e-9))
+    found = solve(scene, 40.0, tolerance=1e-12)
+    assert found.ended == "sensitive"
+    assert found.growth is not None
+    assert found.growth > 1e4
+    assert solve(scene, 40.0, tolerance=1e-3).ended in ("complete", "sensitive")
+
+
+def test_torques_that_cancel_have_a_known_error() -> None:
+    # Two terms of 1e9 N m cancel except for their rounding errors.
+    def torque(t: Any, omega: Any) -> Any:
+        large = 1e9 * omega[0] * omega[1]
+        return [large * np.cos(t) ** 2 + large * (np.sin(t) ** 2 - 1.0), 0.0, 0.0]
+
+    scene = scene_of(torque)
+    still = replace(scene, torque=TorqueLaw())
+    found, truth = solve(scene, 2.0, tolerance=1e-6), solve(still, 2.0, tolerance=1e-14)
+    error = np.abs(found.omega - truth.omega).max() / 3.0
+    assert found.error is not None
+    assert 1e-13 < error <= found.error
+
+
+def test_perturbations_are_followed_where_the_motion_is_steady() -> None:
+    # The motion is a polynomial of time, but perturbations rotate some thousand radians.
+    scene = scene_of(damped, omega=(0.0, 0.0, 30.0), moments=(2.0, 2.0, 1.0))
+    steady = replace(scene, torque=replayed(lambda t, omega, q: 0.0 * omega + [0.0, 0.0, 1e-3]))
+    found = recorded_series(steady, [70.0], 1e-10)
+    assert found.growth == pytest.approx(1.0, abs=0.5)
+    assert found.error is not None
+    assert found.error < 1e-10
+
+
+def test_body_without_products() -> None:
+    found = solve(scene_of(damped, moments=SPHERE, omega=(0.0, 0.0, 0.0)), 1.0)
+    assert found.omega.tolist() == [[0.0, 0.0, 0.0]]
+
+
+def test_from_rest() -> None:
+    scene = scene_of(lambda t, omega: [t, t * t - omega[0], np.sin(t)], omega=(0.0, 0.0, 0.0))
+    for tolerance in (1e-5, 1e-11):
+        found = solve(scene, [0.5, 4.0], tolerance=tolerance)
+        assert error_of(scene, [0.5, 4.0], found) <= tolerance
+
+
+def test_work_limit() -> None:
+    scene = scene_of(lambda t, omega: [np.sin(omega[0] * t), 0.0, 0.0])
+    with pytest.raises(InputError, match=r"taylor exceeded its work limit before t = .*effort"):
+        solve(scene, 1e6, effort=1e-4)
+
+
+def test_prepared_solver_has_the_results_of_solve() -> None:
+    scene, time = draw(Random("prepared"), ("damping", "wheel"))
+    scene = replace(scene, attitude=None)
+    solver = prepare(scene, tolerance=1e-9)
+    found = solve(scene, time, tolerance=1e-9)
+    out = np.empty(3)
+    assert solver(scene.omega, time, out=out) is out
+    assert out.tolist() == found.omega[0].tolist()
+    assert (solver.status, solver.error, solver.growth) == (found.ended, found.error, found.growth)
+    assert solver.steps == found.steps
+    copy = pickle.loads(pickle.dumps(solver))
+    assert copy(scene.omega, time).tolist() == out.tolist()
+    assert copy.plan == solver.plan
+    assert solver.trajectory(scene.omega, [time]).omega.tolist() == found.omega.tolist()
+    assert np.isnan(solver((math.nan, 0.0, 0.0), 1.0)).all()
+    assert (solver.status, solver.error) == ("refused", None)
+    for wrong in ((1.0, 2.0), "abc"):
+        with pytest.raises(InputError, match="omega0"):
+            solver(wrong, 1.0)
+    with pytest.raises(InputError, match="out"):
+        solver(scene.omega, 1.0, out=np.empty(4))
+
+
+def test_prepared_solver_with_attitude_and_full_inertia() -> None:
+    inertia = ((1.0, 0.1, 0.0), (0.1, 2.0, 0.2), (0.0, 0.2, 2.5))
+    scene, _ = draw(Random("full"), ("field", "damping"))
+    scene = replace(scene, moments=None, inertia=inertia)
+    solver, found = prepare(scene, attitude=True), solve(scene, 1.5, attitude=True)
+    omega, attitude = solver(scene.omega, 1.5)
+    assert found.attitude is not None
+    assert omega == pytest.approx(found.omega[0], abs=1e-12)
+    assert abs(attitude @ found.attitude[0]) == pytest.approx(1.0, abs=1e-14)
+    turned, _ = solver(scene.omega, 1.5, (0.0, 1.0, 0.0, 0.0))
+    other = solve(replace(scene, attitude=(0.0, 1.0, 0.0, 0.0)), 1.5, attitude=True)
+    assert turned == pytest.approx(other.omega[0], abs=1e-12)
+    assert not np.allclose(turned, omega)
+
+
+def test_many_bodies_have_the_bits_of_one() -> None:
+    scene, time = draw(Random("many"), ("drag", "wave"))
+    scene = replace(scene, attitude=None)
+    starts = np.random.default_rng(3).normal(size=(600, 3))
+    one, two = (solve_many(scene, time, omega0=starts, threads=n) for n in (1, 2))
+    backward = solve_many(scene, time, omega0=starts[::-1])
+    assert one.omega.tobytes() == two.omega.tobytes() == backward.omega[::-1].tobytes()
+    solver = prepare(scene)
+    assert solver(starts[7], time).tolist() == one.omega[7].tolist()
+    many, status = solver.many(starts[:9], time)
+    assert many.tolist() == one.omega[:9].tolist()
+    assert status.tolist() == one.status[:9].tolist()
+    bodies = solve_many(scene, time, moments=[MOMENTS, (2.0, 3.0, 4.0)])
+    alone = solve(replace(scene, moments=(2.0, 3.0, 4.0)), time)
+    assert bodies.omega[1].tolist() == alone.omega[0].tolist()
+    with pytest.raises(InputError, match="sines is given beside a torque that depends"):
+        solve_many(scene, time, sines=[[1.0, 0.0, 0.0, 2.0]])
+
+
+def test_many_scenes_of_different_kinds() -> None:
+    first, time = draw(Random("kinds"), ("quotient",))
+    first = replace(first, attitude=None)
+    second = Scene("law", (1.0, 2.0, 3.0), moments=MOMENTS, torque=TorqueLaw((0.1, 0.0, 0.0)))
+    found = solve_many([first, second], [time, 1.0])
+    assert found.omega[0].tolist() == solve(first, time).omega[0].tolist()
+    assert found.omega[1] == pytest.approx(solve(second, 1.0).omega[0], abs=1e-11)
+
+
+@pytest.mark.parametrize("level", [0, 1, 2])
+def test_every_instruction_set_meets_the_tolerance(level: int) -> None:
+    scene, time = draw(Random("levels"), ("gradient", "drag"))
+    usual = solve(scene, time, attitude=True)
+    try:
+        if extension().choose_instructions(level) != level:
+            pytest.skip("this processor lacks the instruction set")
+        found = solve(scene, time, attitude=True)
+    finally:
+        extension().choose_instructions(2)
+    assert found.growth is not None
+    scale = np.abs(usual.omega).max()
+    assert np.abs(found.omega - usual.omega).max() <= (1e-12 + 4e-15 * found.growth) * scale
+
+
+def test_sine_and_cosine_of_one_angle_are_one_operation() -> None:
+    scene = scene_of(lambda t, omega: [np.sin(omega[0]), np.cos(omega[0]), np.cos(3.0 * t)])
+    tape = kernel_tape(system(scene))
+    kinds = tape.operations[0].tolist()
+    assert kinds.count(6) == 2
+    # The frequency of an angle proportional to time is known, so that its phase is not rounded.
+    frequency = tape.operations[2, [n for n, kind in enumerate(kinds) if kind == 6]]
+    assert sorted(bool(each) for each in frequency) == [False, True]
+
+
+def test_phase_of_a_fast_wave_is_not_rounded() -> None:
+    # After 3e5 radians a rounded phase would have an error of 3e-11.
+    frequency = 1e5 + 0.1
+
+    def torque(t: Any, omega: Any) -> Any:
+        return [1e4 * np.sin(frequency * t) + 0.0 * omega[0], omega[1] * 0.01, 0.0]
+
+    scene = scene_of(torque, omega=(0.0, 1.0, 0.0), moments=(1.0, 1.0, 1.0))
+    found = solve(scene, 3.0, tolerance=1e-9)
+    wanted = 1e4 / frequency * (2.0 * math.sin(0.5 * frequency * 3.0) ** 2)
+    assert found.omega[0, 0] == pytest.approx(wanted, abs=1e-9)

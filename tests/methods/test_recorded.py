@@ -36,12 +36,13 @@ def damped(t: Any, omega: Any) -> Any:
 def error_of(scene: Scene, times: list[float], found: Any) -> float:
     """Return the error of a trajectory: the relative one of omega, or the angle (rad)."""
     truth = reference(scene, times)
-    assert len(truth.time) == len(found.time) == len(times)
-    scale = max(np.abs(scene.omega).max(), np.abs(truth.omega).max())
-    error = float(np.abs(found.omega - truth.omega).max() / scale)
+    assert len(truth.time) == len(found.time)
+    scale = max(np.abs(scene.omega).max(), np.abs(truth.omega).max(initial=0.0))
+    error = float(np.abs(found.omega - truth.omega).max(initial=0.0) / scale)
     if truth.attitude is not None:
         sign = np.sign((found.attitude * truth.attitude).sum(axis=1))[:, None]
-        angle = 2.0 * np.linalg.norm(sign * found.attitude - truth.attitude, axis=1).max()
+        apart = np.linalg.norm(sign * found.attitude - truth.attitude, axis=1)
+        angle = 2.0 * apart.max(initial=0.0)
         error = max(error, float(angle))
     return error
 
@@ -53,6 +54,8 @@ def test_error_is_below_the_tolerance_and_known(number: int) -> None:
     for tolerance in (1e-4, 1e-8, 1e-12):
         found = solve(scene, times, tolerance=tolerance, attitude=scene.attitude is not None)
         error = error_of(scene, times, found)
+        if found.ended == "overflow":  # as the truth, or the rows would differ
+            continue
         assert found.growth is not None
         assert found.error is not None
         assert error <= tolerance + 4e-15 * found.growth
@@ -63,7 +66,9 @@ def test_error_is_below_the_tolerance_and_known(number: int) -> None:
 def test_a_law_as_a_tape_has_the_solution_and_the_growth_of_the_law(number: int) -> None:
     scene, time = draw_law("recorded", number).scene, 2.0
     if scene.coefficients is not None or scene.torque.in_space:
-        scene = scene_of(damped, torque=TorqueLaw((0.1, 0.2, -0.3), sines=[((1, 2, 3), 2.0)]))
+        scene = replace(
+            scene_of(damped), torque=TorqueLaw((0.1, 0.2, -0.3), sines=[((1, 2, 3), 2.0)])
+        )
     law = scene.law
     taped = replace(scene, torque=replayed(lambda t, omega, q: _law_in_symbols(law, t)))
     one = taylor(scene, [time], 1e-13)
@@ -131,18 +136,18 @@ def test_rows_agree_with_ends() -> None:
 @pytest.mark.parametrize(
     ("torque", "last"),
     [
-        (lambda t, omega: omega * omega, 0.5),  # infinite at 1 s
-        (lambda t, omega: [1.0 / (1.5 - t), 0.0 * omega[0], 0.0], 1.0),
-        (lambda t, omega: [-np.sqrt(1.2 - t) + 0.0 * omega[1], 0.0, 0.0], 1.0),
+        (lambda t, omega: omega * omega, 1.0),  # infinite at 1 s
+        (lambda t, omega: [1.0 / (1.5 - t), 0.0 * omega[0], 0.0], 1.5),
+        (lambda t, omega: [-np.sqrt(1.2 - t) + 0.0 * omega[1], 0.0, 0.0], 1.2),
         (lambda t, omega: [1.0 / (omega[0] - 1.0), 0.0, 0.0], None),
     ],
 )
 def test_singular_torques_end_the_rows(torque: Any, last: float | None) -> None:
     scene = scene_of(torque, omega=(1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0))
-    found = solve(scene, [0.5, 1.0, 2.0])
+    found = solve(scene, [0.5, 1.0 + 1e-6, 2.0])
     assert found.ended == "overflow"
     assert found.error is None
-    assert found.time.tolist() == [t for t in (0.5, 1.0) if last is not None and t <= last]
+    assert found.time.tolist() == [t for t in (0.5, 1.0 + 1e-6) if last is not None and t < last]
 
 
 def test_a_motion_that_amplifies_rounding_errors_is_sensitive() -> None:

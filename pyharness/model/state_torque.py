@@ -42,6 +42,8 @@ class StateTorque:
         recorded from a Python function.
     constants : tuple of pairs
         The names and values of the constants in `expression`.
+    is_zero, varies, in_space : bool
+        False, True and False. A `TorqueLaw` has these attributes too.
     """
 
     tape: Tape | None
@@ -245,7 +247,7 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
         return None
     frequencies, waves = {TIME: 1.0}, {}
     for slot, (kind, operands, linear) in enumerate(tape.operations, N_INPUTS):
-        if linear is not None and len(linear.terms) == 1 and not linear.constant:
+        if linear is not None and not linear.constant and [x for x, _ in linear.terms] == [TIME]:
             ((_, frequencies[slot]),) = linear.terms
         elif kind in ("sine", "cosine") and operands[0] in frequencies:
             waves[slot] = kind, frequencies[operands[0]]

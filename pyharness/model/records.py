@@ -7,7 +7,8 @@ from pyharness.model.build import build
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import body_of
-from pyharness.model.torque_law import Wave
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.model.trajectory import Trajectory
 
 
@@ -15,7 +16,8 @@ def scene_record(scene: Scene) -> dict[str, Any]:
     """Return a scene (body, torque, initial conditions and steps) as a dictionary for JSON.
 
     The dictionary has the tables and keys of a scene file. In addition it has the key "case", the
-    number of the scene's case in Table 1 of the thesis, or None.
+    number of the scene's case in Table 1 of the thesis, or None. For a torque that no scene file
+    can describe, "torque" has the number of recorded operations, or the key "opaque", instead.
     """
     body, values = body_of(scene)
     return {
@@ -26,15 +28,25 @@ def scene_record(scene: Scene) -> dict[str, Any]:
             "omega": list(scene.omega),
             **({} if scene.attitude is None else {"attitude": list(scene.attitude)}),
         },
-        "torque": {
-            "constant": list(scene.law.constant),
-            "rate": list(scene.law.rate),
-            "sines": [_wave(wave) for wave in scene.law.sines],
-            "cosines": [_wave(wave) for wave in scene.law.cosines],
-            **({} if scene.law.frame == "body" else {"frame": scene.law.frame}),
-        },
+        "torque": _torque(scene.torque),
         "run": {"step_size": scene.step_size, "steps": scene.steps},
     }
+
+
+def _torque(torque: TorqueLaw | StateTorque) -> dict[str, Any]:
+    if isinstance(torque, TorqueLaw):
+        return {
+            "constant": list(torque.constant),
+            "rate": list(torque.rate),
+            "sines": [_wave(wave) for wave in torque.sines],
+            "cosines": [_wave(wave) for wave in torque.cosines],
+            **({} if torque.frame == "body" else {"frame": torque.frame}),
+        }
+    if torque.expression:
+        return {"expression": list(torque.expression), "constants": dict(torque.constants)}
+    if torque.tape is None:
+        return {"opaque": True}
+    return {"recorded": len(torque.tape.operations)}
 
 
 def _wave(wave: Wave) -> dict[str, Any]:

@@ -8,10 +8,12 @@ from typing import Any, SupportsIndex
 
 from pyharness.model.attitude import of_angles
 from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.expressions import parsed
 from pyharness.model.facts import facts
 from pyharness.model.pipes import read_input
 from pyharness.model.scene import Scene
 from pyharness.model.schema import SCHEMAS, check_schema
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import integer
 
@@ -19,10 +21,11 @@ _LARGEST_FILE = 1_000_000
 _TABLES = {
     "body": ("moments", "coefficients", "inertia"),
     "initial": ("omega", "attitude", "angles_deg", "sequence"),
-    "torque": ("constant", "rate", "sines", "cosines", "frame"),
+    "torque": ("constant", "rate", "sines", "cosines", "frame", "expression", "constants"),
     "run": ("step_size", "steps"),
 }
 _WAVES = ("sines", "cosines")
+_TEXTS = ("expression", "constants")
 
 
 def case_numbers() -> list[int]:
@@ -154,12 +157,12 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
 
     The restored numbers are bit-for-bit identical. Masses, forces and the number of the case are
     not written, because scene files have no keys for them. `comments` are lines at the beginning of
-    the text.
+    the text. Raise InputError if the torque is an opaque function, or was recorded from a function.
     """
     import json
 
     body, values = body_of(scene)
-    law = scene.law
+    torque = _torque_lines(scene.torque)
     lines = [f"# {line}" for line in comments]
     lines.append(f"schema = {SCHEMAS['scene file']}")
     lines += [f"name = {json.dumps(scene.name, ensure_ascii=False)}", "[body]"]
@@ -167,14 +170,31 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     lines += ["[initial]", f"omega = {list(scene.omega)}"]
     if scene.attitude is not None:
         lines.append(f"attitude = {list(scene.attitude)}")
-    lines += ["[torque]", f"constant = {list(law.constant)}", f"rate = {list(law.rate)}"]
-    if law.frame != "body":
-        lines.append(f'frame = "{law.frame}"')
-    for name, waves in (("sines", law.sines), ("cosines", law.cosines)):
-        each = [f"{{ amplitude = {list(a)}, frequency = {f!r} }}" for a, f in waves]
-        lines.append(f"{name} = [{', '.join(each)}]")
+    lines += torque
     lines += ["[run]", f"step_size = {scene.step_size!r}", f"steps = {scene.steps}"]
     return "\n".join(lines) + "\n"
+
+
+def _torque_lines(torque: TorqueLaw | StateTorque) -> list[str]:
+    """Return the lines of a scene file with the table of a torque."""
+    if isinstance(torque, StateTorque):
+        if not torque.expression:
+            kind = "an opaque function" if torque.tape is None else "recorded from a function"
+            raise InputError(
+                f"[torque]: a torque that is {kind} can't be written to a file; allowed: "
+                "expressions"
+            )
+        # The texts have printable characters of ASCII alone, and neither quotes nor backslashes.
+        texts = ", ".join(f'"{text}"' for text in torque.expression)
+        lines = ["[torque]", f"expression = [{texts}]", "[torque.constants]"]
+        return lines + [f"{name} = {value!r}" for name, value in torque.constants]
+    lines = ["[torque]", f"constant = {list(torque.constant)}", f"rate = {list(torque.rate)}"]
+    if torque.frame != "body":
+        lines.append(f'frame = "{torque.frame}"')
+    for key, waves in (("sines", torque.sines), ("cosines", torque.cosines)):
+        each = [f"{{ amplitude = {list(a)}, frequency = {f!r} }}" for a, f in waves]
+        lines.append(f"{key} = [{', '.join(each)}]")
+    return lines
 
 
 def body_of(scene: Scene) -> tuple[str, list[Any]]:
@@ -228,8 +248,20 @@ def _attitude(initial: dict[str, Any]) -> Any:
     return of_angles("[initial] angles_deg", initial["angles_deg"], initial["sequence"])
 
 
-def _torque(table: dict[str, Any]) -> TorqueLaw:
+def _torque(table: dict[str, Any]) -> TorqueLaw | StateTorque:
     check_keys(table, _TABLES["torque"], "[torque]")
+    if any(key in table for key in _TEXTS):
+        if "expression" not in table:
+            raise InputError(
+                "[torque]: constants without expression; give an expression, a list of three "
+                "texts, or constant, three numbers"
+            )
+        if others := [key for key in table if key not in _TEXTS]:
+            raise InputError(
+                f"[torque]: expression and {others[0]}; allowed: expression with constants, or "
+                "constant, rate, sines, cosines and frame"
+            )
+        return parsed(table["expression"], table.get("constants", {}))
     waves = {key: _waves(f"[torque] {key}", table[key]) for key in _WAVES if key in table}
     return TorqueLaw(**{**table, **waves})
 

@@ -5,7 +5,13 @@ from collections.abc import Sequence
 
 from pyharness.model.report import counted, short
 from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.tape import ATTITUDE, OMEGA, TIME
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
+
+# The most characters of an expression, or of the constants in expressions, in a heading.
+_LONGEST_TEXT = 60
 
 
 def heading(scene: Scene) -> list[str]:
@@ -20,9 +26,7 @@ def heading(scene: Scene) -> list[str]:
     else:
         body = f"A, B, C = {_tuple(scene.euler_coefficients)}"
     unit = "N m" if scene.coefficients is None else "1/s2"
-    torque = f"N = {_law(scene)} {unit}" if not scene.torque.is_zero else "no torque"
-    if scene.torque.in_space:
-        torque += " about the axes of space"
+    torque = _torque(scene, unit)
     lines = [
         f"Case {scene.case}: {scene.name}" if scene.case else scene.name,
         f"{body}; {torque}; omega(0) = {_tuple(scene.omega)} rad/s; "
@@ -35,8 +39,39 @@ def heading(scene: Scene) -> list[str]:
     return lines
 
 
-def _law(scene: Scene) -> str:
-    law = scene.law
+def _torque(scene: Scene, unit: str) -> str:
+    """Return a phrase that describes the torque of a scene, in `unit`."""
+    if isinstance(scene.torque, StateTorque):
+        return _state_torque(scene.torque, unit)
+    if scene.torque.is_zero:
+        return "no torque"
+    axes = " about the axes of space" if scene.torque.in_space else ""
+    return f"N = {_law(scene.torque)} {unit}{axes}"
+
+
+def _state_torque(torque: StateTorque, unit: str) -> str:
+    if torque.expression:
+        shown = ", ".join(map(_shortened, torque.expression))
+        constants = ", ".join(f"{name} = {value:g}" for name, value in torque.constants)
+        return f"N = ({shown}) {unit}" + (f" with {_shortened(constants)}" if constants else "")
+    if torque.tape is None:
+        names = ["t", "omega", "attitude"] if torque.needs_attitude else ["t", "omega"]
+        return f"N is an opaque function of {_joined(names)}, in {unit}"
+    inputs = {"t": (TIME,), "omega": OMEGA, "attitude": ATTITUDE}
+    names = [name for name, slots in inputs.items() if not torque.tape.inputs.isdisjoint(slots)]
+    return f"N is a recorded function of {_joined(names)}, in {unit}"
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST_TEXT else f"{text[: _LONGEST_TEXT - 3]}..."
+
+
+def _joined(names: Sequence[str]) -> str:
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def _law(law: TorqueLaw) -> str:
     if not law.varies:
         return _tuple(law.constant)
     parts = [_tuple(law.constant)] if any(law.constant) else []

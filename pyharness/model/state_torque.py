@@ -11,6 +11,7 @@ import numpy as np
 
 from pyharness.model.attitude import product, quaternion_of_axes
 from pyharness.model.errors import InputError, kind_of, printable
+from pyharness.model.law_symbols import body_torque
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, refusal
 from pyharness.model.tape import FLOATS, N_INPUTS, TIME, Tape, evaluate
 from pyharness.model.torque_law import TorqueLaw
@@ -41,6 +42,8 @@ class StateTorque:
         recorded from a Python function.
     constants : tuple of pairs
         The names and values of the constants in `expression`.
+    is_zero, varies, in_space : bool
+        False, True and False. A `TorqueLaw` has these attributes too.
     """
 
     tape: Tape | None
@@ -52,6 +55,19 @@ class StateTorque:
     is_zero: bool = field(default=False, init=False, repr=False)
     varies: bool = field(default=True, init=False, repr=False)
     in_space: bool = field(default=False, init=False, repr=False)
+
+    def __repr__(self) -> str:
+        """Return one line that names the kind of the torque, without the operations of its tape."""
+        if self.tape is None:
+            return f"StateTorque(opaque, needs_attitude={self.needs_attitude})"
+        # Expressions may be long; three of them and their constants are shortened together.
+        given = f"{list(self.expression)}, {dict(self.constants)}" if self.expression else ""
+        shown = given if len(given) <= 200 else f"{given[:197]}..."
+        count = len(self.tape.operations)
+        return (
+            f"StateTorque({shown or 'recorded'}, {count} operations, "
+            f"needs_attitude={self.needs_attitude})"
+        )
 
     def at(self, time: float, omega: Sequence[float], attitude: Sequence[float]) -> Triple:
         """Return the three components of the torque at `time` (s).
@@ -67,6 +83,27 @@ class StateTorque:
         except ZeroDivisionError:
             return math.nan, math.nan, math.nan
         return first, second, third
+
+    def __add__(self, other: "StateTorque | TorqueLaw | Function | int") -> "StateTorque":
+        """Return the sum with a torque, a torque law or a function, which is recorded.
+
+        The sum with the number 0 is the torque itself, so that ``sum`` accepts torques. Raise
+        InputError if one of the two is opaque.
+        """
+        if type(other) is int and other == 0:
+            return self
+        if isinstance(other, TorqueLaw):
+            law = other
+            second = replayed(lambda time, omega, attitude: body_torque(law, time, attitude))
+        elif isinstance(other, StateTorque):
+            second = other
+        elif callable(other):
+            second = recorded(other)
+        else:
+            return NotImplemented
+        return _sum(self.tape, second.tape)
+
+    __radd__ = __add__
 
     def rotated(self, axes: Array) -> "StateTorque":
         """Return the torque about other body axes.
@@ -100,8 +137,31 @@ def replayed(function: Function) -> StateTorque:
 def recorded(function: Function) -> StateTorque:
     """Return the torque that a user's function computes, recorded with symbols.
 
-    The function has the arguments t, omega and, optionally, attitude. It is called once. Raise
-    InputError if it can't be recorded, or does not return three numbers.
+    A scene records the function of its torque itself; sums of functions are made with this one.
+
+    Parameters
+    ----------
+    function : callable
+        A function of (t, omega) or of (t, omega, attitude) that returns the three components of the
+        torque about the body axes (N m). It is called once.
+
+    Returns
+    -------
+    StateTorque
+        The torque, which can be added to other torques.
+
+    Raises
+    ------
+    InputError
+        If the function can't be recorded, or does not return three numbers.
+
+    Examples
+    --------
+    >>> from pyharness import TorqueLaw
+    >>> from pyharness.torques import recorded
+    >>> total = TorqueLaw((1.0, 0.0, 0.0)) + recorded(lambda t, omega: -0.5 * omega)
+    >>> total.at(0.0, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0))
+    (0.5, -1.0, -1.5)
     """
     takes_attitude = _takes_attitude(function)
 
@@ -187,7 +247,7 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
         return None
     frequencies, waves = {TIME: 1.0}, {}
     for slot, (kind, operands, linear) in enumerate(tape.operations, N_INPUTS):
-        if linear is not None and len(linear.terms) == 1 and not linear.constant:
+        if linear is not None and not linear.constant and [x for x, _ in linear.terms] == [TIME]:
             ((_, frequencies[slot]),) = linear.terms
         elif kind in ("sine", "cosine") and operands[0] in frequencies:
             waves[slot] = kind, frequencies[operands[0]]
@@ -205,6 +265,16 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
 
     constant = [output.constant for output in tape.outputs]
     return TorqueLaw(constant, amplitude(TIME), those("sine"), those("cosine"))
+
+
+def _sum(first: Tape | None, second: Tape | None) -> StateTorque:
+    if first is None or second is None:
+        raise InputError(
+            "[torque]: an opaque torque can't be added to another; allowed: one opaque function "
+            "that returns the sum"
+        )
+    a, b = first, second
+    return replayed(lambda *state: torque_of(a, *state) + torque_of(b, *state))
 
 
 def _takes_attitude(function: object) -> bool:

@@ -234,7 +234,7 @@ class Symbol:
 
     def exp(self) -> "Symbol":
         """Return the exponential."""
-        return self._of("exp", lambda x: math.exp(min(x, 710.0)))
+        return self._of("exp", _exp)
 
     def sin(self) -> "Symbol":
         """Return the sine."""
@@ -305,6 +305,13 @@ class Symbol:
 SYMBOLS: Functions[Any] = Functions(
     float, lambda x: np.sqrt(x), lambda x: np.exp(x), lambda x: np.sin(x), lambda x: np.cos(x)
 )
+
+
+def _exp(x: float) -> float:
+    try:
+        return math.exp(x)
+    except OverflowError:
+        return math.inf  # which the symbol refuses
 
 
 def _without_unused(operations: Sequence[Operation], outputs: Sequence[Linear]) -> Tape:

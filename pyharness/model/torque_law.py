@@ -79,6 +79,34 @@ class TorqueLaw:
         if not isinstance(self.frame, str) or self.frame not in FRAMES:
             raise unknown("frame", self.frame, FRAMES, "[torque] frame")
 
+    def __add__(self, other: "TorqueLaw | int") -> "TorqueLaw":
+        """Return the sum with another torque law about the same axes.
+
+        The sum with the number 0 is the law itself, so that ``sum`` accepts laws. The class
+        `StateTorque` has the sum of a law and a torque that depends on the state. Raise InputError
+        if the axes are different, or if a sum overflows.
+        """
+        if type(other) is int and other == 0:
+            return self
+        if not isinstance(other, TorqueLaw):
+            return NotImplemented
+        if self.is_zero or other.is_zero:
+            return other if self.is_zero else self
+        if self.frame != other.frame:
+            raise InputError(
+                "[torque]: the sum of a law about the axes of the body and a law about the axes of "
+                "space is no law; allowed: pyharness.torques.in_space(law) for the second"
+            )
+        return TorqueLaw(
+            [a + b for a, b in zip(self.constant, other.constant, strict=True)],
+            [a + b for a, b in zip(self.rate, other.rate, strict=True)],
+            self.sines + other.sines,
+            self.cosines + other.cosines,
+            self.frame,
+        )
+
+    __radd__ = __add__
+
     @property
     def needs_attitude(self) -> bool:
         """Whether the torque about the body axes depends on the attitude."""

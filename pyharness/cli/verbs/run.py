@@ -56,7 +56,9 @@ def run(options: argparse.Namespace) -> int:
     relative tolerance of the method. Otherwise return 0.
     """
     by_method = options.method is not None
-    scene = shared.chosen_scene(options, any_axes=by_method, any_torque=by_method)
+    scene = shared.chosen_scene(
+        options, any_axes=by_method, any_torque=by_method, any_state=by_method
+    )
     if (options.program is None) == (options.method is None):
         from pyharness.methods.registry import METHODS
 

@@ -1,0 +1,195 @@
+"""Torque terms of fields in space: gravity gradient, magnetic field, and torques fixed in space."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from pyharness.dynamics.term_input import inertia_of, law_of_vector
+from pyharness.model.law_symbols import law_derivative, law_value, to_body
+from pyharness.model.state_torque import StateTorque, replayed
+from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.values import Number, Numbers, finite, three
+
+
+def gravity_gradient(inertia: Numbers | Iterable[Numbers], rate: Number) -> StateTorque:
+    """Return the torque of the gravity gradient, 3 n^2 r x I r, in a circular orbit.
+
+    The unit vector r points from the centre of attraction to the body. At the time t it is
+    (cos n t, sin n t, 0) about the axes of space, so that the orbit is in the plane of the first
+    two axes and is described from the first to the second. The torque is in equilibrium if a
+    principal axis is along r. In the plane of the orbit that equilibrium is stable if this axis has
+    a smaller moment than the other principal axis in the plane.
+
+    Parameters
+    ----------
+    inertia : three numbers, or three rows of three numbers
+        The moments or the inertia matrix (kg m2) of the body, about the axes of the scene.
+    rate : float
+        The rate n of the orbit (rad/s).
+
+    Returns
+    -------
+    StateTorque
+        The torque about the body axes (N m).
+
+    Raises
+    ------
+    InputError
+        If `inertia` is not as in a scene, or `rate` is not finite.
+
+    References
+    ----------
+    P. C. Hughes, Spacecraft Attitude Dynamics, 1986, section 8.1.
+
+    Examples
+    --------
+    >>> from pyharness.torques import gravity_gradient
+    >>> torque = gravity_gradient((1.0, 2.0, 3.0), rate=2.0)
+    >>> [round(x, 6) for x in torque.at(0.0, (0.0, 0.0, 0.0), (0.1, 0.5, 0.5, 0.7))]
+    [3.456, 9.216, -2.0736]
+    """
+    (a, f, e), (_, b, d), (_, _, c) = inertia_of("[torque] gravity gradient inertia", inertia)
+    n = finite("[torque] gravity gradient rate", rate)
+
+    def torque(time: Any, omega: Any, attitude: Any) -> Any:
+        angle = n * time
+        x, y, z = to_body((np.cos(angle), np.sin(angle), 0.0), attitude)
+        # Only differences of moments occur, so that nearly equal moments cancel exactly.
+        return [
+            3.0 * n * n * each
+            for each in (
+                (c - b) * (y * z) + e * (x * y) - f * (x * z) + d * (y * y - z * z),
+                (a - c) * (z * x) + f * (y * z) - d * (x * y) + e * (z * z - x * x),
+                (b - a) * (x * y) + d * (x * z) - e * (y * z) + f * (x * x - y * y),
+            )
+        ]
+
+    return replayed(torque)
+
+
+def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
+    """Return the torque m x b on a magnetic dipole that is fixed in the body.
+
+    The field is b = R^T B, where B has components about the axes of space, and R is the rotation
+    from body to space.
+
+    Parameters
+    ----------
+    moment : three numbers
+        The moment m of the dipole about the body axes (A m2).
+    field : three numbers, or TorqueLaw
+        The magnetic field B about the axes of space (T). A field that depends on time is a
+        `TorqueLaw` with ``frame="space"``, whose numbers are in tesla instead of N m.
+
+    Returns
+    -------
+    StateTorque
+        The torque about the body axes (N m).
+
+    Raises
+    ------
+    InputError
+        If an argument is of another form, a number is not finite, or the law has another frame.
+
+    References
+    ----------
+    J. R. Wertz (editor), Spacecraft Attitude Determination and Control, 1978, section 17.2.
+
+    Examples
+    --------
+    >>> from pyharness.torques import magnetic_dipole
+    >>> compass = magnetic_dipole((0.0, 0.0, 2.0), field=(0.5, 0.0, 0.0))
+    >>> compass.at(0.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    (0.0, 1.0, 0.0)
+    """
+    dipole = np.array(three("[torque] magnetic dipole moment", moment))
+    law = law_of_vector("[torque] magnetic dipole field", field, "space")
+    return replayed(
+        lambda time, omega, attitude: np.cross(dipole, to_body(law_value(law, time), attitude))
+    )
+
+
+def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
+    """Return the torque m x b of coils that damp the rotation in a magnetic field.
+
+    The coils have the moment m = -k b', where b' is the rate of the field b = R^T B about the body
+    axes, which a magnetometer in the body measures. This rate is R^T B' - omega x b. In a constant
+    field the torque is -k (|b|^2 omega - (omega . b) b). It damps the part of omega that is
+    perpendicular to the field. In a field that rotates in space, the body finally rotates with it.
+
+    Parameters
+    ----------
+    gain : float
+        The gain k (A m2 s/T).
+    field : three numbers, or TorqueLaw
+        The magnetic field B about the axes of space (T), as in `magnetic_dipole`.
+
+    Returns
+    -------
+    StateTorque
+        The torque about the body axes (N m).
+
+    Raises
+    ------
+    InputError
+        If an argument is of another form, a number is not finite, or the law has another frame.
+
+    References
+    ----------
+    A. C. Stickler and K. T. Alfriend, Elementary magnetic attitude control system, Journal of
+    Spacecraft and Rockets 13(5), 1976, 282-287.
+
+    Examples
+    --------
+    >>> from pyharness.torques import magnetic_damping
+    >>> coils = magnetic_damping(2.0, field=(0.0, 0.0, 0.5))
+    >>> coils.at(0.0, (1.0, 0.0, 3.0), (1.0, 0.0, 0.0, 0.0))
+    (-0.5, 0.0, 0.0)
+    """
+    factor = finite("[torque] magnetic damping gain", gain)
+    law = law_of_vector("[torque] magnetic damping field", field, "space")
+    change = law_derivative(law)
+
+    def torque(time: Any, omega: Any, attitude: Any) -> Any:
+        b = to_body(law_value(law, time), attitude)
+        rate = to_body(law_value(change, time), attitude) - np.cross(omega, b)
+        return np.cross(-factor * rate, b)
+
+    return replayed(torque)
+
+
+def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
+    """Return the torque R^T N, where N has components about the axes of space.
+
+    It is meant for sums with other torques. A scene whose whole torque is a
+    ``TorqueLaw(..., frame="space")`` is solved faster, and has the same motion.
+
+    Parameters
+    ----------
+    torque : three numbers, or TorqueLaw
+        The torque N (N m), or a law of it with ``frame="space"``.
+
+    Returns
+    -------
+    StateTorque
+        The torque about the body axes (N m).
+
+    Raises
+    ------
+    InputError
+        If `torque` is of another form, a number is not finite, or the law has another frame.
+
+    References
+    ----------
+    H. Goldstein, C. Poole and J. Safko, Classical Mechanics, 3rd edition, 2002, section 4.9.
+
+    Examples
+    --------
+    >>> from pyharness.torques import in_space
+    >>> torque = in_space((1.0, 0.0, 0.0))
+    >>> torque.at(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+    (-1.0, 0.0, 0.0)
+    """
+    law = law_of_vector("[torque] in space", torque, "space")
+    return replayed(lambda time, omega, attitude: to_body(law_value(law, time), attitude))

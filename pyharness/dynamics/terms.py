@@ -1,0 +1,260 @@
+"""Torque terms for damping, control and wheels, with components about the body axes."""
+
+from collections.abc import Iterable
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from pyharness.dynamics.term_input import law_of_vector, matrix_of
+from pyharness.model.attitude import IDENTITY, product, unit_quaternion
+from pyharness.model.errors import InputError
+from pyharness.model.law_symbols import law_integral, law_value
+from pyharness.model.state_torque import StateTorque, replayed
+from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.values import Number, Numbers, number_list, three
+
+# A number stands for a multiple of the identity matrix, three numbers for a diagonal matrix.
+MatrixLike = Number | Numbers | Iterable[Numbers]
+_MOST_COEFFICIENTS = 50
+
+
+def damping(matrix: MatrixLike) -> StateTorque:
+    """Return the torque -D omega of linear damping.
+
+    The body loses the power omega . D omega (W), which is never negative if the symmetric part of D
+    is positive semidefinite.
+
+    Parameters
+    ----------
+    matrix : number, three numbers, or three rows of three numbers
+        The matrix D (N m s); a number is a multiple of the identity matrix, and three numbers are
+        the elements of a diagonal matrix.
+
+    Returns
+    -------
+    StateTorque
+        The torque about the body axes (N m).
+
+    Raises
+    ------
+    InputError
+        If `matrix` is of another form, or a number is not finite.
+
+    References
+    ----------
+    H. Goldstein, C. Poole and J. Safko, Classical Mechanics, 3rd edition, 2002, section 1.5
+    (Rayleigh's dissipation function).
+
+    Examples
+    --------
+    >>> from pyharness.torques import damping
+    >>> damping([0.5, 0.25, 0.125]).at(0.0, (1.0, 2.0, 4.0), (1.0, 0.0, 0.0, 0.0))
+    (-0.5, -0.5, -0.5)
+    """
+    found = matrix_of("[torque] damping matrix", matrix)
+    return replayed(lambda time, omega, attitude: -(found @ omega))
+
+
+def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTorque:
+    """Return a torque of drag that is an odd polynomial of omega.
+
+    The torque is the sum over n = 0, 1, 2, ... of -C_n |omega|^(2n) omega, where C_n is coefficient
+    number n. If `per_axis` is true, it is the sum of -C_n v_n, where the vector v_n has the
+    components omega_i^(2n+1). The list ``[0, k]`` is therefore a cubic drag. Quadratic drag,
+    -k |omega| omega, is not smooth at omega = 0, and is no such polynomial; a function that the
+    user writes with ``numpy.sqrt`` can have it, for an omega that does not vanish.
+
+    Parameters
+    ----------
+    coefficients : iterable of numbers, three numbers, or three rows of three numbers
+        The coefficients C_0, C_1, ..., at least one and at most 50. The unit of C_n is
+        N m (s/rad)^(2n+1). Each is a matrix in the form that `damping` accepts.
+    per_axis : bool
+        Whether the powers are those of the components, instead of those of |omega|.
+
+    Returns
+    -------
+    StateTorque
+        The torque about the body axes (N m).
+
+    Raises
+    ------
+    InputError
+        If `coefficients` is no list, or has no coefficient or too many, or if a coefficient is of
+        another form.
+
+    References
+    ----------
+    S. H. Strogatz, Nonlinear Dynamics and Chaos, 2nd edition, 2015, section 7.2 (cubic damping).
+
+    Examples
+    --------
+    >>> from pyharness.torques import drag
+    >>> drag([0.0, 0.5]).at(0.0, (1.0, 2.0, 2.0), (1.0, 0.0, 0.0, 0.0))
+    (-4.5, -9.0, -9.0)
+    >>> drag([0.0, 0.5], per_axis=True).at(0.0, (1.0, 2.0, 2.0), (1.0, 0.0, 0.0, 0.0))
+    (-0.5, -4.0, -4.0)
+    """
+    where = "[torque] drag coefficients"
+    allowed = f"allowed: a list of 1 to {_MOST_COEFFICIENTS} coefficients"
+    given = list(islice(number_list(where, coefficients, allowed), _MOST_COEFFICIENTS + 1))
+    if not 1 <= len(given) <= _MOST_COEFFICIENTS:
+        count = f"more than {_MOST_COEFFICIENTS}" if given else "no"
+        raise InputError(f"{where}: {count} coefficients; {allowed}")
+    matrices = [matrix_of(f"{where}, number {n}", each) for n, each in enumerate(given)]
+
+    def torque(time: Any, omega: Any, attitude: Any) -> Any:
+        square = omega * omega if per_axis else omega @ omega
+        power, total = omega, -(matrices[0] @ omega)
+        for matrix in matrices[1:]:
+            power = square * power
+            total = total - matrix @ power
+        return total
+
+    return replayed(torque)
+
+
+def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTorque:
+    """Return the torque -K (omega - target), which controls the angular velocity.
+
+    Under this torque alone, with a positive definite K, the angular velocity approaches a target
+    about a principal axis, or the target 0, from every start that is near enough.
+
+    Parameters
+    ----------
+    gain : number, three numbers, or three rows of three numbers
+        The matrix K (N m s), in the form that `damping` accepts.
+    target : three numbers
+        The desired angular velocity about the body axes (rad/s).
+
+    Returns
+    -------
+    StateTorque
+        The torque about the body axes (N m).
+
+    Raises
+    ------
+    InputError
+        If an argument is of another form, or a number is not finite.
+
+    References
+    ----------
+    B. Wie, Space Vehicle Dynamics and Control, 2nd edition, 2008, chapter 7.
+
+    Examples
+    --------
+    >>> from pyharness.torques import rate_control
+    >>> rate_control(2.0, (0.0, 0.0, 1.0)).at(0.0, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0))
+    (-2.0, -4.0, -4.0)
+    """
+    matrix = matrix_of("[torque] rate control gain", gain)
+    wanted = np.array(three("[torque] rate control target", target))
+    return replayed(lambda time, omega, attitude: -(matrix @ (omega - wanted)))
+
+
+def attitude_control(
+    stiffness: MatrixLike, gain: MatrixLike, target: Numbers = IDENTITY
+) -> StateTorque:
+    """Return the torque -2 k e0 e - K omega, which rotates the body to a target attitude.
+
+    The error quaternion (e0, e) is target* q, where q is the attitude. A quaternion and its
+    negative are one attitude, and the torque is the same for both; the body therefore does not
+    unwind. For a number k the first term is -k sin(angle) about the axis of the error, and has the
+    potential energy k (1 - cos(angle)). A body that is turned by 180 degrees is in an unstable
+    equilibrium.
+
+    Parameters
+    ----------
+    stiffness : number, three numbers, or three rows of three numbers
+        The matrix k (N m), in the form that `damping` accepts.
+    gain : number, three numbers, or three rows of three numbers
+        The matrix K (N m s) of the damping.
+    target : four numbers
+        The desired attitude, a quaternion from body to space, scalar first. It is normalised.
+
+    Returns
+    -------
+    StateTorque
+        The torque about the body axes (N m).
+
+    Raises
+    ------
+    InputError
+        If an argument is of another form, a number is not finite, or `target` is 0.
+
+    References
+    ----------
+    N. A. Chaturvedi, A. K. Sanyal and N. H. McClamroch, Rigid-body attitude control, IEEE Control
+    Systems Magazine 31(3), 2011, 30-51.
+
+    Examples
+    --------
+    >>> from pyharness.torques import attitude_control
+    >>> control = attitude_control(5.0, 1.0)
+    >>> control.at(0.0, (0.0, 2.0, 3.0), (0.8, 0.6, 0.0, 0.0))
+    (-4.8, -2.0, -3.0)
+    """
+    where = "[torque] attitude control"
+    spring = matrix_of(f"{where} stiffness", stiffness)
+    brake = matrix_of(f"{where} gain", gain)
+    (a, b, c, d), _ = unit_quaternion(f"{where} target", target)
+
+    def torque(time: Any, omega: Any, attitude: Any) -> Any:
+        scalar, *vector = product((a, -b, -c, -d), tuple(attitude))
+        half_sine = np.array([scalar * each for each in vector], dtype=object)
+        return -2.0 * (spring @ half_sine) - brake @ omega
+
+    return replayed(torque)
+
+
+def wheels(momentum: Numbers, motor: TorqueLaw | Numbers | None = None) -> StateTorque:
+    """Return the torque -omega x h - u of wheels, which store the momentum h, on the body.
+
+    The motors exert the torque u on the wheels, so that h' = u. The momentum h at the time t is
+    `momentum` plus the integral of u from 0 to t. Without motors h is constant: the body is a
+    gyrostat.
+
+    The vector h is the absolute momentum of the wheels about their own axes, and the inertia of the
+    scene excludes the moments of the wheels about these axes. The same equations hold if h is the
+    momentum relative to the body, u is its rate, and the inertia includes these moments.
+
+    Parameters
+    ----------
+    momentum : three numbers
+        The momentum of the wheels at time 0, about the body axes (N m s).
+    motor : TorqueLaw or three numbers, optional
+        The torque u (N m) of the motors on the wheels, about the body axes.
+
+    Returns
+    -------
+    StateTorque
+        The torque about the body axes (N m).
+
+    Raises
+    ------
+    InputError
+        If an argument is of another form, a number is not finite, or `motor` is about the axes of
+        space.
+
+    References
+    ----------
+    P. C. Hughes, Spacecraft Attitude Dynamics, 1986, chapters 3 and 6.
+
+    Examples
+    --------
+    >>> from pyharness.torques import wheels
+    >>> wheels((1.0, 0.0, 2.0)).at(0.0, (1.0, 3.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    (-6.0, 2.0, 3.0)
+    >>> spinning_up = wheels((1.0, 0.0, 2.0), motor=(0.0, 0.0, 0.5))
+    >>> spinning_up.at(2.0, (1.0, 3.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    (-9.0, 3.0, 2.5)
+    """
+    start = np.array(three("[torque] wheels momentum", momentum))
+    law = TorqueLaw() if motor is None else law_of_vector("[torque] wheels motor", motor, "body")
+
+    def torque(time: Any, omega: Any, attitude: Any) -> Any:
+        stored = start + law_integral(law, time)
+        return np.cross(stored, omega) - law_value(law, time)
+
+    return replayed(torque)

@@ -1,0 +1,272 @@
+"""Torques as text: three arithmetic expressions of time, omega and attitude, as in scene files.
+
+An expression is parsed to a syntax tree, and each node of the tree must be on a list of allowed
+nodes. The tree is evaluated with symbols, which record the operations. No text of a user is run as
+Python code.
+"""
+
+import ast
+import itertools
+import math
+import operator
+import re
+import warnings
+from collections.abc import Callable, Mapping
+from keyword import iskeyword
+from typing import Any
+
+from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.state_torque import StateTorque, law_of
+from pyharness.model.symbols import _MOST_POWER as MOST_POWER
+from pyharness.model.symbols import Recorder, Symbol
+from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.values import finite, number_list
+
+# The names of the inputs of a tape, in the order of its slots.
+INPUTS = ("t", "w1", "w2", "w3", "q0", "q1", "q2", "q3")
+FUNCTIONS = ("sqrt", "sin", "cos", "tan", "exp", "sinh", "cosh", "tanh")
+_LONGEST = 10_000
+_DEEPEST = 500
+_FOREIGN = re.compile(r"[^0-9A-Za-z_+\-*/()., \t\r\n]")
+_NAME = re.compile(r"[A-Za-z_][0-9A-Za-z_]*")
+_ALLOWED = (
+    f"allowed: numbers, names, + - * / ** and parentheses, and {', '.join(FUNCTIONS)} of one "
+    "argument"
+)
+_THREE = "allowed: a list of three texts, as in ['-0.1*w1', '0', 'sin(t)']"
+_SUM: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
+
+
+def parsed(expressions: object, constants: object) -> StateTorque | TorqueLaw:
+    """Return the torque of three expressions, the components about the body axes.
+
+    Parameters
+    ----------
+    expressions : list of three texts
+        Arithmetic of t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3 from body to space,
+        scalar first, pi, and the names in `constants`. Their value is in N m for a body with
+        moments or inertia, and in 1/s2 for a body with coefficients.
+    constants : mapping of text to number
+        Names, as in Python, and their finite values.
+
+    Returns
+    -------
+    StateTorque or TorqueLaw
+        A torque law if the expressions have the form of one, else the recorded torque.
+
+    Raises
+    ------
+    InputError
+        If a text is no such expression or a constant is invalid; the message names the place.
+    """
+    values = _checked_constants(constants)
+    texts = _three_texts(expressions)
+    recorder = Recorder()
+    inputs = dict(zip(INPUTS, recorder.inputs(), strict=True))
+    names = {**inputs, "pi": math.pi, **values}
+    components = [_component(text, names, place) for place, text in texts.items()]
+    tape = recorder.tape(components)
+    torque = StateTorque(
+        tape, None, tape.needs_attitude, tuple(texts.values()), tuple(values.items())
+    )
+    return law_of(torque) or torque
+
+
+def _checked_constants(constants: object) -> dict[str, float]:
+    where = "[torque.constants]"
+    if not isinstance(constants, Mapping):
+        raise InputError(f"{where} is {kind_of(constants)}; allowed: names and numbers")
+    values = {}
+    for name, value in constants.items():
+        if not isinstance(name, str):
+            raise InputError(f"{where}: a name is {kind_of(name)}; allowed: text")
+        if not _NAME.fullmatch(name) or iskeyword(name):
+            raise InputError(
+                f"{where}: '{_short(name)}' is no name; allowed: letters, digits and _, no digit "
+                "first, and no word of Python's grammar"
+            )
+        if name in (*INPUTS, "pi", *FUNCTIONS):
+            raise InputError(
+                f"{where}: '{name}' has a meaning in expressions already; give the constant "
+                "another name"
+            )
+        values[name] = finite(f"{where} {_short(name)}", value)
+    return values
+
+
+def _three_texts(expressions: object) -> dict[str, str]:
+    """Return the expressions by place, each in one line."""
+    where = "[torque] expression"
+    given = list(itertools.islice(number_list(where, expressions, _THREE), 4))
+    if len(given) != 3:
+        count = "more than 3" if len(given) > 3 else len(given)
+        raise InputError(f"{where}: {count} entries; {_THREE}")
+    texts = {}
+    for number, text in enumerate(given, 1):
+        place = f"{where} {number}"
+        if not isinstance(text, str):
+            raise InputError(f"{place} is {kind_of(text)}; it must be text, as in '-0.1*w1'")
+        if len(text) > _LONGEST:
+            raise InputError(
+                f"{place}: {len(text)} characters; allowed: at most {_LONGEST} characters"
+            )
+        if foreign := _FOREIGN.search(text):
+            character = foreign[0]
+            if character.isspace():  # a message shows white space as a blank
+                character = character.encode("unicode_escape").decode()
+            raise InputError(f"{place}: unknown character '{character}'; {_ALLOWED}")
+        texts[place] = " ".join(text.split())
+    return texts
+
+
+def _component(text: str, names: Mapping[str, Any], place: str) -> Any:
+    """Return the value of an expression, a symbol or a float; `names` are the values of names."""
+    found: dict[ast.AST, Any] = {}
+    # A node follows its parent in the list. A loop, unlike recursion, needs no depth of the stack.
+    for node in reversed(_nodes(text, place)):
+        try:
+            value = _value(node, found, names, place)
+        except OverflowError:
+            raise _overflow(place) from None
+        except ZeroDivisionError:
+            raise InputError(f"{place}: division by the constant 0") from None
+        if isinstance(value, Symbol) and not value.linear().terms:
+            value = value.linear().constant
+        if isinstance(value, float) and not math.isfinite(value):
+            raise _overflow(place)
+        found[node] = value
+    return value
+
+
+def _tree(text: str, place: str) -> ast.expr:
+    """Return the syntax tree of an expression."""
+    if not text:
+        raise InputError(f"{place} is empty; write '0' for no torque about this axis")
+    try:
+        with warnings.catch_warnings():
+            # Python warns of text such as "2(t)", which is refused below.
+            warnings.simplefilter("ignore")
+            return ast.parse(text, mode="eval").body
+    except (RecursionError, MemoryError):
+        raise _too_deep(place) from None
+    except (SyntaxError, ValueError) as error:
+        # The message of Python is not shown: it speaks of statements and of memory.
+        at = getattr(error, "offset", None) or 1
+        near = text[max(at - 1, 0) :] or text
+        raise InputError(
+            f"{place}: no arithmetic expression, at '{_short(near)}'; {_ALLOWED}"
+        ) from None
+
+
+def _nodes(text: str, place: str) -> list[ast.expr]:
+    """Return the nodes of the syntax tree of an expression, each after its parent.
+
+    Raise InputError if one of them is not allowed.
+    """
+    nodes, waiting = [], [(_tree(text, place), 1)]
+    while waiting:
+        node, depth = waiting.pop()
+        if depth > _DEEPEST:
+            raise _too_deep(place)
+        nodes.append(node)
+        waiting += [(each, depth + 1) for each in _operands(node, text, place)]
+    return nodes
+
+
+def _operands(node: ast.expr, text: str, place: str) -> list[ast.expr]:
+    match node:
+        case ast.BinOp(left, op, right) if type(op) in _SUM or isinstance(op, ast.Pow):
+            return [left, right]
+        case ast.UnaryOp(ast.UAdd() | ast.USub(), operand):
+            return [operand]
+        case ast.Call(ast.Name(name), arguments, keywords):
+            if name not in FUNCTIONS:
+                raise unknown("function", name, FUNCTIONS, place)
+            if len(arguments) != 1 or keywords:
+                raise InputError(f"{place}: {name} of {len(arguments)} arguments; allowed: one")
+            return arguments
+        case ast.Name():
+            return []
+        case ast.Constant(value) if type(value) in (int, float):
+            return []
+    shown = _short(text[node.col_offset : node.end_col_offset])
+    raise InputError(f"{place}: '{shown}' is not allowed; {_ALLOWED}")
+
+
+def _value(
+    node: ast.expr, found: Mapping[ast.AST, Any], names: Mapping[str, Any], place: str
+) -> Any:
+    """Return the value of a node, a symbol or a float; `found` has the values of its operands."""
+    try:
+        match node:
+            case ast.Constant(value):
+                return float(value)  # type: ignore[arg-type]
+            case ast.Name(name):
+                return _named(name, names, place)
+            case ast.UnaryOp(op, operand):
+                return -found[operand] if isinstance(op, ast.USub) else found[operand]
+            case ast.BinOp(left, ast.Pow(), right):
+                return _power(found[left], found[right], place)
+            case ast.BinOp(left, op, right):
+                return _SUM[type(op)](found[left], found[right])
+            case ast.Call(ast.Name(name), [argument]):
+                return _function(name, found[argument], place)
+    except InputError as error:
+        # Symbols do not know in which expression they are.
+        message = str(error)
+        if message.startswith("[torque]: "):
+            raise InputError(f"{place}: {message.removeprefix('[torque]: ')}") from None
+        raise
+    raise AssertionError(node)
+
+
+def _named(name: str, names: Mapping[str, Any], place: str) -> Any:
+    if name in names:
+        return names[name]
+    if name in FUNCTIONS:
+        raise InputError(f"{place}: {name} without an argument; write {name}(...)")
+    raise unknown("name", name, [*names, *FUNCTIONS], place)
+
+
+def _power(base: Any, exponent: Any, place: str) -> Any:
+    allowed = f"allowed: a whole number up to {MOST_POWER}, or 0.5"
+    if isinstance(exponent, Symbol):
+        raise InputError(f"{place}: the exponent of ** is not constant; {allowed}, or exp(...)")
+    if isinstance(base, Symbol):
+        if exponent != 0.5 and (exponent != int(exponent) or abs(exponent) > MOST_POWER):
+            raise InputError(f"{place}: the exponent of ** is {exponent:g}; {allowed}")
+        return base**exponent
+    try:
+        return math.pow(base, exponent)
+    except ValueError:
+        if base == 0.0:
+            raise ZeroDivisionError from None
+        raise InputError(f"{place}: the constant {base:g} has no real power {exponent:g}") from None
+
+
+def _function(name: str, argument: Any, place: str) -> Any:
+    if isinstance(argument, Symbol):
+        return getattr(argument, name)()
+    if name == "sqrt" and argument < 0.0:
+        raise InputError(f"{place}: square root of the constant {argument:g}")
+    return getattr(math, name)(argument)
+
+
+def _overflow(place: str) -> InputError:
+    return InputError(f"{place}: a constant is too large for binary64")
+
+
+def _too_deep(place: str) -> InputError:
+    return InputError(
+        f"{place}: nested too deeply; allowed: at most {_DEEPEST} levels, where each term of a sum "
+        "is one more (parentheses make a long sum less deep)"
+    )
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 40 else text[:37] + "..."

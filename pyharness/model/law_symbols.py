@@ -1,0 +1,72 @@
+"""Torque laws in symbols: the value of a law, its integral over time, and its derivative.
+
+A law here is any vector that has the form of a `TorqueLaw`: a torque, or a magnetic field.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.trajectory import Array
+
+
+def law_value(law: TorqueLaw, time: Any) -> Array:
+    """Return the three components of a law at a time, which is a symbol, about the law's axes."""
+    found: list[Any] = [c + r * time for c, r in zip(law.constant, law.rate, strict=True)]
+    waves = [(amplitude, np.sin(frequency * time)) for amplitude, frequency in law.sines]
+    waves += [(amplitude, np.cos(frequency * time)) for amplitude, frequency in law.cosines]
+    for amplitude, wave in waves:
+        found = [each + a * wave for each, a in zip(found, amplitude, strict=True)]
+    return np.array(found, dtype=object)
+
+
+def law_integral(law: TorqueLaw, time: Any) -> Array:
+    """Return the integral of a law from time 0 to a time, which is a symbol: three components."""
+    square = time * time
+    found: list[Any] = [
+        c * time + 0.5 * r * square for c, r in zip(law.constant, law.rate, strict=True)
+    ]
+    for amplitude, frequency in law.sines:
+        if frequency:
+            # It is (1 - cos(f t))/f, without its cancellation for small angles.
+            half = np.sin(0.5 * frequency * time)
+            wave = half * half
+            found = [x + 2.0 * a / frequency * wave for x, a in zip(found, amplitude, strict=True)]
+    for amplitude, frequency in law.cosines:
+        wave = np.sin(frequency * time) if frequency else time
+        divisor = frequency or 1.0
+        found = [x + a / divisor * wave for x, a in zip(found, amplitude, strict=True)]
+    return np.array(found, dtype=object)
+
+
+def law_derivative(law: TorqueLaw) -> TorqueLaw:
+    """Return the derivative of a law with respect to time, about the same axes.
+
+    Raise InputError if the product of an amplitude and its frequency overflows.
+    """
+    sines = [([-f * a for a in amplitude], f) for amplitude, f in law.cosines]
+    cosines = [([f * a for a in amplitude], f) for amplitude, f in law.sines]
+    return TorqueLaw(law.rate, sines=sines, cosines=cosines, frame=law.frame)
+
+
+def to_body(vector: Any, attitude: Any) -> Array:
+    """Return a vector about the body axes, from its three components about the axes of space.
+
+    `attitude` is a unit quaternion from body to space, scalar first. Both may be symbols. The
+    matrix of the rotation is written out, because terms of one torque then share its products.
+    """
+    u, v, w = vector
+    a, x, y, z = attitude
+    rows = (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + a * z), 2.0 * (x * z - a * y)),
+        (2.0 * (x * y - a * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + a * x)),
+        (2.0 * (x * z + a * y), 2.0 * (y * z - a * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
+    return np.array([p * u + q * v + s * w for p, q, s in rows], dtype=object)
+
+
+def body_torque(law: TorqueLaw, time: Any, attitude: Any) -> Array:
+    """Return the components about the body axes of a law at a time; all arguments are symbols."""
+    value = law_value(law, time)
+    return to_body(value, attitude) if law.in_space else value

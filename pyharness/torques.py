@@ -1,0 +1,28 @@
+"""Torques that depend on the state of the body: ready terms, which can be added.
+
+A sum of terms, of torque laws about the body axes, and of Python functions is a torque for
+`pyharness.Scene`. At least one of two summands must be a term.
+"""
+
+from pyharness.dynamics.field_terms import (
+    gravity_gradient,
+    in_space,
+    magnetic_damping,
+    magnetic_dipole,
+)
+from pyharness.dynamics.terms import attitude_control, damping, drag, rate_control, wheels
+from pyharness.model.state_torque import opaque, recorded
+
+__all__ = [
+    "attitude_control",
+    "damping",
+    "drag",
+    "gravity_gradient",
+    "in_space",
+    "magnetic_damping",
+    "magnetic_dipole",
+    "opaque",
+    "rate_control",
+    "recorded",
+    "wheels",
+]

@@ -1,0 +1,268 @@
+"""Every verb with a scene whose torque depends on the state: it works, or refuses in one line."""
+
+import re
+import shlex
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import (
+    InputError,
+    Scene,
+    StateTorque,
+    case_scene,
+    compare_programs,
+    opaque,
+    prepare,
+    principal,
+    read_scene,
+    run_many,
+    run_program,
+    solve,
+    solve_many,
+    subset,
+)
+from pyharness.checks.external_file import read_problem
+from pyharness.cli.main import VERBS, main
+from pyharness.cli.parser import Parser
+from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.methods.registry import METHODS
+from pyharness.model.expressions import parsed
+from pyharness.model.scene import STATE_TORQUE
+from pyharness.theory.rotations import steady_rotations
+
+DAMPED = """\
+name = "damped"
+[body]
+moments = [40.0, 30.0, 20.0]
+[initial]
+omega = [0.1, 1.0, 1.0]
+[torque]
+expression = ["-k*w1", "-k*w2 + 0.1*w1*w3", "-k*w3"]
+constants = { k = 0.1 }
+[run]
+step_size = 0.01
+steps = 5
+"""
+# The verbs that take no torque that depends on the state, each with some of its options.
+REFUSED = (
+    "compare", "compare --ablate", "compare --word cdc48",
+    "compare --program two-term --format json", "limits", "family",
+    "family --terms 1 --weighting galerkin", "rotations", "rotations --format json",
+    "run --program two-term", "run --program four-term --implementation python",
+    "run --program runge-kutta --word cdc48", "run --program two-term --attitude quaternion",
+    "run --program two-term --format printer", "run --program two-term --format tape5",
+)  # fmt: skip
+ONES = np.ones((4, 3))
+CORRECTED = subset("two-term")
+
+
+@pytest.fixture
+def damped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Scene:
+    monkeypatch.chdir(tmp_path)
+    Path("damped.toml").write_text(DAMPED)
+    return read_scene("damped.toml")
+
+
+@pytest.mark.usefixtures("damped")
+@pytest.mark.parametrize("command", REFUSED)
+def test_verb_refuses_a_torque_that_depends_on_the_state(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    verb, _, options = command.partition(" ")
+    assert main(shlex.split(f"{verb} --scene damped.toml {options}")) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err == f"pyharness: {STATE_TORQUE}\n"
+    assert [path.name for path in Path().iterdir()] == ["damped.toml"]
+
+
+EXTERNAL = """\
+title = "damped"
+source = "us"
+where = "here"
+conditions = "none"
+[body]
+moments = [3.0, 2.0, 1.0]
+[initial]
+omega = [1.0, 2.0, 3.0]
+[torque]
+expression = ["-w1", "0", "0"]
+[[value]]
+time = "1"
+omega = ["0.5", "", ""]
+"""
+
+
+def test_problem_with_published_numbers_refuses_a_torque_that_depends_on_the_state(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "damped.toml"
+    path.write_text(EXTERNAL)
+    assert main(["verify", "--external", str(path)]) == 2
+    message = f"pyharness: external file '{path}': {STATE_TORQUE}\n"
+    assert capsys.readouterr().err == message
+    path.write_text(EXTERNAL.replace("-w1", "1"))
+    assert read_problem(path).scene.body_torque.constant == (1.0, 0.0, 0.0)
+
+
+def test_every_verb_with_a_scene_is_tried() -> None:
+    """The verb `plan`, and `run` with other methods, are tried with the methods that they need."""
+    with_scene = {verb for verb in VERBS if "--scene FILE" in Parser(verb).module.OPTIONS}
+    assert with_scene == {command.split()[0] for command in REFUSED} | {"plan"}
+
+
+@pytest.mark.usefixtures("damped")
+def test_law_in_expressions_gives_the_output_of_the_law(capsys: pytest.CaptureFixture[str]) -> None:
+    head, _, rest = DAMPED.partition("expression")
+    tail = rest[rest.index("[run]") :]
+    Path("law.toml").write_text(f"{head}constant = [1.0, 0.0, 0.0]\nrate = [0.0, 2.0, 0.0]\n{tail}")
+    Path("text.toml").write_text(f'{head}expression = ["sqrt(1)", "2*t", "w1 - w1"]\n{tail}')
+    for command in (
+        "run --program two-term",
+        "run --method auto",
+        "plan",
+        "compare --program four-term",
+    ):
+        verb, _, options = command.partition(" ")
+        shown = []
+        for name in ("law", "text"):
+            status = main(shlex.split(f"{verb} --scene {name}.toml {options} --format json"))
+            assert status == 0
+            shown.append(capsys.readouterr().out)
+        assert _without_times(shown[0]) == _without_times(shown[1])
+
+
+def _without_times(text: str) -> list[str]:
+    return [line for line in text.splitlines() if '"seconds' not in line]
+
+
+CALLS: dict[str, Callable[[Scene], Any]] = {
+    "run_program": lambda scene: run_program(scene, CORRECTED),
+    "run_program, twin": lambda scene: run_program(scene, CORRECTED, implementation="python"),
+    "run_program, word": lambda scene: run_program(
+        scene, CORRECTED, implementation="python", word="cdc48"
+    ),
+    "run_many": lambda scene: run_many(scene, CORRECTED, omega0=ONES),
+    "run_many, torques": lambda scene: run_many(scene, CORRECTED, torque_constant=ONES),
+    "compare_programs": compare_programs,
+    "steady_rotations": lambda scene: steady_rotations(scene, 1e-3),
+    "right_hand_side": lambda scene: scene.right_hand_side(),
+}
+SCENES = {
+    "omega": ["-0.1*w1", "0", "0"],
+    "attitude": ["q0*q1", "0", "0"],
+    "time": ["sin(t)**2", "0", "0"],
+}
+
+
+@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("kind", [*SCENES, "opaque", "inertia"])
+def test_function_refuses_a_torque_that_depends_on_the_state(call: str, kind: str) -> None:
+    body: dict[str, Any] = {"moments": (1, 2, 3), "attitude": (1, 0, 0, 0)}
+    torque = opaque(lambda t, omega: omega) if kind == "opaque" else parsed(
+        SCENES.get(kind, SCENES["omega"]), {}
+    )  # fmt: skip
+    if kind == "inertia":
+        body = {"inertia": [[3, 0.1, 0], [0.1, 4, 0.2], [0, 0.2, 5]]}
+    scene = Scene(kind, (1, 2, 3), torque=torque, **body)
+    with pytest.raises(InputError, match=r"takes (a torque law|principal axes)"):
+        CALLS[call](scene)
+
+
+def _solved(method: str, scene: Scene) -> Any:
+    return solve(scene, 1.0, method).omega[-1]
+
+
+DECAY = ["-0.2*w1", "-0.2*w2", "-0.2*w3"]
+SOLVERS: dict[str, Callable[[Scene], Any]] = {
+    "solve": lambda scene: solve(scene, 1.0).omega[-1],
+    "attitude": lambda scene: solve(scene, 1.0, attitude=True).omega[-1],
+    "prepare": lambda scene: prepare(scene)(scene.omega, 1.0),
+    "prepare taylor": lambda scene: prepare(scene, "taylor")(scene.omega, 1.0),
+    "prepare attitude": lambda scene: prepare(scene, attitude=True)(scene.omega, 1.0)[0],
+    "solve_many": lambda scene: solve_many(scene, 1.0, omega0=[scene.omega]).omega[0],
+    "solve_many scenes": lambda scene: solve_many([case_scene(5), scene], 1.0).omega[1],
+    **{name: partial(_solved, name) for name in METHODS},
+}
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("body", ["moments", "inertia", "coefficients"])
+def test_method_solves_a_damped_sphere_or_refuses_it(solver: str, body: str) -> None:
+    """A sphere has a closed form under a torque law; it must not be taken for one here."""
+    bodies: dict[str, Any] = {
+        "moments": (2, 2, 2), "inertia": np.diag([2.0, 2.0, 2.0]), "coefficients": (0, 0, 0),
+    }  # fmt: skip
+    texts = DECAY if body != "coefficients" else [text.replace("0.2", "0.1") for text in DECAY]
+    torque = parsed(texts, {})
+    scene = Scene("sphere", (1.0, 2.0, 3.0), torque=torque, **{body: bodies[body]})
+    start = np.array(scene.omega)
+    try:
+        found = SOLVERS[solver](scene)
+    except InputError as error:
+        message = str(error)
+    else:
+        assert np.ravel(found) == pytest.approx(np.exp(-0.1) * start, rel=1e-5)
+        return
+    assert re.search("torque|principal axes", message)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_same_calls_solve_a_sphere_without_torque(solver: str) -> None:
+    scene = Scene("sphere", (1.0, 2.0, 3.0), moments=(2, 2, 2))
+    assert np.ravel(SOLVERS[solver](scene)) == pytest.approx(np.array(scene.omega))
+
+
+@pytest.mark.usefixtures("damped")
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("options", ["", "--attitude quaternion", "--times 1,2 --format json"])
+def test_run_with_a_method_shows_the_torque_or_refuses_it(
+    method: str, options: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status = main(shlex.split(f"run --scene damped.toml --method {method} {options}"))
+    captured = capsys.readouterr()
+    if status == 0:
+        assert "-k*w2 + 0.1*w1*w3" in captured.out
+    else:
+        assert status == 2
+        assert captured.out == ""
+        assert captured.err.startswith("pyharness: ")
+        assert captured.err.count("\n") == 1
+
+
+def test_principal_scene_has_the_torque_in_principal_axes() -> None:
+    """A point of the motion has the same torque in space in both scenes."""
+    matrix = [[3.0, 0.1, 0.0], [0.1, 4.0, 0.2], [0.0, 0.2, 5.0]]
+    torque = parsed(["-0.1*w1 + q1", "w1*w3", "0.5*q0*q0"], {})
+    scene = Scene("full", (1, 2, 3), inertia=matrix, torque=torque, attitude=(0.8, 0, 0.6, 0))
+    turned, axes = principal(scene)
+    assert turned.attitude is not None
+    assert scene.attitude is not None
+    assert isinstance(scene.torque, StateTorque)
+    assert isinstance(turned.torque, StateTorque)
+    old = scene.torque.at(0.5, scene.omega, scene.attitude)
+    new = turned.torque.at(0.5, turned.omega, turned.attitude)
+    assert axes @ np.array(new) == pytest.approx(np.array(old), abs=1e-14)
+
+
+@pytest.mark.usefixtures("damped")
+@pytest.mark.parametrize("scene", ['file = "damped.toml"', "tables"])
+def test_sweep_refuses_a_torque_that_depends_on_the_state(
+    scene: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = f"[scene]\n{scene}\n"
+    if scene == "tables":
+        table = "[scene.body]\nmoments = [3, 2, 1]\n[scene.initial]\nomega = [1, 2, 3]\n"
+        table += '[scene.torque]\nexpression = ["-w1", "0", "0"]\n'
+    axis = '[[axis]]\nfield = "omega.1"\nvalues = [1.0, 2.0]\n'
+    Path("sweep.toml").write_text(f'reductions = ["end"]\n{table}[solve]\nt_end = 1.0\n{axis}')
+    with pytest.raises(InputError, match="takes a torque law"):
+        read_sweep("sweep.toml")
+    assert main(["sweep", "sweep.toml", "--out", "store"]) == 2
+    assert STATE_TORQUE in capsys.readouterr().err
+    assert not Path("store").exists()

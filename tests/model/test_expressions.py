@@ -1,0 +1,322 @@
+"""Torques as text: their values, what is refused, and that no text raises another exception."""
+
+import math
+import random
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pyharness import InputError, Scene, StateTorque, TorqueLaw
+from pyharness.model.expressions import FUNCTIONS, INPUTS, parsed
+
+VALUES = (
+    "-0.1*w1", "2*sin(3*t)*q0", "w1*w2 - w2*w3", "-w1**2", "(-w1)**3", "w2**-2", "2*w3**0.5",
+    "k*w1 + wheel*w2", "1/w1/w2", "w1/(w2/w3)", "w1 - w2 - w3", "w1 - (w2 - w3)", "--w1", "+w3",
+    "2**3**2*w1", "-2**2*w1", "sqrt(1 + w1**2)", "sqrt(w1*w1 + w2*w2)", "tan(q1)", "sinh(w1 - w2)",
+    "cosh(k*t)", "tanh(w3)", "exp(-k*t)*cos(w2*t)", "pi*w1", "1_000*w1", "1e-3*w1", ".5*w2 + 1.",
+    "0x10*w1", "sin(t)**2", "sin(3*t + 1)", "t*w1", "t**2", "cos(cos(t))", "1/(2 + sin(t))",
+    "q0*q0 + q1*q1 - q2*q2 - q3*q3", "w1\n + w2", "\tw1 ", "7*k/3*w2", "exp(sin(w1)*cos(w2))",
+)  # fmt: skip
+CONSTANTS = {"k": 0.25, "wheel": 3, "_unused": -1.5}
+
+MISTAKES = {
+    "": "is empty",
+    " \n ": "is empty",
+    "w1 +": "no arithmetic expression",
+    "w1 w2": "no arithmetic expression, at 'w2'",
+    "3w1": "no arithmetic expression",
+    "(" * 3000: "no arithmetic expression",
+    "9" * 5000: "no arithmetic expression",
+    "9" * 4000: "too large for binary64",
+    "1e999": "too large for binary64",
+    "1e300*1e300": "too large for binary64",
+    "9**9**9**9": "too large for binary64",
+    "exp(1e4)": "too large for binary64",
+    "exp(1e4 + 0*t)": "too large for binary64",
+    "1e200*w1*1e200": "a constant overflows",
+    "1/0": "division by the constant 0",
+    "w1/(1 - 1)": "division by the constant 0",
+    "w1/(w2 - w2)": "division by the constant 0",
+    "0**-1": "division by the constant 0",
+    "w2/(1e-200*w1*1e-200)": "division by the constant 0",
+    "sqrt(-2)": "square root of the constant -2",
+    "sqrt(w1 - w1 - 2)": "square root of the constant -2",
+    "(-8)**(1/3)": "the constant -8 has no real power",
+    "2**w1": "the exponent of ** is not constant",
+    "w1**1.5": "the exponent of ** is 1.5; allowed: a whole number up to 1000",
+    "w1**1001": "the exponent of ** is 1001",
+    "x" * 10_001: "10001 characters; allowed: at most 10000",
+    "x" * 9999: "unknown name 'xxx",
+    "omega": "unknown name 'omega'; allowed: t, w1,",
+    "wheal*w1": "did you mean 'wheel'",
+    "w4": "unknown name 'w4'; did you mean 'w",
+    "__import__": "unknown name '__import__'",
+    "coss(t)": "unknown function 'coss'; did you mean 'cos'",
+    "pi(t)": "unknown function 'pi'",
+    "sin*t": "sin without an argument; write sin(...)",
+    "sin()": "sin of 0 arguments; allowed: one",
+    "sin(w1, w2)": "sin of 2 arguments; allowed: one",
+    "sin(**w1)": "sin of 0 arguments",
+    "sin(*w1)": "'*w1' is not allowed",
+    "2(t)": "'2(t)' is not allowed",
+    "sin(t)(t)": "'sin(t)(t)' is not allowed",
+    "w1.real": "'w1.real' is not allowed",
+    "w1 if t else w2": "'w1 if t else w2' is not allowed",
+    "1if t else 2": "is not allowed",
+    "w1 and w2": "'w1 and w2' is not allowed",
+    "not w1": "'not w1' is not allowed",
+    "w1 is w2": "'w1 is w2' is not allowed",
+    "w1//w2": "'w1//w2' is not allowed",
+    "await t": "'await t' is not allowed",
+    "yield": "no arithmetic expression",
+    "w1, w2": "'w1, w2' is not allowed",
+    "()": "'()' is not allowed",
+    "1j": "'1j' is not allowed",
+    "True": "'True' is not allowed",
+    "None": "'None' is not allowed",
+    "lambda: w1": "unknown character ':'",
+    "(x := 3)": "unknown character ':'",
+    "[w1]": "unknown character '['",
+    "'w1'": "unknown character '''",
+    'f"{w1}"': "unknown character '\"'",
+    "w1 < w2": "unknown character '<'",
+    "w1 % 2": "unknown character '%'",
+    "w1^2": "unknown character '^'",
+    "w1 # damping": "unknown character '#'",
+    "w1\\\n": "unknown character '\\'",
+    "w1\0": r"unknown character '\x00'",
+    "\u03c9": "unknown character '\u03c9'",
+    "w\u00b9": "unknown character '\u00b9'",
+    "\u00a0w1": "unknown character '\\xa0'",
+    "-" * 9999 + "1": "nested too deeply",
+    "-" * 600 + "1": "nested too deeply",
+    "+".join(["w1"] * 600): "nested too deeply; allowed: at most 500 levels",
+    "+".join(["w1"] * 3300): "nested too deeply",
+    "**".join(["w1"] * 2500): "nested too deeply",
+}  # fmt: skip
+
+
+def _torque(text: str, **constants: Any) -> StateTorque | TorqueLaw:
+    return parsed(["0", text, "0"], constants)
+
+
+def _value(torque: StateTorque | TorqueLaw, state: list[float]) -> float:
+    if isinstance(torque, TorqueLaw):
+        return torque.at(state[0])[1]
+    return torque.at(state[0], state[1:4], state[4:])[1]
+
+
+@pytest.mark.parametrize("text", VALUES)
+def test_value_is_that_of_the_same_text_in_python(text: str) -> None:
+    torque = _torque(text, **CONSTANTS)
+    source = random.Random(f"expressions {text}")
+    for _ in range(20):
+        state = [source.uniform(0.5, 1.5) for _ in INPUTS]
+        names = {name: getattr(math, name) for name in FUNCTIONS} | CONSTANTS | {"pi": math.pi}
+        names |= dict(zip(INPUTS, state, strict=True))
+        wanted = eval(" ".join(text.split()), {"__builtins__": {}}, names)
+        assert _value(torque, state) == pytest.approx(wanted, rel=1e-13, abs=1e-14)
+
+
+def _drawn(source: random.Random, depth: int) -> str:
+    """Return a random expression; its value is bounded, and so are those of its parts."""
+    if depth == 0:
+        return source.choice([*INPUTS, "pi", "k", f"{source.uniform(-2.0, 2.0)!r}"])
+    a, b = (_drawn(source, source.randrange(depth)) for _ in range(2))
+    return source.choice([
+        f"{a} + {b}", f"({a} - {b})", f"({a})*({b})", f"({a})/(2 + cos({b}))", f"-({a})**2",
+        f"sqrt(1 + ({a})**2)", f"exp(sin({a}))", f"tanh({a})", f"cos({a})", f"sin(1*({a}) - {b})",
+    ])  # fmt: skip
+
+
+def test_values_of_random_expressions_are_those_of_python() -> None:
+    source = random.Random("random expressions")
+    for _ in range(300):
+        text = _drawn(source, 6)
+        torque = parsed([text, text, "0"], {"k": 0.25})
+        state = [source.uniform(-1.0, 1.0) for _ in INPUTS]
+        names = {name: getattr(math, name) for name in FUNCTIONS} | {"k": 0.25, "pi": math.pi}
+        names |= dict(zip(INPUTS, state, strict=True))
+        wanted = eval(text, {"__builtins__": {}}, names)
+        assert _value(torque, state) == pytest.approx(wanted, rel=1e-10, abs=1e-10), text
+
+
+def test_value_is_that_of_many_digits() -> None:
+    mpmath = pytest.importorskip("mpmath")
+    torque = _torque("exp(-k*t)*tanh(w1)/sqrt(1 + q2**2) - w2*cosh(0.3*w3)", k=0.7)
+    state = [1.25, 0.5, -0.75, 2.0, 0.5, 0.5, -0.5, 0.5]
+    with mpmath.workdps(40):
+        t, w1, w2, w3, _, _, q2, _ = map(mpmath.mpf, state)
+        damped = mpmath.exp(-mpmath.mpf(0.7) * t) * mpmath.tanh(w1) / mpmath.sqrt(1 + q2**2)
+        wanted = damped - w2 * mpmath.cosh(mpmath.mpf(0.3) * w3)
+        assert abs(_value(torque, state) - wanted) < 4e-16 * abs(wanted)
+
+
+def test_expression_of_time_alone_is_a_law_if_it_has_the_form_of_one() -> None:
+    found = parsed(["1 + 2*t", "3*sin(w*t)", "cos(t)/4 - 0*w1"], {"w": 0.5})
+    assert found == TorqueLaw((1, 0, 0), (2, 0, 0), [((0, 3, 0), 0.5)], [((0, 0, 0.25), 1.0)])
+    assert parsed(["0", "w1 - w1", "sqrt(4) - 2"], {}) == TorqueLaw()
+    for text in ("sin(t)**2", "t*t", "sin(t + 1)", "exp(t)"):
+        assert isinstance(_torque(text), StateTorque)
+
+
+def test_sine_of_a_multiple_of_a_sine_is_no_law() -> None:
+    torque = _torque("sin(2*sin(t))")
+    assert _value(torque, [0.75] + [0.0] * 7) == pytest.approx(math.sin(2 * math.sin(0.75)))
+
+
+def test_torque_has_its_expressions_and_constants() -> None:
+    found = parsed(("-k * w1", " 0\n", "q0*\n wheel"), {"k": 1, "wheel": np.float64(2.5)})
+    assert isinstance(found, StateTorque)
+    assert found.expression == ("-k * w1", "0", "q0* wheel")
+    assert found.constants == (("k", 1.0), ("wheel", 2.5))
+    assert found.needs_attitude
+    assert found == parsed(found.expression, dict(found.constants))
+    assert hash(found) == hash(parsed(found.expression, dict(found.constants)))
+    assert found != parsed(found.expression, {"k": 1.0, "wheel": 2.0})
+    assert Scene("a", (1, 2, 3), moments=(1, 2, 3), torque=found).torque is found
+    assert repr(found) == (
+        "StateTorque(['-k * w1', '0', 'q0* wheel'], {'k': 1.0, 'wheel': 2.5}, 0 operations, "
+        "needs_attitude=True)"
+    )
+
+
+def test_repr_of_a_long_torque_is_short() -> None:
+    text = " + ".join(f"sin({n}*w1)" for n in range(400))
+    found = repr(parsed([text, text, text], {"k" * 200: 1.0}))
+    assert "operations" in found
+    assert len(found) < 300
+    assert "\n" not in found
+
+
+@pytest.mark.parametrize(("text", "words"), MISTAKES.items(), ids=range(len(MISTAKES)))
+def test_mistake_is_one_line_with_its_place(text: str, words: str) -> None:
+    with pytest.raises(InputError) as raised:
+        _torque(text, wheel=1.0)
+    message = str(raised.value)
+    assert message.startswith("[torque] expression 2")
+    assert words in message
+    assert "\n" not in message
+    assert len(message) < 1000
+
+
+def test_same_depth_is_allowed_from_a_deep_stack() -> None:
+    text = "+".join(["w1"] * 490)
+
+    def below(depth: int) -> StateTorque | TorqueLaw:
+        return below(depth - 1) if depth else _torque(text)
+
+    assert _value(below(300), [0.0, 2.0, *[0.0] * 6]) == 980.0
+
+
+def test_too_many_operations_are_refused_with_the_place() -> None:
+    text = "+".join(f"({'+'.join(f'sin({n}*w1)' for n in range(k, k + 100))})"
+                    for k in range(0, 700, 100))  # fmt: skip
+    with pytest.raises(InputError, match=r"^\[torque\] expression 2: more than 2000 operations"):
+        parsed([text, text.replace("sin", "cos"), text.replace("w1", "w2")], {})
+
+
+@pytest.mark.parametrize(
+    ("expressions", "words"),
+    [
+        ("w1", "[torque] expression: text; allowed: a list of three texts"),
+        (3, "[torque] expression: a whole number; allowed"),
+        ({"x": "w1"}, "[torque] expression: a table; allowed"),
+        (["w1", "w2"], "[torque] expression: 2 entries; allowed: a list of three texts"),
+        (["0"] * 5, "[torque] expression: more than 3 entries"),
+        ((f"{n}" for n in iter(int, 1)), "[torque] expression: more than 3 entries"),
+        (["w1", 2.0, "0"], "[torque] expression 2 is a number; it must be text"),
+        (["w1", "0", None], "[torque] expression 3 is nothing; it must be text"),
+    ],
+)
+def test_other_values_are_refused(expressions: Any, words: str) -> None:
+    with pytest.raises(InputError) as raised:
+        parsed(expressions, {})
+    assert str(raised.value).startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("constants", "words"),
+    [
+        (["k"], "[torque.constants] is a list; allowed: names and numbers"),
+        ({1: 2.0}, "[torque.constants]: a name is a whole number; allowed: text"),
+        ({"": 1.0}, "[torque.constants]: '' is no name"),
+        ({"2k": 1.0}, "[torque.constants]: '2k' is no name"),
+        ({"k k": 1.0}, "'k k' is no name"),
+        ({"k\n": 1.0}, "is no name"),
+        ({"\u03c9": 1.0}, "'\u03c9' is no name"),
+        ({"lambda": 1.0}, "'lambda' is no name"),
+        ({"t": 1.0}, "'t' has a meaning in expressions already"),
+        ({"w1": 1.0}, "'w1' has a meaning"),
+        ({"q3": 1.0}, "'q3' has a meaning"),
+        ({"pi": 3.0}, "'pi' has a meaning"),
+        ({"sinh": 1.0}, "'sinh' has a meaning"),
+        ({"k": "1"}, "[torque.constants] k: text where a number belongs"),
+        ({"k": True}, "[torque.constants] k: true or false where a number belongs"),
+        ({"k": math.inf}, "[torque.constants] k: inf is not finite"),
+        ({"k": math.nan}, "[torque.constants] k: nan is not finite"),
+        ({"k": 10**400}, "[torque.constants] k: a number too large for binary64"),
+    ],
+)
+def test_constant_that_is_refused(constants: Any, words: str) -> None:
+    with pytest.raises(InputError) as raised:
+        parsed(["k*w1", "0", "0"], constants)
+    assert words in str(raised.value)
+
+
+def _is_torque_or_one_line(text: str) -> None:
+    try:
+        found = parsed([text, "0", "0"], {"k": 0.5})
+    except InputError as error:
+        lines = str(error)
+    else:
+        assert isinstance(found, (StateTorque, TorqueLaw))
+        lines = repr(found)
+    assert len(lines.splitlines()) == 1
+
+
+_PIECES = (
+    *INPUTS, *FUNCTIONS, "pi", "k", "+", "-", "*", "/", "**", "//", "(", ")", ",", ".", " ", "\n",
+    "_", "0", "1", "2", "9", "1e9", "1e308", "1e-308", "0x", "0b", "0o", "1j", "if", "else", "for",
+    "in", "is", "not", "or", "and", "await", "yield", "lambda", ":", "=", "[", "]", "'", '"', "\0",
+    "sqrt(", "exp(", "**-", "e", "E",
+)  # fmt: skip
+
+
+@settings(max_examples=300, deadline=2000, derandomize=True, database=None)
+@given(st.text(max_size=200))
+def test_any_text_is_a_torque_or_one_line(text: str) -> None:
+    _is_torque_or_one_line(text)
+
+
+@settings(max_examples=1500, deadline=2000, derandomize=True, database=None)
+@given(st.lists(st.sampled_from(_PIECES), max_size=40).map("".join))
+def test_any_sequence_of_words_is_a_torque_or_one_line(text: str) -> None:
+    _is_torque_or_one_line(text)
+
+
+@settings(max_examples=300, deadline=2000, derandomize=True, database=None)
+@given(
+    st.recursive(
+        st.sampled_from(["t", "w1", "q0", "k", "0", "1e200", "1e-200", "3", "0.5", "-1"]),
+        lambda inner: st.one_of(
+            st.tuples(inner, st.sampled_from(["+", "-", "*", "/", "**"]), inner).map(
+                lambda each: f"({''.join(each)})"
+            ),
+            st.tuples(st.sampled_from(FUNCTIONS), inner).map(lambda each: f"{each[0]}({each[1]})"),
+        ),
+        max_leaves=30,
+    )
+)
+def test_any_arithmetic_is_a_torque_or_one_line(text: str) -> None:
+    _is_torque_or_one_line(text)
+
+
+def test_names_are_time_omega_and_the_attitude_with_the_scalar_first() -> None:
+    torque = parsed(["t + 10*w1 + 100*w2 + 1000*w3", "q0 + 10*q1 + 100*q2 + 1000*q3", "0"], {})
+    assert isinstance(torque, StateTorque)
+    found = torque.at(1.0, (2.0, 3.0, 4.0), (5.0, 6.0, 7.0, 8.0))
+    assert found == (4321.0, 8765.0, 0.0)

@@ -1,0 +1,171 @@
+"""Expressions in scene files: read, written, refused, and shown in records and headings."""
+
+import json
+import re
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from pyharness import InputError, Scene, StateTorque, TorqueLaw, case_scene, opaque, read_scene
+from pyharness.model.expressions import FUNCTIONS, INPUTS
+from pyharness.model.records import scene_record
+from pyharness.model.scene_file import scene_of, scene_text
+from pyharness.model.scene_report import heading
+from tests.json_reference import SCHEMA
+
+ROOT = Path(__file__).parent.parent.parent
+BODY: dict[str, Any] = {
+    "body": {"moments": [3.0, 2.0, 1.0]},
+    "initial": {"omega": [1.0, 2.0, 3.0], "attitude": [1.0, 0.0, 0.0, 0.0]},
+}
+TEXTS = ["-k*w1 + sin(2*t)*q0", "-k*w2", "0"]
+MISTAKES = [
+    ({"expression": TEXTS}, "[torque] expression 1: unknown name 'k'; allowed: t, w1"),
+    ({"expression": ["w1", "w2"]}, "[torque] expression: 2 entries; allowed: a list of three"),
+    ({"expression": "w1"}, "[torque] expression: text; allowed: a list of three texts"),
+    ({"expression": ["0", 1, "0"]}, "[torque] expression 2 is a whole number; it must be text"),
+    ({"expression": ["0", "0", "w1("]}, "[torque] expression 3: no arithmetic expression"),
+    ({"constants": {"k": 1.0}}, "[torque]: constants without expression; give an expression"),
+    ({"expression": TEXTS, "constants": 3}, "[torque.constants] is a whole number; allowed"),
+    ({"expression": TEXTS, "constants": {"k": "1"}}, "[torque.constants] k: text where"),
+    ({"expressions": TEXTS}, "[torque]: unknown key 'expressions'; did you mean 'expression'"),
+    *[
+        ({"expression": TEXTS, "constants": {"k": 1.0}, key: value},
+         f"[torque]: expression and {key}; allowed: expression with constants, or constant, rate")
+        for key, value in {"constant": [1.0, 0.0, 0.0], "rate": [0.0] * 3, "sines": [],
+                           "cosines": [], "frame": "body"}.items()
+    ],
+]  # fmt: skip
+
+
+def _restored(scene: Scene, folder: Path) -> Scene:
+    path = folder / "again.toml"
+    path.write_text(scene_text(scene))
+    return read_scene(path)
+
+
+def _is_documented(record: dict[str, Any]) -> bool:
+    schema = {"$ref": "#/$defs/scene", "$defs": SCHEMA["$defs"]}
+    return bool(Draft202012Validator(schema).is_valid(json.loads(json.dumps(record))))
+
+
+@pytest.mark.parametrize(
+    "constants", [{"k": 0.1}, {"k": -0.0, "unused": 5e-324}, {"k": 1 / 3, "_A9": 1e300}]
+)
+def test_scene_with_expressions_is_restored_from_its_text(
+    constants: dict[str, float], tmp_path: Path
+) -> None:
+    table = {"expression": TEXTS, "constants": constants}
+    scene = scene_of(BODY | {"torque": table}, "damped")
+    assert isinstance(scene.torque, StateTorque)
+    again = _restored(scene, tmp_path)
+    assert again == scene
+    assert repr(again) == repr(scene)
+    state = 0.5, (1.0, 2.0, 3.0), (0.8, 0.0, 0.6, 0.0)
+    assert isinstance(again.torque, StateTorque)
+    assert repr(again.torque.at(*state)) == repr(scene.torque.at(*state))
+    assert scene_text(again) == scene_text(scene)
+
+
+def test_expressions_that_form_a_law_are_that_law(tmp_path: Path) -> None:
+    table = {"expression": ["1 - t", "a*sin(2*t)", "0"], "constants": {"a": 4.0}}
+    scene = scene_of(BODY | {"torque": table}, "law")
+    assert scene.torque == TorqueLaw((1, 0, 0), (-1, 0, 0), [((0, 4, 0), 2)])
+    assert _restored(scene, tmp_path) == scene
+    assert "constant" in scene_record(scene)["torque"]
+
+
+def test_expression_may_have_several_lines(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        "[body]\ncoefficients = [1, 2, 3]\n[initial]\nomega = [1, 2, 3]\n"
+        '[torque]\nexpression = ["""\n  -0.5*w1\n  - 0.25*w1**3\n""", "0", "0"]\n'
+    )
+    scene = read_scene(path)
+    assert isinstance(scene.torque, StateTorque)
+    assert scene.torque.expression == ("-0.5*w1 - 0.25*w1**3", "0", "0")
+    assert scene.torque.at(0.0, (2.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)) == (-3.0, 0.0, 0.0)
+    assert _restored(scene, tmp_path) == scene
+    assert "N = (-0.5*w1 - 0.25*w1**3, 0, 0) 1/s2; omega(0)" in heading(scene)[1]
+
+
+@pytest.mark.parametrize(("table", "words"), MISTAKES, ids=range(len(MISTAKES)))
+def test_mistake_in_the_table_of_the_torque_is_one_line(table: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError) as raised:
+        scene_of(BODY | {"torque": table}, "bad")
+    assert str(raised.value).startswith(words)
+
+
+def test_message_names_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    text = scene_text(scene_of(BODY | {"torque": {"expression": ["w1", "w2", "w3"]}}, "good"))
+    path.write_text(text.replace('"w2"', '"w2.real"'))
+    with pytest.raises(InputError, match=r"^scene file '.*scene.toml': \[torque\] expression 2: "):
+        read_scene(path)
+
+
+@pytest.mark.parametrize(
+    ("torque", "record", "shown", "refusal"),
+    [
+        (lambda t, omega: -0.1 * omega, {"recorded": 0}, "N is a recorded function of omega, in",
+         "[torque]: a torque that is recorded from a function can't be written to a file; allowed: "
+         "expressions"),
+        (lambda t, omega, q: t * q[0] * omega, {"recorded": 4},
+         "N is a recorded function of t, omega and attitude, in N m", "recorded from a function"),
+        (opaque(lambda t, omega: omega), {"opaque": True},
+         "N is an opaque function of t and omega, in N m",
+         "[torque]: a torque that is an opaque function can't be written"),
+        (opaque(lambda t, omega, q: omega), {"opaque": True},
+         "N is an opaque function of t, omega and attitude, in N m", "an opaque function"),
+    ],
+)  # fmt: skip
+def test_torque_that_is_a_function_is_shown_and_not_written(
+    torque: StateTorque | Callable[..., Any], record: dict[str, Any], shown: str, refusal: str
+) -> None:
+    scene = Scene("function", (1, 2, 3), moments=(1, 2, 3), torque=torque)
+    assert scene_record(scene)["torque"] == record
+    assert _is_documented(scene_record(scene))
+    assert shown in heading(scene)[1]
+    with pytest.raises(InputError) as raised:
+        scene_text(scene)
+    assert refusal in str(raised.value)
+
+
+def test_record_and_heading_have_the_expressions() -> None:
+    table = {"expression": TEXTS, "constants": {"k": 0.1, "unused": 2}}
+    scene = scene_of(BODY | {"torque": table}, "damped")
+    record = scene_record(scene)
+    assert record["torque"] == {"expression": TEXTS, "constants": {"k": 0.1, "unused": 2.0}}
+    assert scene_of({"torque": record["torque"], **BODY}, "damped") == scene
+    shown = "N = (-k*w1 + sin(2*t)*q0, -k*w2, 0) N m with k = 0.1, unused = 2; omega(0)"
+    assert shown in heading(scene)[1]
+    long = {"expression": [" + ".join(["w1"] * 400), "0", "0"]}
+    assert len(heading(scene_of(BODY | {"torque": long}, "long"))[1]) < 200
+
+
+def test_schema_of_the_record_has_one_form_of_torque() -> None:
+    record = scene_record(case_scene(1))
+    assert _is_documented(record)
+    for torque in (
+        {"expression": TEXTS},
+        {"expression": TEXTS, "constants": {}, "recorded": 3},
+        {"recorded": 3, "opaque": True},
+        {**record["torque"], "expression": TEXTS, "constants": {}},
+        {},
+    ):
+        assert not _is_documented(record | {"torque": torque})
+
+
+def test_expressions_in_the_documents_are_read() -> None:
+    reference = (ROOT / "docs/reference/scene-files.md").read_text()
+    (table,) = re.findall(r"```\n(\[torque\].*?)```", reference, re.DOTALL)
+    scene = scene_of(BODY | tomllib.loads(table), "reference")
+    assert isinstance(scene.torque, StateTorque)
+    assert scene.torque.constants == (("k", 0.1),)
+    names = set(re.findall(r"`(\w+)`", reference.partition("## Expressions")[2]))
+    assert {*INPUTS, *FUNCTIONS, "pi"} <= names
+    assert read_scene(ROOT / "docs/damped.toml").torque.needs_attitude

@@ -130,6 +130,7 @@ def test_rows_agree_with_ends() -> None:
         assert rows.attitude is not None
         assert end.attitude is not None
         assert rows.attitude[number] == pytest.approx(end.attitude[0], rel=0.0, abs=1e-10)
+    assert rows.attitude is not None
     assert np.linalg.norm(rows.attitude, axis=1) == pytest.approx(1.0, abs=1e-15)
 
 
@@ -218,7 +219,7 @@ def test_prepared_solver_has_the_results_of_solve() -> None:
     assert solver.trajectory(scene.omega, [time]).omega.tolist() == found.omega.tolist()
     assert np.isnan(solver((math.nan, 0.0, 0.0), 1.0)).all()
     assert (solver.status, solver.error) == ("refused", None)
-    for wrong in ((1.0, 2.0), "abc"):
+    for wrong in ((1.0, 2.0), "abc"):  # type: Any
         with pytest.raises(InputError, match="omega0"):
             solver(wrong, 1.0)
     with pytest.raises(InputError, match="out"):

@@ -8,23 +8,22 @@ the error amplification.
 """
 
 import math
-import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from pyharness.methods.linearised import growth, propagators
-from pyharness.methods.problem import rows_trajectory
+from pyharness.methods.scipy_run import FINEST_STEP, NoNumberError, Run, rows_of
+from pyharness.methods.scipy_run import RightHandSide as RightHandSide
+from pyharness.methods.scipy_state import finest_of_state, solve_state
 from pyharness.methods.sensitivity import is_sensitive, torque_noise
-from pyharness.model.effort import Integrator, advice, waves
-from pyharness.model.errors import InputError, TimedError
+from pyharness.model.effort import Integrator, waves
+from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import ROUNDING, Array, Trajectory
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.trajectory import ROUNDING, Trajectory
 from pyharness.scenes.rescaled import omega_by_torque
-
-RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
 # Largest ratio of the error at the end to the local error. The first table applies to a motion of a
 # few radians. The second table is added for each radian, multiplied by the error amplification.
@@ -43,11 +42,9 @@ _ROWS = 4.0
 # Longest step, in radians of a torque wave. A method that samples a fast wave always at the same
 # phase treats it as a constant torque, although the error estimates are small.
 _WAVE_STEP = 2.0
-# solve_ivp accepts no relative tolerance below 100 times the machine epsilon. FINEST has the
-# tolerances that the methods claim to meet with this value in motions of a few radians.
-_FINEST_STEP = 2.222e-14
+# FINEST has the tolerances that the methods claim to meet in motions of a few radians.
 _A_FEW = 1.05
-FINEST = {name: _A_FEW * _FINEST_STEP * total for name, total in _SUM.items()}
+FINEST = {name: _A_FEW * FINEST_STEP * total for name, total in _SUM.items()}
 
 _COARSE = 1e-3
 # The preliminary integration is repeated if the expected omega exceeds the largest omega of the
@@ -57,16 +54,10 @@ _MOST_GUESSES = 200
 _NODES_PER_RADIAN = 4.0
 _FEWEST_NODES, _MOST_NODES = 30, 20_000
 
-# A phase of so many radians has hardly a correct digit left in binary64. An omega that still grows
-# at this phase becomes infinite in finite time, and LSODA would not return.
-_LARGEST_PHASE = 1e13
 # Work limit, five to ten seconds of Python. Each wave of a torque adds an eighth to the cost of a
 # right-hand side; Radau also solves linear systems.
 _MOST_EVALUATIONS = 500_000
 _RADAU_SHARE = 2
-# LSODA squares the time span to choose its first step. Below 1e-150 s the square underflows to 0,
-# and LSODA does not advance.
-_SHORTEST_SPAN = 2.0**-300
 
 
 class _Ahead(NamedTuple):
@@ -102,8 +93,10 @@ def finest_tolerance(name: str, scene: Scene, time: float) -> float:
     `name` is SciPy's name of the method, such as DOP853. The tolerance is for the error of omega at
     `time`, relative to the largest |omega|.
     """
+    if isinstance(scene.torque, StateTorque):
+        return max(FINEST[name], finest_of_state(name, scene, time, _most(name, 1.0)))
     ahead = _Run(scene, time, name).ahead()
-    return _FINEST_STEP * steps_sum(name, *ahead[1:])
+    return FINEST_STEP * steps_sum(name, *ahead[1:])
 
 
 def scipy_method(name: str) -> Integrator:
@@ -116,18 +109,20 @@ def scipy_method(name: str) -> Integrator:
     def solve(
         scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
     ) -> Trajectory:
+        if isinstance(scene.torque, StateTorque):
+            return solve_state(name, scene, times, tolerance, effort, _most(name, effort))
         if times[-1] == 0.0:
-            return _rows_of(times, np.array([state_of(scene)]), 0, 0, "complete")
+            return rows_of(times, np.array([state_of(scene)]), 0, 0, "complete")
         run = _Run(scene, times[-1], name, effort)
         try:
             ahead = run.ahead()
             if ahead.largest == 0.0:
                 # The body is at rest, and no torque acts.
                 rest = np.tile(state_of(scene), (len(times), 1))
-                return _rows_of(times, rest, run.evaluations, len(times), "complete")
+                return rows_of(times, rest, run.evaluations, len(times), "complete")
             run.add_attitude()
             total = steps_sum(name, *ahead[1:])
-            finest = _FINEST_STEP * total
+            finest = FINEST_STEP * total
             if tolerance < finest * (1.0 - 1e-9):
                 raise InputError(
                     f"tolerance is {tolerance:g}; {run.label} can't meet it over "
@@ -137,7 +132,7 @@ def scipy_method(name: str) -> Integrator:
                 )
             if len(times) > 1:
                 total *= _ROWS
-            step = max(_FINEST_STEP, tolerance / total)
+            step = max(FINEST_STEP, tolerance / total)
             noise = torque_noise(scene, scene.omega, times[-1], scale=ahead.largest)
             is_blurred = noise > 0.0 and is_sensitive(ahead.growth, tolerance, noise)
             if is_blurred:
@@ -155,14 +150,10 @@ def scipy_method(name: str) -> Integrator:
             low, high = min(scene.euler_coefficients), max(scene.euler_coefficients)
             if result.status == 1 and low <= 0.0 <= high:
                 # Omega is bounded, but its phase can't be computed beyond this time.
-                raise TimedError(
-                    f"{run.label} stopped at t = {{time}} s: beyond {_LARGEST_PHASE:.0e} radians "
-                    "the phase has hardly a digit left; use a shorter time",
-                    float(result.t_events[0][0]) * run.unit,
-                )
-        except _NoNumberError:
+                raise run.phase_error(float(result.t_events[0][0]))
+        except NoNumberError:
             nothing = np.empty((0, len(run.start)))
-            return _rows_of([], nothing, run.evaluations, len(times), "overflow")
+            return rows_of([], nothing, run.evaluations, len(times), "overflow")
         rows = result.y.T if len(result.t) else np.empty((0, len(run.start)))
         finite = np.isfinite(rows).all(axis=1)
         count = len(rows) if finite.all() else int(np.argmin(finite))
@@ -171,7 +162,7 @@ def scipy_method(name: str) -> Integrator:
             ended = "sensitive"
         # SciPy does not report the number of steps. The right-hand sides include those of the
         # preliminary integration.
-        return _rows_of(times[:count], rows[:count], run.evaluations, len(times), ended)
+        return rows_of(times[:count], rows[:count], run.evaluations, len(times), ended)
 
     return solve
 
@@ -202,99 +193,29 @@ def with_attitude(slopes: RightHandSide) -> RightHandSide:
     return both
 
 
-def _rows_of(
-    times: Sequence[float], rows: Array, evaluations: int, steps: int, ended: str
-) -> Trajectory:
-    """Return a trajectory from rows of omega, shape (n, 3), or of omega and attitude, (n, 7).
-
-    `times` (s) are the times of the rows. `evaluations` is the number of evaluations of the
-    right-hand side, and `steps` the number of steps. `ended` states how the integration ended, for
-    example ``complete``. The attitudes are normalised to unit quaternions.
-    """
-    found = rows_trajectory(times, rows[:, :3], evaluations, steps, ended)
-    if rows.shape[1] == 3:
-        return found
-    attitude = rows[:, 3:]
-    return replace(found, attitude=attitude / np.linalg.norm(attitude, axis=1, keepdims=True))
+def _most(name: str, effort: float) -> float:
+    """Return the work limit of a method for a torque without waves, in right-hand sides."""
+    return effort * _MOST_EVALUATIONS / (_RADAU_SHARE if name == "Radau" else 1)
 
 
-class _NoNumberError(Exception):
-    """The exception for a number that is not finite in the linear algebra of SciPy's Radau."""
+class _Run(Run):
+    """The integrations of one scene with a torque law from 0 to `end` (s) by `solve_ivp`.
 
-
-class _Run:
-    """The integrations of one scene from 0 to `end` (s) by `solve_ivp`, with one work limit.
-
-    Preliminary integrations with few digits precede the main integration. The work limit applies to
-    the number of evaluations of the right-hand side in all of them, and `effort` multiplies it.
-    `name` is SciPy's name of the method of the main integration.
+    `name` is SciPy's name of the method of the main integration, and `effort` multiplies the work
+    limit.
     """
 
     def __init__(self, scene: Scene, end: float, name: str, effort: float = 1.0) -> None:
-        self.scene, self.end, self.effort = scene, end, effort
-        self.label = name.lower()
-        self.evaluations = 0
-        # Unit of time (s): a power of 2 near the span if that is tiny, else 1.
-        self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
-        self.rate = max(map(abs, scene.euler_coefficients))
-        self.start: tuple[float, ...] = scene.omega
-        self.slopes = scene.right_hand_side()
-        self.most = int(effort * _MOST_EVALUATIONS * 8 / (8 + waves(scene)))
-        if name == "Radau":
-            self.most //= _RADAU_SHARE
+        self.scene = scene
+        rate = max(map(abs, scene.euler_coefficients))
+        most = int(_most(name, effort) * 8 / (8 + waves(scene)))
+        super().__init__(scene.omega, scene.right_hand_side(), rate, end, name, effort, most)
 
     def add_attitude(self) -> None:
         """Add the attitude to the unknowns of later integrations, if the scene has an attitude."""
         if self.scene.attitude is not None:
             self.start = state_of(self.scene)
             self.slopes = with_attitude(self.slopes)
-
-    def solved(
-        self,
-        name: str,
-        relative: float,
-        absolute: float | Sequence[float],
-        times: Sequence[float] | None = None,
-        longest: float = math.inf,
-    ) -> Any:
-        """Integrate the scene by SciPy's method `name` and return SciPy's result object.
-
-        `relative` and `absolute` are the tolerances `rtol` and `atol` of `solve_ivp`, and `longest`
-        is the longest allowed step (s). The result contains the solution at `times` (s), or dense
-        output if `times` is None. Times in the result are in the unit of time `self.unit`, which is
-        a number of seconds.
-        """
-        from scipy.integrate import solve_ivp
-
-        def phase_left(time: float, omega: Sequence[float]) -> float:
-            return _LARGEST_PHASE - self.rate * abs(time * self.unit) * max(map(abs, omega[:3]))
-
-        phase_left.terminal = True  # type: ignore[attr-defined]
-        # A warning of LSODA only repeats that rows are missing.
-        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
-            try:
-                return solve_ivp(
-                    self._counted,
-                    (0.0, self.end / self.unit),
-                    self.start,
-                    method=name,
-                    t_eval=None if times is None else [time / self.unit for time in times],
-                    dense_output=times is None,
-                    events=phase_left,
-                    rtol=relative,
-                    atol=absolute,
-                    max_step=longest / self.unit,
-                )
-            except InputError:
-                raise
-            except (ValueError, ArithmeticError) as error:
-                # Radau's linear algebra refuses numbers that are not finite.
-                if "infs or NaNs" in str(error):
-                    raise _NoNumberError from None
-                raise InputError(
-                    f"{self.label} failed: {error}; use a shorter time, slower motion or "
-                    "smaller torques"
-                ) from None
 
     def _scale_by_torque(self) -> float:
         """Return a bound of the |omega| (rad/s) that the torque alone can cause until the end time.
@@ -303,23 +224,6 @@ class _Run:
         """
         bound = omega_by_torque(self.scene, self.end)
         return bound if math.isfinite(bound) else 1.0
-
-    def _counted(self, time: float, omega: Sequence[float]) -> list[float]:
-        self.evaluations += 1
-        if self.evaluations > self.most:
-            raise TimedError(
-                f"{self.label} exceeded its work limit at t = {{time}} s after {self.most} "
-                "right-hand sides; "
-                + advice(
-                    "use a shorter time or a larger tolerance",
-                    self.effort,
-                    self.effort * self.end / (time * self.unit) if time else None,
-                ),
-                time * self.unit,
-            )
-        if self.unit == 1.0:
-            return self.slopes(time, omega)
-        return [self.unit * slope for slope in self.slopes(self.unit * time, omega)]
 
     @np.errstate(over="ignore", invalid="ignore")
     def ahead(self) -> _Ahead:

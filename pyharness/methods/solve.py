@@ -197,7 +197,7 @@ def _integrate(
     try:
         found = chosen.solve(scaled(scene, factor), faster, tolerance, effort)
     except TimedError as refusal:
-        raise refusal.slower(factor) from None
+        raise refusal.slower(factor) from refusal.__cause__
     return unscaled(found, times, factor)
 
 

@@ -1,8 +1,11 @@
-"""Sine, cosine and pi to all digits of the current decimal arithmetic."""
+"""Sine, cosine, pi and products of series in the current decimal arithmetic."""
 
 import decimal
 from decimal import Decimal
 from functools import cache
+from operator import mul
+
+Row = list[Decimal]
 
 
 def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
@@ -54,3 +57,11 @@ def _arctan_inverse(n: int) -> Decimal:
         k += 2
         total += power / k
     return total
+
+
+def product(x: Row, reversed_y: Row) -> Decimal:
+    """Return the sum of the products of corresponding elements of two lists.
+
+    It is a Taylor coefficient of the product of two series if the second list is in reversed order.
+    """
+    return sum(map(mul, x, reversed_y), Decimal(0))

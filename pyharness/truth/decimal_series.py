@@ -3,19 +3,22 @@
 Omega obeys Euler's equations, numbers 13-15 of the thesis.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from decimal import Decimal
 from fractions import Fraction
-from operator import mul
 
 from pyharness.model.effort import advice, checked_effort, waves
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
-from pyharness.truth.decimal_functions import sine_cosine
+from pyharness.model.state_torque import StateTorque
+from pyharness.truth.decimal_functions import Row as Row
+from pyharness.truth.decimal_functions import product, sine_cosine
+from pyharness.truth.tape_series import TapeSeries, series_products
 
 _MOST_STEPS = 100_000  # some 30 seconds, more if the torque has sines or cosines
 # Work limit in steps, some ten seconds, if the caller specifies `effort`, the factor on this limit.
-# A wave of the torque takes a fifth of the work of a step.
+# A wave of the torque takes a fifth of the work of a step, as does a product of two series on the
+# tape of a torque that depends on the state.
 _ORDINARY_STEPS = 20_000
 # After _FIRST_STEPS steps, a small part of a second, their mean length shows whether the limit will
 # be exceeded. The forecast allows for a motion that becomes slower by the factor _PACE_SLACK.
@@ -23,8 +26,6 @@ _FIRST_STEPS = 100
 _PACE_SLACK = 3.0
 # If the number of steps grows with time to a higher power than this, the forecast uses that power.
 _GROWING = Decimal("1.3")
-
-Row = list[Decimal]
 
 
 def taylor_series(
@@ -38,13 +39,15 @@ def taylor_series(
 ) -> list[Row]:
     """Return a row of omega, velocity and attitude at each of `times` (s).
 
-    There are fewer rows if omega grows without bound before the last time. Omega is in rad/s. The
+    There are fewer rows if omega grows without bound before the last time, or if a torque that
+    depends on the state is singular at an earlier time. Omega is in rad/s. The
     translational velocity (m/s) is included if `velocity` is true. The attitude is included if the
     scene has one. It is a quaternion, which has the same norm as the scene's quaternion.
     `coefficients` are the Euler coefficients A, B, C of the scene, and `order` is the degree of the
     Taylor polynomials. `tolerance` is the local tolerance, relative to omega and to the attitude.
     `effort` is a factor on a work limit of some ten seconds; if it is None, the limit is 100 000
-    steps. Raise InputError if the work limit is exceeded.
+    steps, and fewer if the torque depends on the state. Raise InputError if the work limit is
+    exceeded.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
@@ -54,7 +57,11 @@ def taylor_series(
     rows: list[Row] = []
     step = 0
     while True:
-        series = equations.expand(begin, state, order)
+        try:
+            series = equations.expand(begin, state, order)
+        except ArithmeticError:
+            # The torque is singular here, or beyond the range of decimal arithmetic.
+            return rows
         rest = abs(times[-1] - begin)
         length = _step(series[:moving], tolerance, rest)
         if scene.attitude is not None:
@@ -64,8 +71,10 @@ def taylor_series(
             return rows
         limit.check(step, begin, length, rest)
         while len(rows) < len(times) and abs(times[len(rows)]) <= abs(begin + length):
+            if equations.is_singular_before(times[len(rows)] - begin):
+                return rows
             rows.append(_evaluate(series, times[len(rows)] - begin))
-        if len(rows) == len(times):
+        if len(rows) == len(times) or equations.is_singular_before(length):
             return rows
         state = _evaluate(series, length)
         begin += length
@@ -77,9 +86,12 @@ class _Limit:
 
     def __init__(self, scene: Scene, effort: float | None) -> None:
         self._effort = None if effort is None else checked_effort(effort)
-        self._ordinary = _ORDINARY_STEPS * 5.0 / (5 + waves(scene))
-        self._most = _MOST_STEPS if effort is None else self._ordinary * effort
-        self._next = max(2, _FIRST_STEPS * 5 // (5 + waves(scene)))
+        a_step = 5 + _torque_work(scene)
+        self._ordinary = _ORDINARY_STEPS * 5.0 / a_step
+        self._most = float(_MOST_STEPS) if effort is None else self._ordinary * effort
+        if effort is None and isinstance(scene.torque, StateTorque):
+            self._most *= 5.0 / a_step
+        self._next = max(2, _FIRST_STEPS * 5 // a_step)
         self._before: tuple[int, Decimal] = (0, Decimal(0))
 
     def check(self, step: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
@@ -133,6 +145,16 @@ class _Limit:
             f"reference: more than {self._most:.0f} Taylor steps would be needed, some "
             f"{steps:.2g}; {instead}"
         )
+
+
+def _torque_work(scene: Scene) -> int:
+    """Return the work for the torque of a scene in each step, in fifths of a step without torque.
+
+    The torque is a torque law, or a recorded torque.
+    """
+    if isinstance(scene.torque, StateTorque) and scene.torque.tape is not None:
+        return series_products(scene.torque.tape)
+    return waves(scene)
 
 
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
@@ -194,7 +216,11 @@ class _Equations:
 
     def __init__(self, scene: Scene, coefficients: Row, velocity: bool) -> None:
         self._abc = coefficients
-        self._torque = scene.body_torque
+        self._tape = self._law = None
+        if isinstance(scene.torque, StateTorque) and scene.torque.tape is not None:
+            self._tape = TapeSeries(scene.torque.tape)
+        else:
+            self._law = scene.body_torque
         self._moments = [Decimal(x.numerator) / x.denominator for x in divisors(scene)]
         self._velocity, self._attitude = velocity, scene.attitude is not None
         self._acceleration = [Decimal(force) / Decimal(scene.masses[0]) for force in scene.forces]
@@ -205,19 +231,19 @@ class _Equations:
         `state` contains the values of the unknowns at that time.
         """
         series = [[x] for x in state]
-        torque = self._torque_series(time, order)
+        torque = self._torque_series(time, order, series)
         for k in range(order):
             # Cauchy products of the coefficients 0 ... k.
             backward = [list(reversed(each)) for each in series]
             rates = [
-                self._abc[i] * _product(series[(i + 1) % 3], backward[(i + 2) % 3]) + torque[i][k]
-                for i in range(3)
+                self._abc[i] * product(series[(i + 1) % 3], backward[(i + 2) % 3]) + push
+                for i, push in enumerate(torque(k))
             ]
             if self._velocity:
                 for i in range(3):
                     j, m = (i + 1) % 3, (i + 2) % 3
-                    rate = _product(series[3 + j], backward[m])
-                    rate -= _product(series[3 + m], backward[j])
+                    rate = product(series[3 + j], backward[m])
+                    rate -= product(series[3 + m], backward[j])
                     rates.append(rate + (self._acceleration[i] if k == 0 else 0))
             if self._attitude:
                 rates += _attitude_rates(series[-4:], backward[:3])
@@ -225,12 +251,33 @@ class _Equations:
                 each.append(rate / (k + 1))
         return series
 
-    def _torque_series(self, time: Decimal, order: int) -> list[Row]:
-        """Return Taylor coefficients of the torque over the moment of inertia around `time` (s).
+    def is_singular_before(self, offset: Decimal) -> bool:
+        """Return whether the torque is singular between the expansion's time and `offset` (s) on.
+
+        The series is that of the last call of `expand`. A torque law is never singular.
+        """
+        return self._tape is not None and self._tape.crosses_a_branch(offset)
+
+    def _torque_series(self, time: Decimal, order: int, series: list[Row]) -> Callable[[int], Row]:
+        """Return a function that returns Taylor coefficient k of the torque over the moments.
+
+        The expansion is around `time` (s). The function is called with 0, 1 ... `order` - 1. When
+        it is called with k, the lists in `series` contain the coefficients 0 to k of the unknowns.
+        """
+        if self._tape is not None:
+            tape, moments = self._tape, self._moments
+            tape.begin(time, series[:3], series[-4:] if self._attitude else [])
+            return lambda k: [x / moment for x, moment in zip(tape.next(), moments, strict=True)]
+        terms = self._law_series(time, order)
+        return lambda k: [each[k] for each in terms]
+
+    def _law_series(self, time: Decimal, order: int) -> list[Row]:
+        """Return Taylor coefficients of a torque law over the moment of inertia around `time` (s).
 
         For each axis there are `order` coefficients, numbers 0 to `order` - 1.
         """
-        law = self._torque
+        law = self._law
+        assert law is not None
         series = [
             [Decimal(constant) + Decimal(rate) * time, Decimal(rate), *[Decimal(0)] * (order - 2)]
             for constant, rate in zip(law.constant, law.rate, strict=True)
@@ -263,12 +310,8 @@ def _attitude_rates(q: list[Row], omega: list[Row]) -> Row:
     """
     (a, b, c, d), (x, y, z) = q, omega
     return [
-        (-_product(b, x) - _product(c, y) - _product(d, z)) / 2,
-        (_product(a, x) + _product(c, z) - _product(d, y)) / 2,
-        (_product(a, y) + _product(d, x) - _product(b, z)) / 2,
-        (_product(a, z) + _product(b, y) - _product(c, x)) / 2,
+        (-product(b, x) - product(c, y) - product(d, z)) / 2,
+        (product(a, x) + product(c, z) - product(d, y)) / 2,
+        (product(a, y) + product(d, x) - product(b, z)) / 2,
+        (product(a, z) + product(b, y) - product(c, x)) / 2,
     ]
-
-
-def _product(x: Row, reversed_y: Row) -> Decimal:
-    return sum(map(mul, x, reversed_y), Decimal(0))

@@ -11,7 +11,7 @@ import itertools
 from collections.abc import Sequence
 from decimal import Decimal
 
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, checked_scene
 from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.decimal_series import Row
 from pyharness.truth.reference import exact_coefficients
@@ -25,7 +25,9 @@ def torque_free(scene: Scene, time: float, rounded: bool = False) -> Row:
 
     The motion must be bounded, as it is if the coefficients A, B and C belong to moments. If
     `rounded` is true, A, B and C rounded to binary64 are used instead of the exact coefficients.
+    Raise InputError if the torque depends on the state.
     """
+    checked_scene(scene)
     with decimal.localcontext() as context:
         context.prec = _DIGITS
         context.Emax, context.Emin = decimal.MAX_EMAX, decimal.MIN_EMIN

@@ -10,7 +10,7 @@ import decimal
 from decimal import Decimal
 from fractions import Fraction
 
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, checked_scene
 from pyharness.truth.decimal_functions import pi, sine_cosine
 from pyharness.truth.decimal_series import Row, taylor_series
 from pyharness.truth.reference import exact_coefficients
@@ -26,8 +26,10 @@ def free_attitude(scene: Scene, time: float) -> Row:
     The quaternion is a continuous function of time, which determines its sign. The scene must have
     moments and an attitude. The motion is integrated over at most one period of omega, which is
     long near the separatrix. On the separatrix omega has no period. There the motion is integrated
-    from 0 to `time`. Raise InputError if the integration takes too many steps.
+    from 0 to `time`. Raise InputError if the integration takes too many steps, or if the torque
+    depends on the state.
     """
+    checked_scene(scene)
     assert scene.attitude is not None
     with decimal.localcontext() as context:
         context.prec = _DIGITS

@@ -17,6 +17,7 @@ import numpy as np
 
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.decimal_series import Row, divisors, taylor_series
@@ -81,8 +82,11 @@ def reference(
     None, the limit is 100 000 steps. If the scene has an attitude, the result contains attitudes,
     which are always computed by the series. `velocity` requests the translational velocity.
 
-    Raise InputError if the times are not in order, or if the series needs too many steps.
+    Raise InputError if the times are not in order, or if the series needs too many steps. A torque
+    that depends on the state must be recorded, and needs the scene's attitude if it depends on it.
+    The result ends before the first time at which such a torque is singular.
     """
+    _check_torque(scene)
     away = [abs(t) for t in times]
     one_side = min(times) >= 0.0 or max(times) <= 0.0
     if not (one_side and all(t1 < t2 for t1, t2 in itertools.pairwise(away))):
@@ -117,6 +121,21 @@ def reference(
         return replace(found, attitude=_array(turned, 4), angle_estimate=angle)
 
 
+def _check_torque(scene: Scene) -> None:
+    """Raise InputError if the torque depends on the state and has no Taylor series."""
+    if not isinstance(scene.torque, StateTorque):
+        return
+    if scene.torque.tape is None:
+        raise InputError(
+            "an opaque torque has no Taylor series; allowed: a torque that can be recorded, or the "
+            "methods of SciPy"
+        )
+    if scene.torque.needs_attitude and scene.attitude is None:
+        raise InputError(
+            "a torque that depends on the attitude needs it; give attitude=True, or --attitude FORM"
+        )
+
+
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
     """Return omega of a sphere, or of a symmetric body without torque, in closed form, else None.
 
@@ -124,6 +143,8 @@ def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
     decimal point as the current decimal arithmetic has digits. Therefore an angle of 1e41 rad is
     computed with some 41 additional digits.
     """
+    if isinstance(scene.torque, StateTorque):
+        return None
     with decimal.localcontext() as context:
         context.prec += _digits_before_the_point(scene, max(map(abs, times)))
         return _known_rows(scene, times)

@@ -93,6 +93,4 @@ def gradient(t: Any, q: Any, inertia: Any, rate: float) -> Any:
 def to_body(q: Any, vector: Any) -> Any:
     """Return components about the body axes of a vector given about the axes of space."""
     w, v = q[0], q[1:]
-    return (
-        (w * w - v @ v) * vector + 2.0 * (v @ vector) * v - 2.0 * w * np.cross(v, vector)
-    )
+    return (w * w - v @ v) * vector + 2.0 * (v @ vector) * v - 2.0 * w * np.cross(v, vector)

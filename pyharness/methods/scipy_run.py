@@ -1,0 +1,155 @@
+"""Integrations by SciPy's `solve_ivp` under one work limit; SciPy is imported on first use."""
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pyharness.methods.problem import rows_trajectory
+from pyharness.model.effort import advice
+from pyharness.model.errors import InputError, TimedError
+from pyharness.model.trajectory import Array, Trajectory
+
+RightHandSide = Callable[[float, Sequence[float]], list[float]]
+
+# solve_ivp accepts no relative tolerance below 100 times the machine epsilon.
+FINEST_STEP = 2.222e-14
+# A phase of so many radians has hardly a correct digit left in binary64. An omega that still grows
+# at this phase becomes infinite in finite time, and LSODA would not return.
+LARGEST_PHASE = 1e13
+# LSODA squares the time span to choose its first step. Below 1e-150 s the square underflows to 0,
+# and LSODA does not advance.
+_SHORTEST_SPAN = 2.0**-300
+
+
+class NoNumberError(Exception):
+    """The exception for an integration that can't continue, for example with a NaN in Radau."""
+
+
+class Run:
+    """The integrations of one problem from 0 to `end` (s) by `solve_ivp`, with one work limit.
+
+    Preliminary integrations with few digits precede the main integration. The work limit applies to
+    the number of evaluations of the right-hand side in all of them. It is `most`, which includes
+    the factor `effort`. `start` is the state at time 0, and `slopes` is the right-hand side. The
+    first three components of the state are omega (rad/s). `rate` is the largest Euler coefficient;
+    its product with omega and time is the phase (rad). `name` is SciPy's name of the main method.
+    """
+
+    def __init__(
+        self,
+        start: Sequence[float],
+        slopes: RightHandSide,
+        rate: float,
+        end: float,
+        name: str,
+        effort: float,
+        most: int,
+    ) -> None:
+        self.start, self.slopes, self.rate = tuple(start), slopes, rate
+        self.end, self.effort, self.most = end, effort, most
+        self.label = name.lower()
+        self.evaluations = 0
+        # Unit of time (s): a power of 2 near the span if that is tiny, else 1.
+        self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
+
+    def after_step(self, time: float, state: Sequence[float]) -> None:
+        """Do nothing; a subclass may record the time (s) and the state of each accepted step.
+
+        The method is also called at the beginning, and at times inside the last step.
+        """
+
+    def solved(
+        self,
+        name: str,
+        relative: float,
+        absolute: float | Sequence[float],
+        times: Sequence[float] | None = None,
+        longest: float = math.inf,
+    ) -> Any:
+        """Integrate by SciPy's method `name` and return SciPy's result object.
+
+        `relative` and `absolute` are the tolerances `rtol` and `atol` of `solve_ivp`, and `longest`
+        is the longest allowed step (s). The result contains the solution at `times` (s), or dense
+        output if `times` is None. Times in the result are in the unit of time `self.unit`, which is
+        a number of seconds. Raise NoNumberError if Radau's linear algebra refuses a number.
+        """
+        from scipy.integrate import solve_ivp
+
+        def phase_left(time: float, state: Sequence[float]) -> float:
+            self.after_step(time * self.unit, state)
+            return LARGEST_PHASE - self.rate * abs(time * self.unit) * max(map(abs, state[:3]))
+
+        phase_left.terminal = True  # type: ignore[attr-defined]
+        # A warning of LSODA only repeats that rows are missing.
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+            try:
+                return solve_ivp(
+                    self._counted,
+                    (0.0, (self.end if times is None else times[-1]) / self.unit),
+                    self.start,
+                    method=name,
+                    t_eval=None if times is None else [time / self.unit for time in times],
+                    dense_output=times is None,
+                    events=phase_left,
+                    rtol=relative,
+                    atol=absolute,
+                    max_step=longest / self.unit,
+                )
+            except InputError:
+                raise
+            except (ValueError, ArithmeticError) as error:
+                # Radau's linear algebra refuses numbers that are not finite.
+                if "infs or NaNs" in str(error):
+                    raise NoNumberError from None
+                raise InputError(
+                    f"{self.label} failed: {error}; use a shorter time, slower motion or "
+                    "smaller torques"
+                ) from None
+
+    def phase_error(self, time: float) -> TimedError:
+        """Return the exception for an integration that stopped at the largest phase.
+
+        `time` is the time at which it stopped, in the unit of time `self.unit`.
+        """
+        return TimedError(
+            f"{self.label} stopped at t = {{time}} s: beyond {LARGEST_PHASE:.0e} radians the phase "
+            "has hardly a digit left; use a shorter time",
+            time * self.unit,
+        )
+
+    def _counted(self, time: float, state: Sequence[float]) -> list[float]:
+        self.evaluations += 1
+        if self.evaluations > self.most:
+            raise TimedError(
+                f"{self.label} exceeded its work limit at t = {{time}} s after {self.most} "
+                "right-hand sides; "
+                + advice(
+                    "use a shorter time or a larger tolerance",
+                    self.effort,
+                    self.effort * self.end / (time * self.unit) if time else None,
+                ),
+                time * self.unit,
+            )
+        if self.unit == 1.0:
+            return self.slopes(time, state)
+        return [self.unit * slope for slope in self.slopes(self.unit * time, state)]
+
+
+def rows_of(
+    times: Sequence[float], rows: Array, evaluations: int, steps: int, ended: str
+) -> Trajectory:
+    """Return a trajectory from rows of omega, shape (n, 3), or of omega and attitude, (n, 7).
+
+    `times` (s) are the times of the rows. `evaluations` is the number of evaluations of the
+    right-hand side, and `steps` the number of steps. `ended` states how the integration ended, for
+    example ``complete``. The attitudes are normalised to unit quaternions.
+    """
+    found = rows_trajectory(times, rows[:, :3], evaluations, steps, ended)
+    if rows.shape[1] == 3:
+        return found
+    attitude = rows[:, 3:]
+    return replace(found, attitude=attitude / np.linalg.norm(attitude, axis=1, keepdims=True))

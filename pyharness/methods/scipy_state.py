@@ -1,0 +1,302 @@
+"""SciPy's methods for torques that depend on the state, recorded or opaque.
+
+SciPy controls the local error of each step, whereas a tolerance of this project limits the error at
+the requested times. How a torque of the state adds up and amplifies local errors is unknown.
+Therefore the scene is integrated repeatedly with smaller and smaller local tolerances, until the
+difference of two integrations shows that the second meets the tolerance.
+"""
+
+import math
+import warnings
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from pyharness.dynamics.system import slopes_of
+from pyharness.methods.scipy_run import FINEST_STEP, NoNumberError, RightHandSide, Run, rows_of
+from pyharness.model.errors import InputError, TimedError, printable
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.trajectory import Array, Trajectory
+
+# Ratio of the tolerance to the first local tolerance: an ordinary ratio of the error to the local
+# error in a motion of a few radians.
+_FIRST = {"DOP853": 4.0, "RK45": 8.0, "Radau": 4.0, "LSODA": 25.0}
+# Smallest and largest ratio of a local tolerance to the next.
+_RATIO, _LARGEST_RATIO = 8.0, 1e3
+# Safety factor on the error of the second of two integrations. The error is estimated from their
+# difference, in proportion to the local tolerances, but by no less than a fraction of it.
+_SAFETY, _LEAST_FRACTION = 4.0, 0.25
+# The longest step is the time span over this number, which grows with each integration, so that two
+# of them can't pass a short pulse or sample a wave in the same way.
+_FEWEST_STEPS, _MORE_STEPS = 32, 7
+_COARSE = 1e-3
+# The preliminary integration of a body at rest is repeated if omega is smaller than expected by
+# this factor.
+_FAR = 4.0
+_MOST_GUESSES = 200
+# LSODA does not return if its steps no longer change the time.
+_MOST_STUCK = 50
+# An omega that has grown by this factor when the phase is too large grows without bound.
+_UNBOUNDED = 1e3
+# Local tolerances of the two integrations that determine the smallest tolerance.
+_TRIAL = (1e-7, 1e-8)
+# Work of a right-hand side, in microseconds: without torque, with SciPy's own work; of an operation
+# of a tape; and of an opaque function.
+_WORK, _OPERATION_WORK, _OPAQUE_WORK = 16.0, 0.7, 16.0
+
+
+class _Rows(NamedTuple):
+    """The results of one integration: the state at the first times, as far as it was computed."""
+
+    state: Array  # shape (n, 3) or (n, 7): omega, and the attitude as a unit quaternion
+    is_complete: bool  # whether there is a row for each time
+    largest: float  # largest abs(omega) of any component from 0 to the end (rad/s)
+
+
+def solve_state(
+    name: str,
+    scene: Scene,
+    times: Sequence[float],
+    tolerance: float,
+    effort: float,
+    most: float,
+) -> Trajectory:
+    """Return the trajectory of a scene whose torque depends on the state, by a method of SciPy.
+
+    `name` is SciPy's name of the method, such as DOP853. The error at `times` (s), estimated from
+    the difference of two integrations, is at most `tolerance`: omega relative to the largest
+    |omega|, and the attitude as an angle (rad). `effort` is the factor on the work limit, and
+    `most` is the limit in right-hand sides of a body without torque. The trajectory ends early,
+    with the ending ``overflow``, before a time at which omega grows without bound or the torque is
+    singular. Raise InputError if an opaque function raises an exception, if the torque needs an
+    attitude that the scene does not have, or if the tolerance or the work limit can't be met.
+    """
+    run = _StateRun(scene, times[-1], name, effort, most)
+    nothing = np.empty((0, len(run.start)))
+    if run.is_singular():
+        return rows_of([], nothing, 1, len(times), "overflow")
+    if times[-1] == 0.0:
+        return rows_of(times, np.array([run.start]), 1, 0, "complete")
+    scale = run.expected_omega()
+    if scale == 0.0:
+        # The body is at rest, and no torque acts.
+        rest = np.tile(run.start, (len(times), 1))
+        return rows_of(times, rest, run.evaluations, len(times), "complete")
+    found = _refined(run, times, tolerance, scale)
+    count = len(found.state)
+    ended = "complete" if found.is_complete else "overflow"
+    return rows_of(times[:count], found.state, run.evaluations, len(times), ended)
+
+
+def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
+    """Return an estimate of the smallest tolerance that a method of SciPy can meet until `time`.
+
+    The torque of the scene depends on the state, and `time` is in s. `name` and `most` are those of
+    `solve_state`. The estimate is 0 if the method does not reach the end.
+    """
+    run = _StateRun(scene, time, name, 1.0, most)
+    scale = 0.0 if run.is_singular() else run.expected_omega()
+    if scale == 0.0:
+        return 0.0
+    first, second = (run.rows([time], local, scale) for local in _TRIAL)
+    if not (first.is_complete and second.is_complete):
+        return 0.0
+    return 1.5 * _SAFETY * FINEST_STEP * _difference(first, second) / _TRIAL[0]
+
+
+def _refined(run: "_StateRun", times: Sequence[float], tolerance: float, scale: float) -> _Rows:
+    """Return the results of an integration whose estimated error is at most `tolerance`.
+
+    `scale` is an estimate of the largest |omega| (rad/s). Raise InputError if no local tolerance
+    is small enough.
+    """
+    local = max(tolerance / _FIRST[run.name], _RATIO * FINEST_STEP)
+    before, ratio = run.rows(times, local, scale), _RATIO
+    while True:
+        finer = max(FINEST_STEP, local / ratio)
+        after = run.rows(times, finer, scale)
+        difference = _difference(before, after)
+        ratio = local / finer
+        error = difference * min(1.0, max(_LEAST_FRACTION, _SAFETY / ratio))
+        same_end = before.is_complete == after.is_complete
+        if error <= tolerance and same_end and len(before.state) == len(after.state):
+            return after
+        if finer == FINEST_STEP:
+            if not (before.is_complete or after.is_complete):
+                # Near the time at which omega becomes infinite no row has the digits.
+                return _agreeing(before, after, tolerance)
+            raise InputError(
+                f"tolerance is {tolerance:g}; {run.label} can't meet it here, because two "
+                "integrations with the smallest local tolerances "
+                + (f"differ by {difference:.2g}; " if same_end else "end at different times; ")
+                + f"allowed for this motion: {_allowed(error)}, or a shorter time"
+            )
+        # The next integration should have a quarter of the allowed error.
+        ratio = min(_LARGEST_RATIO, max(_RATIO, 4.0 * difference / (ratio * tolerance)))
+        before, local = after, finer
+
+
+def _allowed(error: float) -> str:
+    return f"{2.0 * error:.2g} to 1" if 0.0 < error < 0.5 else "a larger tolerance"
+
+
+def _difference(before: _Rows, after: _Rows) -> float:
+    """Return the largest difference of two integrations at the times that both reached.
+
+    Omega is relative to the largest |omega|, and the attitude is an angle (rad).
+    """
+    n = min(len(before.state), len(after.state))
+    return float(_differences(before, after, n).max(initial=0.0))
+
+
+def _differences(before: _Rows, after: _Rows, n: int) -> Array:
+    first, second = before.state[:n], after.state[:n]
+    if before.is_complete and after.is_complete:
+        largest = min(before.largest, after.largest)
+    else:
+        # The largest omega until the end does not exist.
+        largest = float(np.abs(second[:, :3]).max(initial=0.0))
+    apart = np.abs(first[:, :3] - second[:, :3]).max(axis=1, initial=0.0)
+    found: Array = np.divide(apart, largest, out=np.zeros(n), where=apart > 0.0)
+    if first.shape[1] > 3:
+        # The angle is twice the distance of two unit quaternions on the sphere.
+        turned = 2.0 * np.linalg.norm(first[:, 3:] - second[:, 3:], axis=1)
+        found = np.maximum(found, turned)
+    return found
+
+
+def _agreeing(before: _Rows, after: _Rows, tolerance: float) -> _Rows:
+    n = min(len(before.state), len(after.state))
+    while n and _differences(before, after, n).max() > tolerance:
+        n -= 1
+    return after._replace(state=after.state[:n])
+
+
+class _StateRun(Run):
+    """The integrations of one scene with a torque that depends on the state.
+
+    The time reached and the largest |omega| are recorded after each step.
+    """
+
+    def __init__(self, scene: Scene, end: float, name: str, effort: float, most: float) -> None:
+        torque = scene.torque
+        assert isinstance(torque, StateTorque)
+        if torque.needs_attitude and scene.attitude is None:
+            raise InputError(
+                "a torque that depends on the attitude needs it; give attitude=True, or "
+                "--attitude FORM"
+            )
+        work = _OPAQUE_WORK
+        if torque.tape is not None:
+            work = _OPERATION_WORK * (
+                len(torque.tape.operations) + sum(len(each.terms) for each in torque.tape.outputs)
+            )
+        slopes = slopes_of(scene)
+        rate = max(map(abs, scene.euler_coefficients))
+        limit = int(most * _WORK / (_WORK + work))
+        start = (*scene.omega, *(scene.attitude or ()))
+        super().__init__(
+            start, slopes if torque.tape is not None else _guarded(slopes), rate, end, name, effort,
+            limit,
+        )  # fmt: skip
+        self.name = name
+        self._integrations = 0
+        self._reached, self._largest, self._stuck = 0.0, 0.0, 0
+
+    def after_step(self, time: float, state: Sequence[float]) -> None:
+        """Record the time (s) and |omega|; raise NoNumberError if the steps are too short."""
+        self._stuck = self._stuck + 1 if time == self._reached else 0
+        if self._stuck > _MOST_STUCK:
+            raise NoNumberError
+        self._reached = time
+        omega = max(map(abs, state[:3]))
+        if math.isfinite(omega):
+            self._largest = max(self._largest, float(omega))
+
+    def is_singular(self) -> bool:
+        """Return whether a rate at time 0 is not finite.
+
+        SciPy's choice of the first step would then not return.
+        """
+        self.evaluations += 1
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+            return not all(map(math.isfinite, self.slopes(0.0, self.start)))
+
+    def expected_omega(self) -> float:
+        """Integrate with few digits, and return an estimate of the largest |omega| (rad/s).
+
+        If the integration does not reach the end, the estimate is the initial |omega|, or that
+        which the initial torque causes. The result is 0 for a body that remains at rest.
+        """
+        scale = max(map(abs, self.start[:3])) or self._pushed()
+        for _ in range(_MOST_GUESSES):
+            found = self.rows([self.end], _COARSE, scale)
+            if not found.is_complete:
+                return scale
+            if not 0.0 < found.largest < scale / _FAR:
+                return found.largest
+            scale = found.largest
+        return scale
+
+    def _pushed(self) -> float:
+        """Return the |omega| (rad/s) that a body at rest would attain by its largest torque."""
+        times = np.linspace(0.0, self.end, _FEWEST_STEPS + 1).tolist()
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+            rates = [abs(rate) for time in times for rate in self.slopes(time, self.start)[:3]]
+        self.evaluations += len(times)
+        omega = max(filter(math.isfinite, rates), default=0.0) * abs(self.end)
+        return omega if 0.0 < omega < math.inf else 1.0
+
+    def rows(self, times: Sequence[float], local: float, scale: float) -> _Rows:
+        """Return the state at `times` (s), integrated with the local tolerance `local`.
+
+        The local tolerance is relative to `scale` (rad/s) for omega. There are fewer rows if the
+        integration ends before the last time.
+        """
+        self._integrations += 1
+        sizes = [local * scale] * 3 + [local] * (len(self.start) - 3)
+        longest = abs(self.end) / (_FEWEST_STEPS + _MORE_STEPS * self._integrations)
+        wanted = list(times)
+        while wanted:
+            self._reached, self._largest, self._stuck = 0.0, 0.0, 0
+            try:
+                result = self.solved(self.name, local, sizes, wanted, longest)
+            except NoNumberError:
+                # SciPy returned no rows. They exist at the times before that of the failure.
+                wanted = [time for time in wanted if abs(time) < abs(self._reached)]
+                continue
+            if result.status == 1 and self._largest < _UNBOUNDED * scale:
+                raise self.phase_error(float(result.t_events[0][0]))
+            # SciPy returns an empty list if it reached no time.
+            return self._found(np.asarray(result.y).T, len(times))
+        return _Rows(np.empty((0, len(self.start))), False, 0.0)
+
+    def _found(self, rows: Array, wanted: int) -> _Rows:
+        rows = np.reshape(rows, (-1, len(self.start)))
+        finite = np.isfinite(rows).all(axis=1)
+        rows = rows if finite.all() else rows[: int(np.argmin(finite))]
+        if rows.shape[1] > 3:
+            unit = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
+            rows = np.hstack([rows[:, :3], unit])
+        return _Rows(rows, len(rows) == wanted, self._largest)
+
+
+def _guarded(slopes: RightHandSide) -> RightHandSide:
+    """Return a right-hand side that raises InputError if a user's opaque function fails."""
+
+    def guarded(time: float, state: Sequence[float]) -> list[float]:
+        try:
+            return slopes(time, state)
+        except InputError:
+            raise
+        except Exception as error:
+            raise TimedError(
+                f"[torque]: the function raised {type(error).__name__} at t = {{time}} s: "
+                f"{printable(str(error))}; allowed: a function that returns three components in "
+                "N m",
+                float(time),
+            ) from error
+
+    return guarded

@@ -1,0 +1,168 @@
+"""Taylor coefficients, in decimal arithmetic, of a torque that is recorded on a tape.
+
+The recurrences are those of Jorba and Zou 2005, Experimental Mathematics 14. The coefficients of
+all operations are computed order by order, together with those of the solution.
+"""
+
+from decimal import Decimal
+
+from pyharness.model.tape import N_INPUTS, Linear, Operation, Tape
+from pyharness.truth.decimal_functions import Row, product, sine_cosine
+
+# An angle beyond the range of binary64 has no sine in any method. Its reduction would take as many
+# digits as the angle has.
+_LARGEST_ANGLE = Decimal("1e308")
+# Relative accuracy with which the square of a root's polynomial must agree with its operand, so
+# that a negative value of the polynomial is not merely its truncation error.
+_TRUSTED = Decimal("1e-6")
+
+# A linear combination of slots: its constant, and pairs of a coefficient and a slot.
+_Sum = tuple[Decimal, list[tuple[Decimal, int]]]
+
+
+def series_products(tape: Tape) -> int:
+    """Return the number of products of two series that each order of a tape's series takes.
+
+    A sine and a cosine are computed together, by two products.
+    """
+    waves = ("sine", "cosine")
+    angles = {each.operands for each in tape.operations if each.kind in waves}
+    others = [each for each in tape.operations if each.kind not in ("linear", *waves)]
+    return 2 * len(angles) + len(others)
+
+
+class TapeSeries:
+    """The Taylor series of the operations of a tape around a time.
+
+    The method `begin` starts an expansion. Each call of `next` adds one coefficient to the series
+    of every operation.
+    """
+
+    def __init__(self, tape: Tape) -> None:
+        """Convert the numbers of the tape to Decimal, in the current arithmetic."""
+        self._operations = [(each, _sum(each.linear)) for each in tape.operations]
+        self._outputs = [_sum(each) for each in tape.outputs]
+        self._slots: list[Row] = []
+
+    def begin(self, time: Decimal, omega: list[Row], attitude: list[Row]) -> None:
+        """Begin an expansion around `time` (s).
+
+        `omega` and `attitude` are the lists of the Taylor coefficients of the unknowns. The caller
+        extends these lists. `attitude` is empty if the tape does not depend on the attitude.
+        """
+        self._order = 0
+        self._slots = [[time], *omega, *(attitude or [[] for _ in range(4)])]
+        self._slots += [[] for _ in self._operations]
+        # For each operand of a sine or a cosine: the series of the sine, and of the cosine.
+        self._waves: dict[int, tuple[Row, Row]] = {}
+        # For each operand of an exponential, a sine or a cosine: coefficient j times j.
+        self._slopes: dict[int, Row] = {}
+
+    def next(self) -> Row:
+        """Return the next Taylor coefficients of the three outputs, beginning with number 0.
+
+        The lists of the unknowns must contain the coefficients up to the same number. Raise
+        ArithmeticError if an operation is singular at the time of the expansion.
+        """
+        k = self._order
+        if k > 0:
+            self._slots[0].append(Decimal(k == 1))
+        for slot, (operation, linear) in enumerate(self._operations, N_INPUTS):
+            self._slots[slot].append(self._coefficient(operation, linear, slot, k))
+        self._order = k + 1
+        return [self._combined(each, k) for each in self._outputs]
+
+    def _combined(self, linear: _Sum, k: int) -> Decimal:
+        constant, terms = linear
+        start = constant if k == 0 else Decimal(0)
+        return sum((factor * self._slots[slot][k] for factor, slot in terms), start)
+
+    def _coefficient(self, operation: Operation, linear: _Sum, slot: int, k: int) -> Decimal:
+        """Return Taylor coefficient k of an operation, whose series has coefficients 0 to k - 1."""
+        kind, operands, _ = operation
+        if kind == "linear":
+            return self._combined(linear, k)
+        x, found = self._slots[operands[0]], self._slots[slot]
+        if kind == "product":
+            return product(x, self._slots[operands[1]][::-1])
+        if kind == "quotient":
+            divisor = self._slots[operands[1]]
+            return (x[k] - product(divisor[1:], found[::-1])) / divisor[0]
+        if kind == "sqrt":
+            return _root_coefficient(x, found, k)
+        if kind == "exp":
+            if k == 0:
+                return x[0].exp()
+            return product(self._slope(operands[0], k), found[::-1]) / k
+        sine, cosine = self._wave(operands[0], k)
+        return (sine if kind == "sine" else cosine)[k]
+
+    def _wave(self, operand: int, k: int) -> tuple[Row, Row]:
+        """Return the series of sine and cosine of a slot, with the coefficients 0 to k."""
+        if k == 0 and operand not in self._waves:
+            angle = self._slots[operand][0]
+            if abs(angle) > _LARGEST_ANGLE:
+                raise OverflowError("an angle is beyond the range of binary64")
+            first, second = sine_cosine(angle)
+            self._waves[operand] = [first], [second]
+        sine, cosine = self._waves[operand]
+        if len(sine) == k:
+            slope = self._slope(operand, k)
+            # Both right-hand sides use the coefficients 0 to k - 1.
+            terms = product(slope, cosine[::-1]) / k, -product(slope, sine[::-1]) / k
+            sine.append(terms[0])
+            cosine.append(terms[1])
+        return sine, cosine
+
+    def _slope(self, operand: int, k: int) -> Row:
+        """Return the coefficients 1 to k of a slot, each multiplied by its number."""
+        slope = self._slopes.setdefault(operand, [])
+        if len(slope) < k:
+            slope.append(k * self._slots[operand][k])
+        return slope
+
+    def crosses_a_branch(self, offset: Decimal) -> bool:
+        """Return whether a square root reaches 0 between the expansion's time and `offset` (s) on.
+
+        Beyond a double zero of its operand, the Taylor series of a square root is its negative. For
+        example, the series of sqrt(x**2) is that of x or -x, whereas the root is abs(x).
+        """
+        for slot, (operation, _) in enumerate(self._operations, N_INPUTS):
+            if operation.kind == "sqrt":
+                root = _value(self._slots[slot], offset)
+                operand = _value(self._slots[operation.operands[0]], offset)
+                if root < 0 and abs(root * root - operand) <= _TRUSTED * abs(operand):
+                    return True
+        return False
+
+
+def _sum(linear: Linear | None) -> _Sum:
+    """Return a linear combination in the current decimal arithmetic; 0 for None.
+
+    The numbers of a tape are exact binary fractions. They are rounded to the current arithmetic
+    like all others, so that equal numbers have the difference 0.
+    """
+    if linear is None:
+        return Decimal(0), []
+    return +Decimal(linear.constant), [(+Decimal(factor), slot) for slot, factor in linear.terms]
+
+
+def _root_coefficient(x: Row, root: Row, k: int) -> Decimal:
+    """Return Taylor coefficient k of the square root of x.
+
+    `root` contains the coefficients 0 to k - 1 of the root. If x is 0 throughout, so is its root.
+    Raise ArithmeticError where x is 0 and changes, because the root then has no Taylor series.
+    """
+    if k == 0:
+        return x[0].sqrt()
+    rest = x[k] - product(root[1:], root[:0:-1])
+    if root[0] == 0 == rest:
+        return rest
+    return rest / (2 * root[0])
+
+
+def _value(series: Row, offset: Decimal) -> Decimal:
+    total = Decimal(0)
+    for term in reversed(series):
+        total = total * offset + term
+    return total

@@ -1,0 +1,286 @@
+"""SciPy's methods for torques that depend on the state, compared with the reference."""
+
+import math
+import re
+from collections.abc import Callable
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness.methods.scipy_ivp import FINEST, finest_tolerance, scipy_method
+from pyharness.model.errors import InputError, TimedError
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque, opaque, replayed
+from pyharness.model.trajectory import Trajectory
+from pyharness.truth.reference import Reference, reference
+
+METHODS = ("DOP853", "RK45", "Radau", "LSODA")
+_MOMENTS = (1.5, 2.0, 3.0)
+_OMEGA = (0.3, -1.1, 2.2)
+_Torque = Callable[[Any, Any, Any], Any]
+
+
+def _random_torque(source: Random) -> _Torque:
+    """Return a random sum of damping, a wheel, drag, a pulse, a wave and a force of direction."""
+
+    def numbers(size: float) -> Any:
+        return np.array([source.uniform(-size, size) for _ in range(3)])
+
+    damping, wheel, constant = numbers(0.3), numbers(1.0), numbers(0.5)
+    begin, width = source.uniform(0.0, 5.0), source.uniform(1.0, 5.0)
+    frequency = source.uniform(1.0, 9.0)
+    kinds = [source.random() < 0.4 for _ in range(5)]
+    pull = source.uniform(0.1, 2.0)
+
+    def torque(t: Any, w: Any, q: Any) -> Any:
+        found = -damping * w
+        if kinds[0]:
+            found = found + np.cross(wheel, w)
+        if kinds[1]:
+            found = found - 0.2 * np.sqrt(w @ w + 0.01) * w
+        if kinds[2]:
+            found = found + constant * np.exp(-width * (t - begin) * (t - begin))
+        if kinds[3]:
+            found = found + constant * np.sin(frequency * t) / (1.0 + w[0] * w[0])
+        if kinds[4]:
+            found = found - pull * q[0] * q[1:]
+        return found
+
+    return torque
+
+
+def _random_scene(number: int) -> tuple[Scene, list[float]]:
+    """Return a random scene, with attitude in half of them, and times of results."""
+    source = Random(f"scipy-state/{number}")
+    torque = replayed(_random_torque(source))
+    low, middle = sorted(source.uniform(1.0, 5.0) for _ in range(2))
+    moments = [low, middle, source.uniform(middle - low, middle + low)]
+    source.shuffle(moments)
+    attitude = [source.uniform(-1.0, 1.0) for _ in range(4)]
+    with_attitude = torque.needs_attitude or source.random() < 0.5
+    scene = Scene(
+        f"{number}",
+        [source.uniform(-2.0, 2.0) for _ in range(3)],
+        moments,
+        torque=torque,
+        attitude=attitude if with_attitude else None,
+    )
+    # Backward in time, drag makes omega grow without bound.
+    end = source.uniform(1.0, 8.0) * source.choice((-0.2, 1.0))
+    return scene, [end * part for part in (0.2, 0.55, 1.0)]
+
+
+def _error(found: Trajectory, truth: Reference) -> float:
+    """Return the error of omega over the largest |omega| of the rows, or the angle's error."""
+    error = float(np.abs(found.omega - truth.omega).max() / np.abs(truth.omega).max())
+    if truth.attitude is None:
+        assert found.attitude is None
+        return error
+    assert found.attitude is not None
+    turned = 2.0 * np.linalg.norm(found.attitude - truth.attitude, axis=1).max()
+    return max(error, float(turned))
+
+
+@pytest.mark.parametrize("number", range(20))
+def test_the_error_is_below_the_tolerance(number: int) -> None:
+    scene, times = _random_scene(number)
+    truth = reference(scene, times)
+    assert len(truth.time) == 3
+    for name in METHODS:
+        for tolerance in (1e-3, 1e-7 if name == "Radau" else 1e-10):
+            found = scipy_method(name)(scene, times, tolerance)
+            assert found.ended == "complete"
+            assert found.time.tolist() == times
+            assert _error(found, truth) <= tolerance, (name, tolerance)
+
+
+def test_the_random_scenes_have_both_kinds_of_state() -> None:
+    scenes = [_random_scene(number)[0] for number in range(20)]
+    assert {scene.attitude is None for scene in scenes} == {True, False}
+    torques = [scene.torque for scene in scenes if isinstance(scene.torque, StateTorque)]
+    assert {each.needs_attitude for each in torques} == {True, False}
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("number", [0, 1, 2, 3])
+def test_an_opaque_torque_has_the_results_of_the_recorded_one(number: int, name: str) -> None:
+    """The two right-hand sides differ by rounding errors, and therefore the results do too."""
+    scene, times = _random_scene(number)
+    function = _random_torque(Random(f"scipy-state/{number}"))
+    torque = opaque(lambda t, omega, attitude: function(t, omega, attitude))
+    attitude = scene.attitude or (1.0, 0.0, 0.0, 0.0)
+    first, second = (
+        scipy_method(name)(
+            Scene("", scene.omega, scene.moments, torque=each, attitude=attitude), times, 1e-6
+        )
+        for each in (scene.torque, torque)
+    )
+    np.testing.assert_allclose(first.omega, second.omega, rtol=0, atol=1e-9)
+    assert first.attitude is not None
+    assert second.attitude is not None
+    np.testing.assert_allclose(first.attitude, second.attitude, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_short_pulse_is_not_missed(name: str) -> None:
+    """A body at rest until a pulse of 0.2 s in 10 s: every first step sees no torque."""
+    torque = replayed(lambda t, w, q: [np.exp(-200.0 * (t - 7.0) * (t - 7.0)), -w[1], -w[2]])
+    scene = Scene("", (0.0, 0.0, 0.0), _MOMENTS, torque=torque)
+    found = scipy_method(name)(scene, [10.0], 1e-6)
+    wanted = math.sqrt(math.pi / 200.0) / _MOMENTS[0]
+    assert found.omega[0, 0] == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["Radau", "LSODA"])
+def test_a_stiff_torque(name: str) -> None:
+    torque = replayed(lambda t, w, q: -1e6 * (w - np.array([0.1, 0.2, 0.3])))
+    scene = Scene("", _OMEGA, _MOMENTS, torque=torque)
+    found = scipy_method(name)(scene, [1.0, 2.0], 1e-6)
+    np.testing.assert_allclose(found.omega, [[0.1, 0.2, 0.3]] * 2, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_body_at_rest_remains_at_rest(name: str) -> None:
+    torque = replayed(lambda t, w, q: -np.sqrt(w @ w) * w)
+    attitude = (0.5, 0.5, -0.5, 0.5)
+    scene = Scene("", (0.0, 0.0, 0.0), _MOMENTS, torque=torque, attitude=attitude)
+    found = scipy_method(name)(scene, [1.0, 2.0], 1e-8)
+    np.testing.assert_array_equal(found.omega, np.zeros((2, 3)))
+    np.testing.assert_array_equal(found.attitude, [attitude] * 2)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_time_zero_alone_is_the_initial_state(name: str) -> None:
+    scene, _ = _random_scene(4)
+    found = scipy_method(name)(scene, [0.0], 1e-8)
+    np.testing.assert_array_equal(found.omega, [scene.omega])
+
+
+def _one(component: Any) -> list[Any]:
+    return [component, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize(
+    ("torque", "rows"),
+    [
+        (replayed(lambda t, w, q: _one(w[0] * w[0] * 3.0)), 1),  # omega becomes infinite
+        (replayed(lambda t, w, q: _one(1.0 / (t - 2.0))), 2),
+        (replayed(lambda t, w, q: _one(np.sqrt(0.9 - t))), 1),
+        (replayed(lambda t, w, q: _one(1.0 / t)), 0),
+        (opaque(lambda t, w: _one(math.nan if t > 0.7 else 0.1)), 1),
+        (opaque(lambda t, w: _one(math.inf if t > 0.7 else 0.1)), 1),
+        (opaque(lambda t, w: _one(-math.inf)), 0),
+        (opaque(lambda t, w: _one(np.log(0.9 - t))), 1),
+        (opaque(lambda t, w: _one(np.float64(1.0) / np.float64(t))), 0),
+    ],
+)
+def test_the_rows_end_where_the_torque_is_singular(
+    name: str, torque: StateTorque, rows: int
+) -> None:
+    scene = Scene("", _OMEGA, _MOMENTS, torque=torque)
+    found = scipy_method(name)(scene, [0.5, 1.0, 3.0], 1e-7)
+    assert found.ended == "overflow"
+    assert found.time.tolist() == [0.5, 1.0, 3.0][:rows]
+    assert np.isfinite(found.omega).all()
+    if rows and torque.tape is not None:
+        truth = reference(scene, [0.5, 1.0][:rows])
+        assert _error(found, truth) <= 1e-7
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("later", [0.0, 0.4])
+def test_an_exception_of_an_opaque_function_is_the_cause_of_an_input_error(
+    name: str, later: float
+) -> None:
+    for raised in (KeyError("mass"), ZeroDivisionError("x"), ValueError("array has infs or NaNs")):
+
+        def torque(t: Any, w: Any, raised: Exception = raised) -> Any:
+            if t >= later:
+                raise raised
+            return -w
+
+        scene = Scene("", _OMEGA, _MOMENTS, torque=opaque(torque))
+        with pytest.raises(InputError, match=rf"function raised {type(raised).__name__} at") as e:
+            scipy_method(name)(scene, [1.0], 1e-6)
+        assert e.value.__cause__ is raised
+        assert "\n" not in str(e.value)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_an_opaque_function_must_return_three_numbers(name: str) -> None:
+    for value in ([1.0, 2.0], 3.0, "abc", [1.0, 2.0, None], [1j, 0, 0]):
+        scene = Scene("", _OMEGA, _MOMENTS, torque=opaque(lambda t, w, value=value: value))
+        with pytest.raises(InputError, match=r"^\[torque\]"):
+            scipy_method(name)(scene, [1.0], 1e-6)
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("raised", [KeyboardInterrupt, SystemExit])
+def test_an_interrupt_is_not_caught(name: str, raised: type[BaseException]) -> None:
+    def torque(t: Any, w: Any) -> Any:
+        if t > 0.4:
+            raise raised
+        return -w
+
+    scene = Scene("", _OMEGA, _MOMENTS, torque=opaque(torque))
+    with pytest.raises(raised):
+        scipy_method(name)(scene, [1.0], 1e-6)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_the_work_limit_holds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pyharness.methods.scipy_ivp._MOST_EVALUATIONS", 1000)
+    calls = 0
+
+    def torque(t: Any, w: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        return -0.5 * np.sign(w)  # chatters where a component of omega is 0
+
+    scene = Scene("", _OMEGA, _MOMENTS, torque=opaque(torque))
+    with pytest.raises(TimedError, match=r"exceeded its work limit at t = .*--effort"):
+        scipy_method(name)(scene, [20.0], 1e-9)
+    assert calls <= 501
+
+
+def test_a_tolerance_that_can_not_be_met_is_refused() -> None:
+    """A component of omega grows by the factor exp(21), and so does the error of the first step."""
+    torque = replayed(lambda t, w, q: [6.0 * w[0], -w[1] + w[0] * w[0], -w[2]])
+    scene = Scene("", (1e-9, 1.0, 0.5), (2.0, 2.0, 2.0), torque=torque)
+    truth = reference(scene, [7.0])
+    refused = {}
+    for name in METHODS:
+        try:
+            found = scipy_method(name)(scene, [7.0], 1e-11)
+        except InputError as error:
+            refused[name] = str(error)
+        else:
+            assert _error(found, truth) <= 1e-11
+    assert {"DOP853", "RK45", "LSODA"} <= set(refused)
+    message = r"tolerance is 1e-11; [a-z0-9]+ can't meet it here, .*; allowed .* shorter time"
+    assert all(re.fullmatch(message, each) for each in refused.values())
+
+
+@pytest.mark.parametrize("name", ["DOP853", "RK45", "LSODA"])
+def test_the_smallest_tolerance_can_be_met(name: str) -> None:
+    for number in (1, 2, 5):
+        scene, times = _random_scene(number)
+        least = 1.06 * finest_tolerance(name, scene, times[-1])
+        assert FINEST[name] <= least < 1e-6
+        found = scipy_method(name)(scene, times, least)
+        assert _error(found, reference(scene, times)) <= least
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_torque_that_needs_the_attitude_needs_one(name: str) -> None:
+    torques = (
+        replayed(lambda t, w, q: -q[0] * q[1:]),
+        opaque(lambda t, omega, attitude: -attitude[1:]),
+    )
+    for torque in torques:
+        scene = Scene("", _OMEGA, _MOMENTS, torque=torque)
+        with pytest.raises(InputError, match=r"depends on the attitude .* give attitude=True"):
+            scipy_method(name)(scene, [1.0], 1e-6)

@@ -1,7 +1,7 @@
 ! The interface that f2py reads for scenes whose equations of motion are a tape.
 
-subroutine tape_rows(n_unknowns, n_slots, n_operations, operations, n_combinations, starts, n_terms, &
-                     slots, coefficients, constants, omega0, n_times, times, tolerance, &
+subroutine tape_rows(n_unknowns, n_slots, n_operations, operations, n_combinations, starts, &
+                     n_terms, slots, coefficients, constants, omega0, n_times, times, tolerance, &
                      n_attitudes, attitudes, effort, rows, n_rows, status, steps)
   ! Integrate a tape by Taylor series: omega and, if n_attitudes > 0, the attitude at `times`, which
   ! have one sign and are ordered away from 0.

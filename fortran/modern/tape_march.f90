@@ -4,11 +4,13 @@ module tape_march
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
+  use operations, only: SQUARE_ROOT => SQRT
   use problem, only: request_t, solution_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
   use tape_growth, only: begin, count_step, growth_of, MOST_UNKNOWNS, transitions_t
-  use tape_series, only: expand, LAST_TERM, MOST_ORDER, noise_of, propagate
+  use tape_series, only: expand, LAST_TERM, MOST_ORDER, noise_of, propagate, series_t, &
+                         VARIATION_TOLERANCE
   use two_words, only: two_sum
   implicit none(type, external)
   private
@@ -21,22 +23,15 @@ module tape_march
   real(dp), parameter :: LONGER = 16.0_dp  ! largest factor on the step that was tried
   real(dp), parameter :: SHORTER = 0.5_dp  ! least factor on the first step that was tried
   real(dp), parameter :: LEAST_LOCAL_TOLERANCE = 1e-18_dp ! below rounding
-  real(dp), parameter :: VARIATION_TOLERANCE = 1e-3_dp    ! of the perturbations, in each step
   ! If the first step forecasts more than this multiple of the steps allowed, the integration ends.
   real(dp), parameter :: HOPELESS = 10.0_dp
   ! If the steps increase with a larger power of time, this is not by chance.
   real(dp), parameter :: GROWING = 1.3_dp
   real(dp), parameter :: RIDGE = 1.001_dp  ! makes the fit work for one pole or none
-  real(dp), parameter :: LINEAR_RANGE = 0.1_dp ! largest error for which the linearised equations hold
+  ! Largest error for which the linearised equations hold.
+  real(dp), parameter :: LINEAR_RANGE = 0.1_dp
+  real(dp), parameter :: ROOT_TOLERANCE = 0.1_dp ! relative deviation of a squared root
   integer, parameter :: ROWS_BETWEEN_LOOKS = 2**17
-
-  ! Working storage of the integrations of a request.
-  type, public :: room_t
-    real(dp), allocatable :: a(:, :), b(:, :)     ! (0:LAST_TERM, slots): terms, ascending and descending
-    real(dp), allocatable :: v(:, :, :, :)        ! (4, 0:MOST_ORDER, slots, 2): of perturbations
-    real(dp), allocatable :: slot_noise(:)        ! (slots): rounding error of terms 0
-    type(transitions_t) :: transitions
-  end type room_t
 
   ! One integration of a request.
   type, public :: attempt_t
@@ -56,41 +51,30 @@ module tape_march
     logical :: finest = .false. ! whether the local tolerance is the smallest
   end type outcome_t
 
-  public :: allocate_room, march
+  public :: march
 
 contains
 
-  subroutine allocate_room(tape, room, failed)
-    !! Allocate the working storage; `failed` is not 0 if there is not enough memory.
-    type(tape_t), intent(in) :: tape
-    type(room_t), intent(inout) :: room
-    integer, intent(out) :: failed
-
-    allocate (room%a(0:LAST_TERM, tape%n_slots), stat=failed)
-    if (failed == 0) allocate (room%b(0:LAST_TERM, tape%n_slots), stat=failed)
-    if (failed == 0) allocate (room%v(4, 0:MOST_ORDER, tape%n_slots, 2), stat=failed)
-    if (failed == 0) allocate (room%slot_noise(tape%n_slots), stat=failed)
-  end subroutine allocate_room
-
-  subroutine march(tape, request, attitude, attempt, room, solution, found)
+  subroutine march(tape, request, attitude, attempt, s, solution, found)
     !! Integrate once from 0 to the last of the times: rows, their number and the status.
     type(tape_t), intent(in) :: tape
     type(request_t), intent(in) :: request
     real(dp), intent(in) :: attitude(4)       !! at time 0
     type(attempt_t), intent(in) :: attempt
-    type(room_t), intent(inout) :: room
+    type(series_t), intent(inout) :: s        !! working storage
     type(solution_t), intent(inout) :: solution
     type(outcome_t), intent(out) :: found
+    type(transitions_t) :: transitions
     real(dp) :: y(tape%n_unknowns), y_low(tape%n_unknowns) ! unknowns and their rounding errors
     real(dp) :: left(tape%n_unknowns)         ! truncation error of the step
     real(dp) :: weights(tape%n_unknowns)      ! which make the unknowns comparable
     real(dp) :: noise(tape%n_unknowns)
     real(dp) :: lanes(8, MOST_UNKNOWNS)       ! the error, and a perturbation of each unknown
     real(dp) :: t(2)                          ! time and its rounding error, s
-    real(dp) :: t_end, rest, h, factor, local_tolerance, scale, power
+    real(dp) :: t_end, rest, factor, local_tolerance, scale, power
     real(dp) :: t_half                        ! the time after half_way steps, s
     logical :: at_end, from_rest, is_full, has_guess, short
-    integer :: i, k, n, order, n_before, n_blocks, tries, last_terms(2)
+    integer :: i, k, n, n_before, n_blocks, tries, last_terms(2)
     integer(int64) :: next_look, half_way
 
     n = tape%n_unknowns
@@ -103,16 +87,16 @@ contains
     rest = t_end
     solution%status = COMPLETE
     solution%n_rows = 0
-    room%a = 0.0_dp
-    room%b = 0.0_dp
-    room%v = 0.0_dp
-    call begin(n, room%transitions)
+    s%a = 0.0_dp
+    s%b = 0.0_dp
+    s%v = 0.0_dp
+    call begin(n, transitions)
     call begin_lanes()
     scale = maxval(abs(request%omega))
     from_rest = .not. scale > 0.0_dp
     local_tolerance = max(LEAST_LOCAL_TOLERANCE, 0.125_dp*attempt%tolerance)
-    order = order_for(local_tolerance)
-    h = t_end
+    s%order = order_for(local_tolerance)
+    s%h = t_end
     next_look = 1
     half_way = max(1_int64, int(0.5_dp*min(4e18_dp, attempt%most_steps), int64))
     t_half = 0.0_dp
@@ -120,11 +104,11 @@ contains
     has_guess = .false.
     do
       call set_unknowns()
-      call expand(tape, t(2), h, order, room%a, room%b)
+      call expand(tape, t(2), s)
       ! The scale of a body at rest is the omega that it is about to reach.
       if (found%steps == 0 .and. from_rest) scale = largest_terms()
       call weigh()
-      factor = fitting(tape, order, local_tolerance, weights, room%a)
+      factor = fitting(tape, s%order, local_tolerance, weights, s%a)
       if (.not. factor > 0.0_dp) then
         ! The terms are not finite.
         tries = tries + 1
@@ -132,22 +116,22 @@ contains
           solution%status = OVERFLOW
           exit
         end if
-        room%a = 0.0_dp
-        room%b = 0.0_dp
-        h = 0.0625_dp*h
+        s%a = 0.0_dp
+        s%b = 0.0_dp
+        s%h = 0.0625_dp*s%h
         cycle
       end if
       if (found%steps == 0 .and. tries < MOST_TRIES) then
         ! The first step is a guess, and so is the omega that a body at rest is about to reach.
         if (factor < SHORTER) then
           tries = tries + 1
-          h = factor*h
+          s%h = factor*s%h
           cycle
         end if
         if (.not. has_guess) then
           has_guess = .true.
-          local_tolerance = local_tolerance_of(attempt%tolerance, t_end/(factor*h))
-          order = order_for(local_tolerance)
+          local_tolerance = local_tolerance_of(attempt%tolerance, t_end/(factor*s%h))
+          s%order = order_for(local_tolerance)
           found%finest = local_tolerance <= LEAST_LOCAL_TOLERANCE
           cycle
         end if
@@ -156,25 +140,24 @@ contains
       factor = to_end(factor)
       do k = 1, n_blocks
         call set_lanes(k)
-        ! The first lane of all is the error, which may be zero.
-        call propagate(tape, h, order, room%a, room%b, factor, weights, VARIATION_TOLERANCE, &
-                       merge(2, 1, k == 1), room%v(:, :, :, k), last_terms(k), short)
+        call propagate(tape, s, factor, weights, k, last_terms(k), short)
         ! Perturbations may change faster than the motion, as about a steady rotation.
         if (short) factor = factor*fitting_lanes(k)
       end do
-      at_end = abs(factor*h) >= abs(rest)*(1.0_dp - epsilon(h))
-      if (at_end) factor = rest/h
+      factor = before_zero_of_root(tape, s%order, s%a, factor)
+      at_end = abs(factor*s%h) >= abs(rest)*(1.0_dp - epsilon(s%h))
+      if (at_end) factor = rest/s%h
       call estimate_truncation()
-      call noise_of(tape, room%a, noise, room%slot_noise)
+      call noise_of(tape, s, noise)
       do i = 1, n
-        found%noise = found%noise + (weights(i)*noise(i)*factor*h)**2
+        found%noise = found%noise + (weights(i)*noise(i)*factor*s%h)**2
       end do
       n_before = solution%n_rows
       call add_rows()
       if (solution%status /= COMPLETE) exit
       call take_step()
       found%steps = found%steps + 1
-      if (.not. maxval(abs(y)) <= huge(h)) then
+      if (.not. maxval(abs(y)) <= huge(s%h)) then
         solution%status = OVERFLOW
         exit
       end if
@@ -183,12 +166,17 @@ contains
         call add_row(y, y_low, lanes(1, :n), solution%n_rows + 1)
         exit
       end if
-      call count_step(solution%n_rows > n_before, transposed(lanes), room%transitions, is_full)
+      ! The steps shrink to nothing before a singularity.
+      if (abs(factor*s%h) <= spacing(t(1))) then
+        solution%status = OVERFLOW
+        exit
+      end if
+      call count_step(solution%n_rows > n_before, transposed(lanes), transitions, is_full)
       if (is_full) call begin_block()
-      call two_sum((t(1)), factor*h + t(2), t(1), t(2))
+      call two_sum((t(1)), factor*s%h + t(2), t(1), t(2))
       rest = (t_end - t(1)) - t(2)
-      h = factor*h
-      if (abs(h) > abs(rest)) h = rest
+      s%h = factor*s%h
+      if (abs(s%h) > abs(rest)) s%h = rest
       if (found%steps >= next_look) then
         next_look = max(found%steps + 1, int(min(4e18_dp, attempt%most_steps), int64))
         next_look = min(found%steps + attempt%stride, next_look)
@@ -214,7 +202,7 @@ contains
       end if
     end do
     call weigh()
-    found%growth = growth_of(transposed(lanes), 1.0_dp/weights, room%transitions)
+    found%growth = growth_of(transposed(lanes), 1.0_dp/weights, transitions)
     found%noise = sqrt(found%noise)
     do i = 1, n
       found%error = max(found%error, weights(i)*abs(lanes(1, i)))
@@ -242,13 +230,13 @@ contains
       !! Set the terms that the expansion begins with.
       integer :: i
 
-      room%a(0, TIME_SLOT) = t(1)
-      room%a(1, TIME_SLOT) = h
-      room%b(MOST_ORDER, TIME_SLOT) = t(1)
-      room%b(MOST_ORDER - 1, TIME_SLOT) = h
+      s%a(0, TIME_SLOT) = t(1)
+      s%a(1, TIME_SLOT) = s%h
+      s%b(MOST_ORDER, TIME_SLOT) = t(1)
+      s%b(MOST_ORDER - 1, TIME_SLOT) = s%h
       do i = 1, n
-        room%a(0, FIRST_UNKNOWN - 1 + i) = y(i)
-        room%b(MOST_ORDER, FIRST_UNKNOWN - 1 + i) = y(i)
+        s%a(0, FIRST_UNKNOWN - 1 + i) = y(i)
+        s%b(MOST_ORDER, FIRST_UNKNOWN - 1 + i) = y(i)
       end do
     end subroutine set_unknowns
 
@@ -259,7 +247,7 @@ contains
       integer :: i
 
       do i = 1, n
-        room%v(:, 0, FIRST_UNKNOWN - 1 + i, k) = lanes(4*k - 3:4*k, i)
+        s%v(:, 0, FIRST_UNKNOWN - 1 + i, k) = lanes(4*k - 3:4*k, i)
       end do
     end subroutine set_lanes
 
@@ -273,21 +261,21 @@ contains
       last_term = 0.0_dp
       do i = 1, n
         associate (slot => FIRST_UNKNOWN - 1 + i)
-          first = max(first, weights(i)*maxval(abs(room%v(2:, 0, slot, k))))
-          last_term = max(last_term, weights(i)*maxval(abs(room%v(2:, order, slot, k))), &
-                          weights(i)*maxval(abs(room%v(2:, order - 1, slot, k)))/factor)
+          first = max(first, weights(i)*maxval(abs(s%v(2:, 0, slot, k))))
+          last_term = max(last_term, weights(i)*maxval(abs(s%v(2:, s%order, slot, k))), &
+                          weights(i)*maxval(abs(s%v(2:, s%order - 1, slot, k)))/factor)
         end associate
       end do
-      last_term = last_term*factor**order
+      last_term = last_term*factor**s%order
       fitting_lanes = 0.25_dp
-      if (last_term <= huge(h) .and. last_term > 0.0_dp .and. first > 0.0_dp) then
-        fitting_lanes = min(1.0_dp, (VARIATION_TOLERANCE*first/last_term)**(1.0_dp/order))
+      if (last_term <= huge(s%h) .and. last_term > 0.0_dp .and. first > 0.0_dp) then
+        fitting_lanes = min(1.0_dp, (VARIATION_TOLERANCE*first/last_term)**(1.0_dp/s%order))
       end if
     end function fitting_lanes
 
     real(dp) function largest_terms()
       !! Return the largest of the first terms of omega.
-      largest_terms = min(huge(h), maxval(abs(room%a(1:4, FIRST_UNKNOWN:FIRST_UNKNOWN + 2))))
+      largest_terms = min(huge(s%h), maxval(abs(s%a(1:4, FIRST_UNKNOWN:FIRST_UNKNOWN + 2))))
     end function largest_terms
 
     subroutine weigh()
@@ -301,10 +289,10 @@ contains
       real(dp), intent(in) :: factor
 
       to_end = factor
-      if (factor*abs(h) >= abs(rest)) then
-        to_end = rest/h
-      else if (abs(rest) < 4.0_dp*factor*abs(h)) then
-        to_end = (rest/h)/ceiling(rest/(factor*h))
+      if (factor*abs(s%h) >= abs(rest)) then
+        to_end = rest/s%h
+      else if (abs(rest) < 4.0_dp*factor*abs(s%h)) then
+        to_end = (rest/s%h)/ceiling(rest/(factor*s%h))
       end if
     end function to_end
 
@@ -315,7 +303,7 @@ contains
       real(dp) :: near, far
       integer :: i, k
 
-      powers(FITTED) = factor**order
+      powers(FITTED) = factor**s%order
       do k = FITTED - 1, 1, -1
         powers(k) = powers(k + 1)/factor
       end do
@@ -325,7 +313,8 @@ contains
       ux = 0.0_dp
       vx = 0.0_dp
       do i = 1, n
-        x = weights(i)/local_tolerance*powers*room%a(order - FITTED + 1:order, FIRST_UNKNOWN - 1 + i)
+        x = weights(i)/local_tolerance &
+            *powers*s%a(s%order - FITTED + 1:s%order, FIRST_UNKNOWN - 1 + i)
         uu = uu + (x(3)*x(3) + x(2)*x(2))
         vv = vv + (x(2)*x(2) + x(1)*x(1))
         uv = uv + (x(3)*x(2) + x(2)*x(1))
@@ -341,20 +330,20 @@ contains
       q = q/determinant
       do i = 1, n
         associate (slot => FIRST_UNKNOWN - 1 + i)
-          left(i) = p*(room%a(order, slot)*powers(FITTED)) &
-                    - q*(room%a(order - 1, slot)*powers(FITTED - 1))
+          left(i) = p*(s%a(s%order, slot)*powers(FITTED)) &
+                    - q*(s%a(s%order - 1, slot)*powers(FITTED - 1))
         end associate
       end do
       ! The fit may be small by chance.
       near = 0.0_dp
       far = 0.0_dp
-      power = factor**(order - 2*FEW + 1)
-      do k = order - 2*FEW + 1, order
+      power = factor**(s%order - 2*FEW + 1)
+      do k = s%order - 2*FEW + 1, s%order
         do i = 1, n
-          if (k > order - FEW) then
-            near = near + weights(i)*abs(room%a(k, FIRST_UNKNOWN - 1 + i))*power
+          if (k > s%order - FEW) then
+            near = near + weights(i)*abs(s%a(k, FIRST_UNKNOWN - 1 + i))*power
           else
-            far = far + weights(i)*abs(room%a(k, FIRST_UNKNOWN - 1 + i))*power
+            far = far + weights(i)*abs(s%a(k, FIRST_UNKNOWN - 1 + i))*power
           end if
         end do
         power = power*factor
@@ -370,14 +359,14 @@ contains
 
       do i = 1, n
         change = 0.0_dp
-        do k = order, 1, -1
-          change = factor*(change + room%a(k, FIRST_UNKNOWN - 1 + i))
+        do k = s%order, 1, -1
+          change = factor*(change + s%a(k, FIRST_UNKNOWN - 1 + i))
         end do
         call two_sum((y(i)), change + y_low(i), y(i), y_low(i))
         do m = 1, n_blocks
-          x = room%v(:, last_terms(m), FIRST_UNKNOWN - 1 + i, m)
+          x = s%v(:, last_terms(m), FIRST_UNKNOWN - 1 + i, m)
           do k = last_terms(m) - 1, 0, -1
-            x = factor*x + room%v(:, k, FIRST_UNKNOWN - 1 + i, m)
+            x = factor*x + s%v(:, k, FIRST_UNKNOWN - 1 + i, m)
           end do
           lanes(4*m - 3:4*m, i) = x
         end do
@@ -393,19 +382,19 @@ contains
       last_row = size(request%times)
       if (at_end) last_row = last_row - 1
       do while (solution%n_rows < last_row)
-        part = ((request%times(solution%n_rows + 1) - t(1)) - t(2))/h
+        part = ((request%times(solution%n_rows + 1) - t(1)) - t(2))/s%h
         if (abs(part) > factor) return
         do i = 1, n
           change(i) = 0.0_dp
-          do k = order, 1, -1
-            change(i) = part*(change(i) + room%a(k, FIRST_UNKNOWN - 1 + i))
+          do k = s%order, 1, -1
+            change(i) = part*(change(i) + s%a(k, FIRST_UNKNOWN - 1 + i))
           end do
-          error(i) = room%v(1, last_terms(1), FIRST_UNKNOWN - 1 + i, 1)
+          error(i) = s%v(1, last_terms(1), FIRST_UNKNOWN - 1 + i, 1)
           do k = last_terms(1) - 1, 0, -1
-            error(i) = part*error(i) + room%v(1, k, FIRST_UNKNOWN - 1 + i, 1)
+            error(i) = part*error(i) + s%v(1, k, FIRST_UNKNOWN - 1 + i, 1)
           end do
         end do
-        call add_row(y, y_low + change, error - (part/factor)**(order + 1)*left, &
+        call add_row(y, y_low + change, error - (part/factor)**(s%order + 1)*left, &
                      solution%n_rows + 1)
         if (solution%status /= COMPLETE) return
         if (mod(solution%n_rows, ROWS_BETWEEN_LOOKS) == 0) then
@@ -431,7 +420,7 @@ contains
       else
         z = high + low
       end if
-      if (.not. maxval(abs(z)) <= huge(h)) then
+      if (.not. maxval(abs(z)) <= huge(s%h)) then
         solution%status = OVERFLOW
         return
       end if
@@ -479,6 +468,33 @@ contains
       end if
     end do
   end function fitting
+
+  pure real(dp) function before_zero_of_root(tape, order, a, factor)
+    !! Return the factor on the step, reduced until each series of a square root is the root of the
+    !! series of its argument at the end of the step. The series of a root continues with the wrong
+    !! sign where its argument touches zero.
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: order
+    real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots)
+    real(dp), intent(in) :: factor
+    real(dp) :: argument, root
+    integer :: k, n, tries
+
+    before_zero_of_root = factor
+    do n = 1, tape%n_operations
+      if (tape%operations(1, n) /= SQUARE_ROOT) cycle
+      do tries = 1, MOST_TRIES
+        argument = 0.0_dp
+        root = 0.0_dp
+        do k = order - 1, 0, -1
+          argument = before_zero_of_root*argument + a(k, tape%operations(2, n))
+          root = before_zero_of_root*root + a(k, tape%operations(4, n))
+        end do
+        if (root >= 0.0_dp .and. abs(root*root - argument) <= ROOT_TOLERANCE*argument) exit
+        before_zero_of_root = 0.5_dp*before_zero_of_root
+      end do
+    end do
+  end function before_zero_of_root
 
   pure integer function order_for(local_tolerance)
     !! Return the order with the least work for the requested digits (Jorba and Zou 2005).

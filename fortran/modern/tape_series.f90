@@ -13,16 +13,49 @@ module tape_series
   ! A product sums four terms at once, and may read three terms beyond its last.
   integer, parameter, public :: LAST_TERM = MOST_ORDER + 3
   real(dp), parameter :: EPSILON_OF_FUNCTION = 2.0_dp ! rounding error of a function, in units
+  ! Largest terms of perturbations that a step leaves out, relative.
+  real(dp), parameter, public :: VARIATION_TOLERANCE = 1e-3_dp
 
-  public :: expand, noise_of, propagate
+  ! Taylor series around the beginning of a step.
+  type, public :: series_t
+    real(dp) :: h                           !! s; a term includes its power of it
+    integer :: order
+    real(dp), allocatable :: a(:, :)        !! (0:LAST_TERM, slots): terms in ascending order
+    real(dp), allocatable :: b(:, :)        !! b(MOST_ORDER - k, :) = a(k, :)
+    ! (4, 0:MOST_ORDER, slots, 2): terms of perturbations, of which four are side by side
+    real(dp), allocatable :: v(:, :, :, :)
+    real(dp), allocatable :: noise(:)       !! (slots): rounding errors of terms 0, in units
+  end type series_t
+
+  public :: allocate_series, expand, noise_of, propagate
 
 contains
 
-  pure subroutine expand(tape, t_low, h, order, a, b)
-    !! Compute the terms of all slots, and terms 1 to `order` of the unknowns. Terms 0 of the time
-    !! and of the unknowns are inputs, and so is term 1 of the time.
+  pure subroutine allocate_series(n_slots, s, fits)
+    !! Allocate the terms of all slots.
+    integer, intent(in) :: n_slots
+    type(series_t), intent(inout) :: s
+    logical, intent(out) :: fits !! whether there is enough memory
+    integer :: failed
+
+    allocate (s%a(0:LAST_TERM, n_slots), s%b(0:LAST_TERM, n_slots), &
+              s%v(4, 0:MOST_ORDER, n_slots, 2), s%noise(n_slots), stat=failed)
+    fits = failed == 0
+  end subroutine allocate_series
+
+  pure subroutine expand(tape, t_low, s)
+    !! Compute the terms of all slots, and those of the unknowns up to the order. Terms 0 of the
+    !! time and of the unknowns are inputs, and so is term 1 of the time.
     type(tape_t), intent(in) :: tape
-    real(dp), intent(in) :: t_low, h  !! rounding error of the time, and the step, s
+    real(dp), intent(in) :: t_low  !! rounding error of the time, s
+    type(series_t), intent(inout) :: s
+
+    call expand_terms(tape, t_low, s%h, s%order, s%a, s%b)
+  end subroutine expand
+
+  pure subroutine expand_terms(tape, t_low, h, order, a, b)
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: t_low, h  !! s
     integer, intent(in) :: order
     real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots) !! terms in ascending order
     real(dp), intent(inout) :: b(0:LAST_TERM, tape%n_slots) !! b(MOST_ORDER - k) = a(k)
@@ -87,13 +120,13 @@ contains
         b(MOST_ORDER - k - 1, out) = x
       end do
     end do
-  end subroutine expand
+  end subroutine expand_terms
 
   pure real(dp) function convolved(k, a, b)
     !! Return term k of the product of two series. Four sums side by side fill a register.
     integer, intent(in) :: k
     real(dp), intent(in) :: a(0:LAST_TERM) !! in ascending order
-    real(dp), intent(in) :: b(0:LAST_TERM) !! in descending order; the numbers beyond the first are 0
+    real(dp), intent(in) :: b(0:LAST_TERM) !! descending; beyond the first term 0
     real(dp) :: x1, x2, x3, x4
     integer :: j
 
@@ -124,66 +157,29 @@ contains
     end do
   end function combined
 
-  pure subroutine propagate(tape, h, order, a, b, factor, weights, tolerance, lane, &
-                            v, last, short)
-    !! Expand four perturbations side by side, whose values are in v(:, 0, unknown), to as many
-    !! terms as they need.
+  pure subroutine propagate(tape, s, factor, weights, block, last, short)
+    !! Expand the four perturbations of a block, whose values are in the terms 0 of the unknowns, to
+    !! as many terms as they need.
     type(tape_t), intent(in) :: tape
-    real(dp), intent(in) :: h         !! s
-    integer, intent(in) :: order
-    real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots), b(0:LAST_TERM, tape%n_slots)
-    real(dp), intent(in) :: factor    !! the step over h
-    real(dp), intent(in) :: weights(:)!! of the unknowns, which make them comparable
-    real(dp), intent(in) :: tolerance !! largest terms left out, relative
-    integer, intent(in) :: lane       !! first lane that decides how many terms are needed
-    real(dp), intent(inout) :: v(4, 0:MOST_ORDER, tape%n_slots)
-    integer, intent(out) :: last      !! the last term
-    logical, intent(out) :: short     !! whether all terms do not suffice for the step
-    real(dp) :: x(4), y(4), power, size_0, size_k, before
-    integer :: i, k, n, out
+    type(series_t), intent(inout) :: s
+    real(dp), intent(in) :: factor     !! the step over h
+    real(dp), intent(in) :: weights(:) !! of the unknowns, which make them comparable
+    integer, intent(in) :: block       !! 1 or 2; the first perturbation of block 1 is the error
+    integer, intent(out) :: last       !! the last term
+    logical, intent(out) :: short      !! whether all terms do not suffice for the step
+    real(dp) :: power, size_0, size_k, before
+    integer :: k
 
     size_0 = size_of(0)
     before = size_0
     power = 1.0_dp
-    do k = 0, order - 1
-      do n = 1, tape%n_operations
-        associate (first => tape%operations(2, n), second => tape%operations(3, n))
-          out = tape%operations(4, n)
-          x = 0.0_dp
-          select case (tape%operations(1, n))
-          case (LINEAR)
-            call combine(tape, first, k, v, x)
-          case (PRODUCT)
-            call convolve(k, v(:, :, first), b(:, second), x)
-            call convolve(k, v(:, :, second), b(:, first), x)
-          case (QUOTIENT)
-            call convolve(k, v(:, :, second), b(:, out), x)
-            call convolve_before(k, v(:, :, out), b(:, second), x)
-            x = (v(:, k, first) - x)/a(0, second)
-          case (SQUARE_ROOT)
-            call convolve_before(k, v(:, :, out), b(:, out), x)
-            x = (0.5_dp*v(:, k, first) - x)/a(0, out)
-          case (EXPONENTIAL)
-            call convolve(k, v(:, :, first), b(:, out), x)
-          case default
-            y = 0.0_dp
-            call convolve(k, v(:, :, first), b(:, out + 1), x)
-            call convolve(k, v(:, :, first), b(:, out), y)
-            v(:, k, out + 1) = -y
-          end select
-          v(:, k, out) = x
-        end associate
-      end do
-      do i = 1, tape%n_unknowns
-        x = 0.0_dp
-        call combine(tape, size(tape%constants) - tape%n_unknowns + i, k, v, x)
-        v(:, k + 1, FIRST_UNKNOWN - 1 + i) = (h/(k + 1))*x
-      end do
+    do k = 0, s%order - 1
+      call propagate_term(tape, k, s%h, s%a, s%b, s%v(:, :, :, block))
       last = k + 1
       power = power*factor
       size_k = power*size_of(last)
       ! Every other term may be zero.
-      short = .not. max(size_k, before) <= tolerance*size_0
+      short = .not. max(size_k, before) <= VARIATION_TOLERANCE*size_0
       if (.not. short) return
       before = size_k
     end do
@@ -192,15 +188,63 @@ contains
 
     pure real(dp) function size_of(k)
       integer, intent(in) :: k
-      integer :: i
+      integer :: i, lane
 
+      ! The error may be zero.
       size_of = 0.0_dp
       do i = 1, tape%n_unknowns
-        size_of = max(size_of, weights(i)*maxval(abs(v(lane:, k, FIRST_UNKNOWN - 1 + i))))
+        do lane = merge(2, 1, block == 1), 4
+          size_of = max(size_of, weights(i)*abs(s%v(lane, k, FIRST_UNKNOWN - 1 + i, block)))
+        end do
       end do
     end function size_of
 
   end subroutine propagate
+
+  pure subroutine propagate_term(tape, k, h, a, b, v)
+    !! Compute terms k of four perturbations of all slots, and terms k + 1 of the unknowns.
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: k
+    real(dp), intent(in) :: h  !! s
+    real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots), b(0:LAST_TERM, tape%n_slots)
+    real(dp), intent(inout) :: v(4, 0:MOST_ORDER, tape%n_slots)
+    real(dp) :: x(4), y(4)
+    integer :: i, n, out
+
+    do n = 1, tape%n_operations
+      associate (first => tape%operations(2, n), second => tape%operations(3, n))
+        out = tape%operations(4, n)
+        x = 0.0_dp
+        select case (tape%operations(1, n))
+        case (LINEAR)
+          call combine(tape, first, k, v, x)
+        case (PRODUCT)
+          call convolve(k, v(:, :, first), b(:, second), x)
+          call convolve(k, v(:, :, second), b(:, first), x)
+        case (QUOTIENT)
+          call convolve(k, v(:, :, second), b(:, out), x)
+          call convolve_before(k, v(:, :, out), b(:, second), x)
+          x = (v(:, k, first) - x)/a(0, second)
+        case (SQUARE_ROOT)
+          call convolve_before(k, v(:, :, out), b(:, out), x)
+          x = (0.5_dp*v(:, k, first) - x)/a(0, out)
+        case (EXPONENTIAL)
+          call convolve(k, v(:, :, first), b(:, out), x)
+        case default
+          y = 0.0_dp
+          call convolve(k, v(:, :, first), b(:, out + 1), x)
+          call convolve(k, v(:, :, first), b(:, out), y)
+          v(:, k, out + 1) = -y
+        end select
+        v(:, k, out) = x
+      end associate
+    end do
+    do i = 1, tape%n_unknowns
+      x = 0.0_dp
+      call combine(tape, size(tape%constants) - tape%n_unknowns + i, k, v, x)
+      v(:, k + 1, FIRST_UNKNOWN - 1 + i) = (h/(k + 1))*x
+    end do
+  end subroutine propagate_term
 
   pure subroutine combine(tape, n, k, v, x)
     !! Add term k of the perturbations of linear combination n.
@@ -248,41 +292,40 @@ contains
     x = [x1, x2, x3, x4]
   end subroutine convolve_before
 
-  pure subroutine noise_of(tape, a, noise, slot_noise)
+  pure subroutine noise_of(tape, s, noise)
     !! Compute bounds of the rounding errors of the derivatives of the unknowns, in units of the
     !! rounding error of 1, by running error analysis of terms 0 (Higham 2002, section 3.3). The
     !! time and the unknowns are taken as exact.
     type(tape_t), intent(in) :: tape
-    real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots)
+    type(series_t), intent(inout) :: s
     real(dp), intent(out) :: noise(:)
-    real(dp), intent(inout) :: slot_noise(:)
     integer :: i, n, out
 
-    slot_noise = 0.0_dp
+    s%noise = 0.0_dp
     do n = 1, tape%n_operations
       associate (first => tape%operations(2, n), second => tape%operations(3, n))
         out = tape%operations(4, n)
         select case (tape%operations(1, n))
         case (LINEAR)
-          slot_noise(out) = of_combination(first)
+          s%noise(out) = of_combination(first)
         case (PRODUCT)
-          slot_noise(out) = abs(a(0, out)) + abs(a(0, first))*slot_noise(second) &
-                            + abs(a(0, second))*slot_noise(first)
+          s%noise(out) = abs(s%a(0, out)) + abs(s%a(0, first))*s%noise(second) &
+                         + abs(s%a(0, second))*s%noise(first)
         case (QUOTIENT)
-          slot_noise(out) = abs(a(0, out)) &
-                            + (slot_noise(first) + abs(a(0, out))*slot_noise(second)) &
-                            /abs(a(0, second))
+          s%noise(out) = abs(s%a(0, out)) &
+                         + (s%noise(first) + abs(s%a(0, out))*s%noise(second)) &
+                         /abs(s%a(0, second))
         case (SQUARE_ROOT)
-          slot_noise(out) = abs(a(0, out)) + slot_noise(first)/(2.0_dp*abs(a(0, out)))
+          s%noise(out) = abs(s%a(0, out)) + s%noise(first)/(2.0_dp*abs(s%a(0, out)))
         case (EXPONENTIAL)
-          slot_noise(out) = abs(a(0, out))*(EPSILON_OF_FUNCTION + slot_noise(first))
+          s%noise(out) = abs(s%a(0, out))*(EPSILON_OF_FUNCTION + s%noise(first))
         case default
-          slot_noise(out) = EPSILON_OF_FUNCTION
-          slot_noise(out + 1) = EPSILON_OF_FUNCTION
+          s%noise(out) = EPSILON_OF_FUNCTION
+          s%noise(out + 1) = EPSILON_OF_FUNCTION
           ! An angle proportional to time has no rounding error.
           if (second == 0) then
-            slot_noise(out) = slot_noise(out) + abs(a(0, out + 1))*slot_noise(first)
-            slot_noise(out + 1) = slot_noise(out + 1) + abs(a(0, out))*slot_noise(first)
+            s%noise(out) = s%noise(out) + abs(s%a(0, out + 1))*s%noise(first)
+            s%noise(out + 1) = s%noise(out + 1) + abs(s%a(0, out))*s%noise(first)
           end if
         end select
       end associate
@@ -301,7 +344,7 @@ contains
       ! One term alone is rounded once, and the multiplication by 1 not at all.
       do i = tape%starts(n), tape%starts(n + 1) - 1
         of_combination = of_combination + abs(tape%coefficients(i)) &
-                         *(abs(a(0, tape%slots(i))) + slot_noise(tape%slots(i)))
+                         *(abs(s%a(0, tape%slots(i))) + s%noise(tape%slots(i)))
       end do
       if (tape%starts(n + 1) > tape%starts(n)) then
         of_combination = of_combination + abs(tape%constants(n))

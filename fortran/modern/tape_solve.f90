@@ -7,7 +7,8 @@ module tape_solve
   use problem, only: request_t, solution_t
   use statuses, only: COMPLETE, GAVE_UP, SENSITIVE
   use tape, only: tape_t
-  use tape_march, only: allocate_room, attempt_t, march, outcome_t, room_t
+  use tape_march, only: attempt_t, march, outcome_t
+  use tape_series, only: allocate_series, series_t
   implicit none(type, external)
   private
 
@@ -37,13 +38,12 @@ contains
     type(tape_t), pointer :: tape
     type(request_t), pointer :: request
     type(solution_t), pointer :: solution
-    type(room_t), allocatable :: room
+    type(series_t) :: s
     type(attempt_t) :: attempt
     type(outcome_t) :: outcome
     real(dp) :: attitude(4)
     real(dp) :: most, spent, cost, error, blurred, planned
-    integer :: failed
-    logical :: again
+    logical :: again, fits
 
     call c_f_pointer(tape_at, tape)
     call c_f_pointer(request_at, request)
@@ -65,9 +65,8 @@ contains
       solution%growth = 1.0_dp
       return
     end if
-    allocate (room, stat=failed)
-    if (failed == 0) call allocate_room(tape, room, failed)
-    if (failed /= 0) return
+    call allocate_series(tape%n_slots, s, fits)
+    if (.not. fits) return
     cost = max(1.0_dp, tape%n_slots/CHEAP_SLOTS)
     most = min(4e18_dp, request%effort*(MOST_STEPS/cost))
     attempt%stride = 1 + int(STEPS_BETWEEN_LOOKS/cost, int64)
@@ -76,14 +75,15 @@ contains
     planned = PLANNED_GROWTH
     do
       attempt%most_steps = most - spent
-      call march(tape, request, attitude, attempt, room, solution, outcome)
+      call march(tape, request, attitude, attempt, s, solution, outcome)
       spent = spent + real(outcome%steps, dp)
       if (.not. outcome%error <= NO_DIGIT) outcome%error = NO_DIGIT
       if (solution%status /= COMPLETE .or. outcome%finest) exit
       again = outcome%growth > planned
       ! Where perturbations grow, a few steps cause most of the error; their estimates may be wrong
       ! by chance.
-      error = max(outcome%error, outcome%least)*(1.0_dp + min(outcome%growth, PLANNED_GROWTH)/DOUBTED)
+      error = max(outcome%error, outcome%least) &
+              *(1.0_dp + min(outcome%growth, PLANNED_GROWTH)/DOUBTED)
       if (.not. again .and. error <= TRUSTED*request%tolerance) exit
       attempt%tolerance = attempt%tolerance &
                           *min(1.0_dp, &

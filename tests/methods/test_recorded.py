@@ -120,6 +120,20 @@ def test_every_function_has_its_series() -> None:
     assert found.omega == pytest.approx(np.array(scene.omega) + change, rel=0.0, abs=5e-13)
 
 
+def test_the_truncation_error_is_subtracted() -> None:
+    # The estimate is the error before the subtraction, which leaves a small part of it.
+    left = []
+    for number in range(12):
+        scene, time = draw(Random(f"subtracted {number}"), ("wheel", "wave", "swing", "decay"))
+        for times in ([time], [0.5317 * time, time]):
+            fine = solve(scene, times, tolerance=1e-13, attitude=scene.attitude is not None)
+            found = solve(scene, times, tolerance=1e-4, attitude=scene.attitude is not None)
+            assert found.error is not None
+            scale = max(np.abs(scene.omega).max(), np.abs(fine.omega).max())
+            left.append(np.abs(found.omega - fine.omega).max() / scale / found.error)
+    assert np.median(left) < 0.1
+
+
 def test_rows_agree_with_ends() -> None:
     scene, time = draw(Random("rows"), ("gradient", "damping"))
     times = [0.1 * time, 0.33 * time, 0.5 * time, time]
@@ -149,6 +163,47 @@ def test_singular_torques_end_the_rows(torque: Any, last: float | None) -> None:
     assert found.ended == "overflow"
     assert found.error is None
     assert found.time.tolist() == [t for t in (0.5, 1.0 + 1e-6) if last is not None and t < last]
+
+
+@pytest.mark.parametrize("time", [1.3, 1.352, 1.4, 1.8, 2.0, 3.0, 8.0])
+def test_a_root_ends_the_rows_where_its_argument_touches_zero(time: float) -> None:
+    # The root of omega squared is |omega|, but its series continues with the sign of omega.
+    def quadratic_drag(t: Any, omega: Any) -> Any:
+        return [-omega[0] * np.sqrt(omega[0] ** 2) - 0.5, 0.0, 0.0]
+
+    found = solve(scene_of(quadratic_drag, (1.0, 0.0, 0.0)), [0.5, time])
+    root = math.sqrt(2.0)
+    zero = root * math.atan(root)
+    wanted = [math.tan((zero - t) / root) / root for t in (0.5, time) if t < zero]
+    assert found.ended == ("complete" if time < zero else "overflow")
+    assert found.omega[:, 0] == pytest.approx(wanted, abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    "rate",
+    [
+        lambda x: np.sin(x),
+        lambda x: 1.0 - np.cos(x),
+        lambda x: np.exp(x) - 1.0,
+        lambda x: np.sqrt(1.0 + x) - 1.0,
+        lambda x: x / (1.0 + 0.3 * x),
+        lambda x: x - 0.4 / (2.0 - x) + 0.2,
+        lambda x: x + x * x,
+        lambda x: 0.7 * x + 0.1,
+    ],
+)
+def test_growth_is_the_derivative_by_the_start(rate: Any) -> None:
+    # One component alone moves, and perturbations of it grow at all times.
+    def torque(t: Any, omega: Any) -> Any:
+        return [rate(omega[0]), 0.0, 0.0]
+
+    scene, time = scene_of(torque, (0.5, 0.0, 0.0), moments=(1.0, 1.0, 1.0)), 0.8
+    more, less = (replace(scene, omega=(0.5 + shift, 0.0, 0.0)) for shift in (1e-5, -1e-5))
+    change = solve(more, time).omega[0, 0] - solve(less, time).omega[0, 0]
+    found = solve(scene, time)
+    assert found.growth == pytest.approx(change / 2e-5, rel=2e-3)
+    assert found.growth is not None
+    assert found.growth > 1.15
 
 
 def test_a_motion_that_amplifies_rounding_errors_is_sensitive() -> None:
@@ -219,7 +274,8 @@ def test_prepared_solver_has_the_results_of_solve() -> None:
     assert solver.trajectory(scene.omega, [time]).omega.tolist() == found.omega.tolist()
     assert np.isnan(solver((math.nan, 0.0, 0.0), 1.0)).all()
     assert (solver.status, solver.error) == ("refused", None)
-    for wrong in ((1.0, 2.0), "abc"):  # type: Any
+    wrongs: list[Any] = [(1.0, 2.0), "abc"]
+    for wrong in wrongs:
         with pytest.raises(InputError, match="omega0"):
             solver(wrong, 1.0)
     with pytest.raises(InputError, match="out"):

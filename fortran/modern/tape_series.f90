@@ -40,7 +40,8 @@ contains
 
     allocate (s%a(0:LAST_TERM, n_slots), s%b(0:LAST_TERM, n_slots), &
               s%v(4, 0:MOST_ORDER, n_slots, 2), s%noise(n_slots), stat=failed)
-    fits = failed == 0
+    fits = .true.
+    if (failed /= 0) fits = .false.
   end subroutine allocate_series
 
   pure subroutine expand(tape, t_low, s)

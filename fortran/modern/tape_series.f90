@@ -38,10 +38,16 @@ contains
     logical, intent(out) :: fits !! whether there is enough memory
     integer :: failed
 
-    allocate (s%a(0:LAST_TERM, n_slots), s%b(0:LAST_TERM, n_slots), &
-              s%v(4, 0:MOST_ORDER, n_slots, 2), s%noise(n_slots), stat=failed)
+    fits = .false.
+    allocate (s%a(0:LAST_TERM, n_slots), stat=failed)
+    if (failed /= 0) return
+    allocate (s%b(0:LAST_TERM, n_slots), stat=failed)
+    if (failed /= 0) return
+    allocate (s%v(4, 0:MOST_ORDER, n_slots, 2), stat=failed)
+    if (failed /= 0) return
+    allocate (s%noise(n_slots), stat=failed)
+    if (failed /= 0) return
     fits = .true.
-    if (failed /= 0) fits = .false.
   end subroutine allocate_series
 
   pure subroutine expand(tape, t_low, s)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pyharness.compare.comparison import Comparison, compare_programs
+    from pyharness.dynamics.scene_reader import read_scene
     from pyharness.methods.many import Ensemble, solve_many
     from pyharness.methods.prepared import prepare
     from pyharness.methods.prepared_attitude import AttitudeSolver
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from pyharness.model.listing import Listing, subset
     from pyharness.model.principal import principal
     from pyharness.model.scene import Scene
-    from pyharness.model.scene_file import case_scene, read_scene
+    from pyharness.model.scene_file import case_scene
     from pyharness.model.state_torque import StateTorque, opaque
     from pyharness.model.torque_law import TorqueLaw
     from pyharness.model.trajectory import Stop, Trajectory
@@ -63,12 +64,13 @@ __all__ = [
 # program loads only the modules that it needs.
 _SUBMODULES = {
     "compare.comparison": ("Comparison", "compare_programs"),
+    "dynamics.scene_reader": ("read_scene",),
     "model.errors": ("InputError", "NotBuiltError"),
     "model.impossible": ("ImpossibleBodyWarning",),
     "model.listing": ("Listing", "subset"),
     "model.principal": ("principal",),
     "model.scene": ("Scene",),
-    "model.scene_file": ("case_scene", "read_scene"),
+    "model.scene_file": ("case_scene",),
     "model.state_torque": ("StateTorque", "opaque"),
     "model.torque_law": ("TorqueLaw",),
     "model.trajectory": ("Stop", "Trajectory"),

@@ -12,10 +12,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from pyharness.dynamics.scene_reader import scene_of
 from pyharness.model.attitude import IDENTITY, Quaternion, of_angles, unit_quaternion
 from pyharness.model.errors import InputError, kind_of, printable, unknown
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.scene_file import check_keys, check_written_schema, read_toml, scene_of
+from pyharness.model.scene_file import check_keys, check_written_schema, read_toml
 from pyharness.model.values import number
 
 UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180.0}

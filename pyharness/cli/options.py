@@ -10,13 +10,14 @@ from typing import Any
 from pyharness.cli import say, shown, write_text
 from pyharness.cli.progress import end_progress as end_progress
 from pyharness.cli.progress import progress as progress
+from pyharness.dynamics.scene_reader import read_scene
 from pyharness.model.attitude import NEAR_ONE
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, subset
 from pyharness.model.report import Report
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.scene_file import case_numbers, case_scene, read_scene
+from pyharness.model.scene_file import case_numbers, case_scene
 
 FORMATS = ("table", "json", "csv", "markdown")
 # Options that several verbs share, each with its help text. An option takes a value if a

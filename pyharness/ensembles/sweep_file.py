@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from pyharness.dynamics.scene_reader import scene_of, scene_of_file
 from pyharness.ensembles.axes import Axis, axis_of
 from pyharness.ensembles.batches import listing_of
 from pyharness.ensembles.fields import CHOICES, RIVALS
@@ -25,8 +26,6 @@ from pyharness.model.scene_file import (
     check_keys,
     check_written_schema,
     read_file,
-    scene_of,
-    scene_of_file,
     toml_of,
 )
 from pyharness.model.values import boolean, finite, integer, number

@@ -5,7 +5,10 @@ import warnings
 from typing import Protocol
 
 # Modules whose stack frames are between the user's call and the creation of the scene.
-_BETWEEN = ("copy", "dataclasses", "pyharness.model.scene", "pyharness.model.scene_file", __name__)
+_BETWEEN = (
+    *("copy", "dataclasses", "pyharness.dynamics.scene_reader"),
+    *("pyharness.model.scene", "pyharness.model.scene_file", __name__),
+)
 
 
 class ImpossibleBodyWarning(UserWarning):

@@ -35,18 +35,38 @@ def scene_record(scene: Scene) -> dict[str, Any]:
 
 def _torque(torque: TorqueLaw | StateTorque) -> dict[str, Any]:
     if isinstance(torque, TorqueLaw):
-        return {
-            "constant": list(torque.constant),
-            "rate": list(torque.rate),
-            "sines": [_wave(wave) for wave in torque.sines],
-            "cosines": [_wave(wave) for wave in torque.cosines],
-            **({} if torque.frame == "body" else {"frame": torque.frame}),
-        }
-    if torque.expression:
-        return {"expression": list(torque.expression), "constants": dict(torque.constants)}
+        frame = {} if torque.frame == "body" else {"frame": torque.frame}
+        return {**_law(torque), **frame}
     if torque.tape is None:
         return {"opaque": True}
-    return {"recorded": len(torque.tape.operations)}
+    if not (torque.expression or torque.terms):
+        return {"recorded": len(torque.tape.operations)}
+    record: dict[str, Any] = {}
+    if torque.expression:
+        record = {"expression": list(torque.expression), "constants": dict(torque.constants)}
+    for part in torque.terms:
+        if isinstance(part, TorqueLaw):
+            record |= _torque(part)
+        else:
+            term = {key: _value(value) for key, value in part}
+            record["terms"] = [*record.get("terms", []), term]
+    return record
+
+
+def _value(value: Any) -> Any:
+    """Return a value of a ready term for JSON."""
+    if isinstance(value, TorqueLaw):
+        return _law(value)
+    return list(map(_value, value)) if isinstance(value, tuple) else value
+
+
+def _law(law: TorqueLaw) -> dict[str, Any]:
+    return {
+        "constant": list(law.constant),
+        "rate": list(law.rate),
+        "sines": [_wave(wave) for wave in law.sines],
+        "cosines": [_wave(wave) for wave in law.cosines],
+    }
 
 
 def _wave(wave: Wave) -> dict[str, Any]:

@@ -1,14 +1,14 @@
-"""Scenes for the cases of Table 1 of the thesis, and scenes in TOML files that users write."""
+"""Scenes for the cases of Table 1 of the thesis, and the text of TOML files that describe scenes.
+
+`pyharness.dynamics.scene_reader` reads scenes from these files.
+"""
 
 import os
 import tomllib
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any, SupportsIndex
 
-from pyharness.model.attitude import of_angles
-from pyharness.model.errors import InputError, kind_of, unknown
-from pyharness.model.expressions import parsed
+from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts
 from pyharness.model.pipes import read_input
 from pyharness.model.scene import Scene
@@ -18,14 +18,7 @@ from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import integer
 
 _LARGEST_FILE = 1_000_000
-_TABLES = {
-    "body": ("moments", "coefficients", "inertia"),
-    "initial": ("omega", "attitude", "angles_deg", "sequence"),
-    "torque": ("constant", "rate", "sines", "cosines", "frame", "expression", "constants"),
-    "run": ("step_size", "steps"),
-}
 _WAVES = ("sines", "cosines")
-_TEXTS = ("expression", "constants")
 
 
 def case_numbers() -> list[int]:
@@ -65,58 +58,13 @@ def case_scene(number: SupportsIndex) -> Scene:
                 name=entry["title"],
                 omega=entry["omega"],
                 moments=entry["moments"],
-                torque=_torque(entry.get("torque", {})),
+                torque=law_of_table(entry.get("torque", {})),
                 step_size=deck["step_size"],
                 steps=deck["steps"],
                 case=number,
             )
     shown = str(number) if abs(number) < 10**18 else "of more than 18 digits"
     raise unknown("case", shown, map(str, case_numbers()), "--case")
-
-
-def read_scene(path: str | os.PathLike[str]) -> Scene:
-    """Return the scene (the problem to solve) that a TOML file describes.
-
-    Parameters
-    ----------
-    path : str or path
-        The path of the file, of at most 1 000 000 bytes. If the file has no key ``name``, the
-        scene's name is the file's name without its suffix.
-
-    Returns
-    -------
-    Scene
-        The scene, with all its values checked.
-
-    Raises
-    ------
-    InputError
-        If the file can't be read, is not TOML, has an unknown key, or lacks a value.
-
-    Examples
-    --------
-    >>> from pyharness import read_scene
-    >>> read_scene("brick.toml").omega  # doctest: +SKIP
-    (0.0, 1.0, 1.0)
-    """
-    if not isinstance(path, (str, os.PathLike)):
-        raise InputError(f"scene file: {kind_of(path)}; allowed: a path, as text or a Path")
-    path = os.fsdecode(path)
-    where = f"scene file '{path}'"
-    return scene_of_file(read_file(path, where), Path(path).stem, where)
-
-
-def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
-    """Return the scene that a TOML file, a scene file with the bytes `content`, describes.
-
-    `default_name` is the name of the scene if the file has no key ``name``. Raise InputError, with
-    `where` in front of the message, if the content is invalid.
-    """
-    data = toml_of(content, where)
-    try:
-        return scene_of(data, default_name)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
 def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
@@ -147,7 +95,9 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
     except UnicodeDecodeError:
         raise InputError(f"{where}: not UTF-8 text; TOML files are") from None
     except RecursionError:
-        raise InputError(f"{where}: nested too deeply; a scene has two levels") from None
+        raise InputError(
+            f"{where}: nested too deeply; the tables of a scene need few levels"
+        ) from None
     except ValueError as error:
         raise InputError(f"{where}: not TOML: {' '.join(str(error).split())}") from None
 
@@ -176,25 +126,49 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
 
 
 def _torque_lines(torque: TorqueLaw | StateTorque) -> list[str]:
-    """Return the lines of a scene file with the table of a torque."""
-    if isinstance(torque, StateTorque):
-        if not torque.expression:
-            kind = "an opaque function" if torque.tape is None else "recorded from a function"
-            raise InputError(
-                f"[torque]: a torque that is {kind} can't be written to a file; allowed: "
-                "expressions"
-            )
+    """Return the lines of a scene file with the tables of a torque."""
+    if isinstance(torque, TorqueLaw):
+        return ["[torque]", *_law_lines(torque)]
+    if not (torque.expression or torque.terms):
+        kind = "an opaque function" if torque.tape is None else "recorded from a function"
+        raise InputError(
+            f"[torque]: a torque that is {kind} can't be written to a file; allowed: "
+            "expressions, and terms that were read from a file"
+        )
+    lines = ["[torque]"]
+    if torque.expression:
         # The texts have printable characters of ASCII alone, and neither quotes nor backslashes.
         texts = ", ".join(f'"{text}"' for text in torque.expression)
-        lines = ["[torque]", f"expression = [{texts}]", "[torque.constants]"]
-        return lines + [f"{name} = {value!r}" for name, value in torque.constants]
-    lines = ["[torque]", f"constant = {list(torque.constant)}", f"rate = {list(torque.rate)}"]
-    if torque.frame != "body":
-        lines.append(f'frame = "{torque.frame}"')
-    for key, waves in (("sines", torque.sines), ("cosines", torque.cosines)):
+        lines += [f"expression = [{texts}]", "[torque.constants]"]
+        lines += [f"{name} = {value!r}" for name, value in torque.constants]
+    for part in torque.terms:
+        if isinstance(part, TorqueLaw):
+            lines += _law_lines(part)
+        else:
+            lines += ["[[torque.terms]]", *(f"{key} = {_toml(value)}" for key, value in part)]
+    return lines
+
+
+def _law_lines(law: TorqueLaw) -> list[str]:
+    lines = [f"constant = {list(law.constant)}", f"rate = {list(law.rate)}"]
+    if law.frame != "body":
+        lines.append(f'frame = "{law.frame}"')
+    for key, waves in (("sines", law.sines), ("cosines", law.cosines)):
         each = [f"{{ amplitude = {list(a)}, frequency = {f!r} }}" for a, f in waves]
         lines.append(f"{key} = [{', '.join(each)}]")
     return lines
+
+
+def _toml(value: Any) -> str:
+    """Return a value of a ready term as TOML; a torque law is a table without its frame."""
+    if isinstance(value, TorqueLaw):
+        lines = _law_lines(value)
+        return f"{{ {', '.join(line for line in lines if not line.startswith('frame'))} }}"
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, str):
+        return f'"{value}"'
+    return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def body_of(scene: Scene) -> tuple[str, list[Any]]:
@@ -209,59 +183,11 @@ def body_of(scene: Scene) -> tuple[str, list[Any]]:
     return "coefficients", list(scene.coefficients or ())
 
 
-def scene_of(data: dict[str, Any], default_name: str) -> Scene:
-    """Return the scene that `data`, the content of a scene file as a dictionary, describes.
+def law_of_table(table: dict[str, Any]) -> TorqueLaw:
+    """Return the torque law with the keys and values of a table [torque] of a scene file.
 
-    `default_name` is the name of the scene if the data have no key ``name``. Raise InputError if
-    the data are invalid.
+    Raise InputError if a value is invalid.
     """
-    check_written_schema(data, "scene file")
-    check_keys(data, ("schema", "name", *_TABLES), "top level")
-    tables: dict[str, dict[str, Any]] = {}
-    for table, keys in _TABLES.items():
-        tables[table] = data.get(table, {})
-        if not isinstance(tables[table], dict):
-            raise InputError(f"{table} is {kind_of(tables[table])}; it must be a table [{table}]")
-        if table != "torque":
-            check_keys(tables[table], keys, f"[{table}]")
-    body, initial, run = tables["body"], tables["initial"], tables["run"]
-    if "omega" not in initial:
-        raise InputError("[initial] omega is missing; give three numbers in rad/s")
-    return Scene(
-        name=data.get("name", default_name),
-        omega=initial["omega"],
-        attitude=_attitude(initial),
-        torque=_torque(tables["torque"]),
-        **body,
-        **run,
-    )
-
-
-def _attitude(initial: dict[str, Any]) -> Any:
-    given = [key for key in ("attitude", "angles_deg", "sequence") if key in initial]
-    if given in ([], ["attitude"]):
-        return initial.get("attitude")
-    if given != ["angles_deg", "sequence"]:
-        raise InputError(
-            f"[initial]: {' and '.join(given)}; allowed: attitude, or angles_deg with a sequence"
-        )
-    return of_angles("[initial] angles_deg", initial["angles_deg"], initial["sequence"])
-
-
-def _torque(table: dict[str, Any]) -> TorqueLaw | StateTorque:
-    check_keys(table, _TABLES["torque"], "[torque]")
-    if any(key in table for key in _TEXTS):
-        if "expression" not in table:
-            raise InputError(
-                "[torque]: constants without expression; give an expression, a list of three "
-                "texts, or constant, three numbers"
-            )
-        if others := [key for key in table if key not in _TEXTS]:
-            raise InputError(
-                f"[torque]: expression and {others[0]}; allowed: expression with constants, or "
-                "constant, rate, sines, cosines and frame"
-            )
-        return parsed(table["expression"], table.get("constants", {}))
     waves = {key: _waves(f"[torque] {key}", table[key]) for key in _WAVES if key in table}
     return TorqueLaw(**{**table, **waves})
 

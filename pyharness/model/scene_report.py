@@ -43,17 +43,26 @@ def _torque(scene: Scene, unit: str) -> str:
     """Return a phrase that describes the torque of a scene, in `unit`."""
     if isinstance(scene.torque, StateTorque):
         return _state_torque(scene.torque, unit)
-    if scene.torque.is_zero:
-        return "no torque"
-    axes = " about the axes of space" if scene.torque.in_space else ""
-    return f"N = {_law(scene.torque)} {unit}{axes}"
+    return "no torque" if scene.torque.is_zero else f"N = {_law_phrase(scene.torque, unit)}"
+
+
+def _law_phrase(law: TorqueLaw, unit: str) -> str:
+    return f"{_law(law)} {unit}" + (" about the axes of space" if law.in_space else "")
 
 
 def _state_torque(torque: StateTorque, unit: str) -> str:
-    if torque.expression:
-        shown = ", ".join(map(_shortened, torque.expression))
-        constants = ", ".join(f"{name} = {value:g}" for name, value in torque.constants)
-        return f"N = ({shown}) {unit}" + (f" with {_shortened(constants)}" if constants else "")
+    if torque.expression or torque.terms:
+        parts = []
+        if torque.expression:
+            shown = ", ".join(map(_shortened, torque.expression))
+            constants = ", ".join(f"{name} = {value:g}" for name, value in torque.constants)
+            parts = [f"({shown}) {unit}" + (f" with {_shortened(constants)}" if constants else "")]
+        for part in torque.terms:
+            if isinstance(part, TorqueLaw):
+                parts.append(_law_phrase(part, unit))
+            else:
+                parts.append(part[0][1].replace("_", " "))
+        return f"N = {' + '.join(parts)}"
     if torque.tape is None:
         names = ["t", "omega", "attitude"] if torque.needs_attitude else ["t", "omega"]
         return f"N is an opaque function of {_joined(names)}, in {unit}"

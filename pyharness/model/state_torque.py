@@ -42,6 +42,10 @@ class StateTorque:
         recorded from a Python function.
     constants : tuple of pairs
         The names and values of the constants in `expression`.
+    terms : tuple
+        The other summands of a torque that was read from a scene file: at most one `TorqueLaw`, and
+        then the ready terms. A term is a tuple of pairs of keys and values, of which the first is
+        its kind.
     is_zero, varies, in_space : bool
         False, True and False. A `TorqueLaw` has these attributes too.
     """
@@ -51,6 +55,7 @@ class StateTorque:
     needs_attitude: bool = False
     expression: tuple[str, ...] = ()
     constants: tuple[tuple[str, float], ...] = ()
+    terms: tuple[TorqueLaw | tuple[tuple[str, Any], ...], ...] = ()
     # A torque law has these attributes too.
     is_zero: bool = field(default=False, init=False, repr=False)
     varies: bool = field(default=True, init=False, repr=False)
@@ -61,7 +66,9 @@ class StateTorque:
         if self.tape is None:
             return f"StateTorque(opaque, needs_attitude={self.needs_attitude})"
         # Expressions may be long; three of them and their constants are shortened together.
-        given = f"{list(self.expression)}, {dict(self.constants)}" if self.expression else ""
+        parts = [f"{list(self.expression)}, {dict(self.constants)}"] if self.expression else []
+        parts += [repr(x) if isinstance(x, TorqueLaw) else str(x[0][1]) for x in self.terms]
+        given = " + ".join(parts)
         shown = given if len(given) <= 200 else f"{given[:197]}..."
         count = len(self.tape.operations)
         return (

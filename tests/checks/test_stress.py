@@ -16,9 +16,9 @@ from pyharness.checks.check import Check, Name
 from pyharness.checks.stress import named, stress, worst
 from pyharness.cli.main import main
 from pyharness.compare.candidates import End
+from pyharness.dynamics.scene_reader import read_scene
 from pyharness.methods.solve import solve
 from pyharness.model.scene import Scene
-from pyharness.model.scene_file import read_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.scenes.extreme import EXTREMES, in_steps

@@ -48,6 +48,13 @@ constants = { k = 0.1 }
 step_size = 0.01
 steps = 5
 """
+TERMS = """\
+[[torque.terms]]
+kind = "wheels"
+momentum = [0.0, 1.0, 0.0]
+motor = { rate = [0.0, 0.0, 0.5] }
+[run]
+"""
 # The verbs that take no torque that depends on the state, each with some of its options.
 REFUSED = (
     "compare", "compare --ablate", "compare --word cdc48",
@@ -233,6 +240,22 @@ def test_run_with_a_method_shows_the_torque_or_refuses_it(
         assert captured.out == ""
         assert captured.err.startswith("pyharness: ")
         assert captured.err.count("\n") == 1
+
+
+@pytest.mark.usefixtures("damped")
+@pytest.mark.parametrize("options", ["", "--attitude quaternion", "--times 0.05 --format json"])
+def test_run_with_ready_terms_shows_them(options: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("terms.toml").write_text(DAMPED.replace("[run]\n", TERMS))
+    rows = []
+    for name in ("damped", "terms"):
+        assert main(shlex.split(f"run --scene {name}.toml --method auto {options}")) == 0
+        rows.append(capsys.readouterr().out)
+    assert ('"kind": "wheels"' in rows[1]) if "json" in options else ("+ wheels;" in rows[1])
+    assert "wheels" not in rows[0]
+    ends = [solve(read_scene(f"{name}.toml"), 0.05).omega[-1] for name in ("damped", "terms")]
+    assert np.abs(ends[0] - ends[1]).max() > 1e-6
+    assert main(shlex.split("compare --scene terms.toml")) == 2
+    assert capsys.readouterr().err == f"pyharness: {STATE_TORQUE}\n"
 
 
 def test_principal_scene_has_the_torque_in_principal_axes() -> None:

@@ -14,12 +14,13 @@ from pyharness.checks.golden import read_record
 from pyharness.checks.port_protocol import request
 from pyharness.cli.main import main
 from pyharness.cli.output import check_tree
+from pyharness.dynamics.scene_reader import read_scene
 from pyharness.edition.report import MARK
 from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing
-from pyharness.model.scene_file import case_scene, read_scene, scene_text
+from pyharness.model.scene_file import case_scene, scene_text
 from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.original.vectors import OURS, answers
 from tests.ensembles.sweeps import TILT, text, written

@@ -11,9 +11,10 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from pyharness import InputError, Scene, StateTorque, TorqueLaw, case_scene, opaque, read_scene
+from pyharness.dynamics.scene_reader import scene_of
 from pyharness.model.expressions import FUNCTIONS, INPUTS
 from pyharness.model.records import scene_record
-from pyharness.model.scene_file import scene_of, scene_text
+from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading
 from tests.json_reference import SCHEMA
 

@@ -1,0 +1,143 @@
+"""Reading of scenes from TOML files that users write.
+
+The torque of a scene file may have ready terms, which are in this subpackage.
+`pyharness.model.scene_file` writes scene files.
+"""
+
+import os
+from pathlib import Path
+from typing import Any
+
+from pyharness.model.attitude import of_angles
+from pyharness.model.errors import InputError, kind_of
+from pyharness.model.expressions import parsed
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import (
+    check_keys,
+    check_written_schema,
+    law_of_table,
+    read_file,
+    toml_of,
+)
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.torque_law import TorqueLaw
+
+_TEXTS = ("expression", "constants")
+_TABLES = {
+    "body": ("moments", "coefficients", "inertia"),
+    "initial": ("omega", "attitude", "angles_deg", "sequence"),
+    "torque": ("constant", "rate", "sines", "cosines", "frame", *_TEXTS, "terms"),
+    "run": ("step_size", "steps"),
+}
+
+
+def read_scene(path: str | os.PathLike[str]) -> Scene:
+    """Return the scene (the problem to solve) that a TOML file describes.
+
+    Parameters
+    ----------
+    path : str or path
+        The path of the file, of at most 1 000 000 bytes. If the file has no key ``name``, the
+        scene's name is the file's name without its suffix.
+
+    Returns
+    -------
+    Scene
+        The scene, with all its values checked.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read, is not TOML, has an unknown key, or lacks a value.
+
+    Examples
+    --------
+    >>> from pyharness import read_scene
+    >>> read_scene("brick.toml").omega  # doctest: +SKIP
+    (0.0, 1.0, 1.0)
+    """
+    if not isinstance(path, (str, os.PathLike)):
+        raise InputError(f"scene file: {kind_of(path)}; allowed: a path, as text or a Path")
+    path = os.fsdecode(path)
+    where = f"scene file '{path}'"
+    return scene_of_file(read_file(path, where), Path(path).stem, where)
+
+
+def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
+    """Return the scene that a TOML file, a scene file with the bytes `content`, describes.
+
+    `default_name` is the name of the scene if the file has no key ``name``. Raise InputError, with
+    `where` in front of the message, if the content is invalid.
+    """
+    data = toml_of(content, where)
+    try:
+        return scene_of(data, default_name)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def scene_of(data: dict[str, Any], default_name: str) -> Scene:
+    """Return the scene that `data`, the content of a scene file as a dictionary, describes.
+
+    `default_name` is the name of the scene if the data have no key ``name``. Raise InputError if
+    the data are invalid.
+    """
+    check_written_schema(data, "scene file")
+    check_keys(data, ("schema", "name", *_TABLES), "top level")
+    tables: dict[str, dict[str, Any]] = {}
+    for table, keys in _TABLES.items():
+        tables[table] = data.get(table, {})
+        if not isinstance(tables[table], dict):
+            raise InputError(f"{table} is {kind_of(tables[table])}; it must be a table [{table}]")
+        if table != "torque":
+            check_keys(tables[table], keys, f"[{table}]")
+    body, initial, run = tables["body"], tables["initial"], tables["run"]
+    if "omega" not in initial:
+        raise InputError("[initial] omega is missing; give three numbers in rad/s")
+    return Scene(
+        name=data.get("name", default_name),
+        omega=initial["omega"],
+        attitude=_attitude(initial),
+        torque=_torque(tables["torque"], body),
+        **body,
+        **run,
+    )
+
+
+def _attitude(initial: dict[str, Any]) -> Any:
+    given = [key for key in ("attitude", "angles_deg", "sequence") if key in initial]
+    if given in ([], ["attitude"]):
+        return initial.get("attitude")
+    if given != ["angles_deg", "sequence"]:
+        raise InputError(
+            f"[initial]: {' and '.join(given)}; allowed: attitude, or angles_deg with a sequence"
+        )
+    return of_angles("[initial] angles_deg", initial["angles_deg"], initial["sequence"])
+
+
+def _torque(table: dict[str, Any], body: dict[str, Any]) -> TorqueLaw | StateTorque:
+    """Return the torque of a scene file from its tables [torque] and [body]."""
+    check_keys(table, _TABLES["torque"], "[torque]")
+    given = {key: value for key, value in table.items() if key != "terms"}
+    first = _expressions(given) if any(key in given for key in _TEXTS) else law_of_table(given)
+    if "terms" not in table:
+        return first
+    # Few scenes have ready terms.
+    from pyharness.dynamics.term_file import read_terms, sum_of
+
+    terms = read_terms(table["terms"], body)
+    return sum_of(first, terms) if terms else first
+
+
+def _expressions(table: dict[str, Any]) -> StateTorque | TorqueLaw:
+    if "expression" not in table:
+        raise InputError(
+            "[torque]: constants without expression; give an expression, a list of three texts, or "
+            "constant, three numbers"
+        )
+    if others := [key for key in table if key not in _TEXTS]:
+        raise InputError(
+            f"[torque]: expression and {others[0]}; allowed: expression with constants, or "
+            "constant, rate, sines, cosines and frame"
+        )
+    return parsed(table["expression"], table.get("constants", {}))

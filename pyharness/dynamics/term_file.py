@@ -1,0 +1,140 @@
+"""Ready terms in scene files: the tables [[torque.terms]]."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from inspect import Parameter, signature
+from typing import Any
+
+from pyharness.dynamics.field_terms import (
+    gravity_gradient,
+    in_space,
+    magnetic_damping,
+    magnetic_dipole,
+)
+from pyharness.dynamics.term_input import inertia_of
+from pyharness.dynamics.terms import attitude_control, damping, drag, rate_control, wheels
+from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.scene_file import check_keys, law_of_table
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.values import boolean
+
+Function = Callable[..., StateTorque]
+# A term as data, pairs of keys and values, of which the first is its kind; and its torque.
+Term = tuple[tuple[tuple[str, Any], ...], StateTorque]
+
+KINDS: dict[str, Function] = {
+    each.__name__: each
+    for each in (
+        *(damping, drag, rate_control, attitude_control, wheels),
+        *(gravity_gradient, magnetic_dipole, magnetic_damping, in_space),
+    )
+}
+# The arguments that may depend on time, and the axes of their components.
+_FRAMES = {"motor": "body", "field": "space", "torque": "space"}
+_LAW = ("constant", "rate", "sines", "cosines")
+_MOST = 50
+
+
+def read_terms(tables: object, body: dict[str, Any]) -> list[Term]:
+    """Return the ready terms of a torque from the tables [[torque.terms]] of a scene file.
+
+    `body` is the table [body] of the file. Raise InputError if a table is invalid; the message
+    begins with the number of the table, from 1.
+    """
+    if not isinstance(tables, list):
+        raise InputError(
+            f"[torque] terms is {kind_of(tables)}; it must be a list of tables [[torque.terms]]"
+        )
+    if len(tables) > _MOST:
+        raise InputError(f"[[torque.terms]]: {len(tables)} terms; allowed: at most {_MOST}")
+    return [_term(table, f"[[torque.terms]] {n}", body) for n, table in enumerate(tables, 1)]
+
+
+def sum_of(first: TorqueLaw | StateTorque, terms: list[Term]) -> StateTorque:
+    """Return the sum of the torque `first` and ready terms, which has all summands as data.
+
+    The torque `first` is a law, or was made of expressions. The list `terms` must not be empty.
+    """
+    total = sum((torque for _, torque in terms[1:]), terms[0][1])
+    data: tuple[Any, ...] = tuple(each for each, _ in terms)
+    if isinstance(first, StateTorque):
+        return replace(
+            total + first, expression=first.expression, constants=first.constants, terms=data
+        )
+    if first.is_zero:
+        return replace(total, terms=data)
+    return replace(total + first, terms=(first, *data))
+
+
+def _term(table: object, where: str, body: dict[str, Any]) -> Term:
+    if not isinstance(table, dict):
+        raise InputError(f"{where} is {kind_of(table)}; it must be a table [[torque.terms]]")
+    if "kind" not in table:
+        raise InputError(f"{where}: kind is missing; allowed: {', '.join(KINDS)}")
+    kind = table["kind"]
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise unknown("kind", kind, KINDS, where)
+    parameters = signature(KINDS[kind]).parameters
+    check_keys(table, ("kind", *parameters), f"{where}, {kind}")
+    given = {key: value for key, value in table.items() if key != "kind"}
+    if kind == "gravity_gradient" and "inertia" not in given:
+        given["inertia"] = _inertia(body, where)
+    for name, parameter in parameters.items():
+        if name not in given and parameter.default is Parameter.empty:
+            raise InputError(f"{where}, {kind}: {name} is missing; keys: {', '.join(parameters)}")
+    arguments = {key: _argument(f"{where}, {key}", key, value) for key, value in given.items()}
+    try:
+        torque = KINDS[kind](**arguments)
+    except InputError as error:
+        raise _placed(error, where) from None
+    pairs = sorted(arguments.items(), key=lambda pair: list(parameters).index(pair[0]))
+    return (("kind", kind), *((key, _data(value)) for key, value in pairs)), torque
+
+
+def _inertia(body: dict[str, Any], where: str) -> Any:
+    """Return the moments or the inertia matrix in the table [body] of a scene file."""
+    for key in ("moments", "inertia"):
+        if key in body:
+            inertia_of(f"[body] {key}", body[key])
+            return body[key]
+    raise InputError(
+        f"{where}, gravity_gradient: inertia is missing, and [body] has no moments and no inertia; "
+        "give inertia, kg m2"
+    )
+
+
+def _argument(where: str, key: str, value: object) -> object:
+    """Return the argument of a term for the value of a key; a table becomes a torque law."""
+    if key == "per_axis":
+        return boolean(where, value)
+    if key not in _FRAMES:
+        return value
+    if isinstance(value, dict):
+        check_keys(value, _LAW, where)
+        try:
+            return TorqueLaw(**{**vars(law_of_table(value)), "frame": _FRAMES[key]})
+        except InputError as error:
+            raise _placed(error, where) from None
+    if not isinstance(value, list):
+        raise InputError(
+            f"{where} is {kind_of(value)}; allowed: three numbers, or a table with {_one_of(_LAW)}"
+        )
+    return value
+
+
+def _one_of(names: tuple[str, ...]) -> str:
+    return f"{', '.join(names[:-1])} or {names[-1]}"
+
+
+def _placed(error: InputError, where: str) -> InputError:
+    """Return an error of a term's function or of a torque law, with the place of the term."""
+    message = str(error).removeprefix("[torque]").lstrip(": ")
+    return InputError(f"{where}, {message}")
+
+
+def _data(value: Any) -> Any:
+    """Return a checked argument of a term as floats in tuples; truth values and laws stay."""
+    if isinstance(value, list):
+        return tuple(map(_data, value))
+    return value if isinstance(value, (bool, TorqueLaw)) else float(value)

@@ -1,0 +1,300 @@
+"""Ready terms in scene files: read, written, refused, and shown in records and headings."""
+
+import json
+import re
+import tomllib
+import warnings
+from collections.abc import Callable
+from inspect import signature
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+
+from pyharness import InputError, Scene, StateTorque, TorqueLaw, read_scene, torques
+from pyharness.dynamics.scene_reader import scene_of
+from pyharness.dynamics.term_file import KINDS
+from pyharness.model.records import scene_record
+from pyharness.model.scene_file import scene_text
+from pyharness.model.scene_report import heading
+from pyharness.model.state_torque import recorded
+from tests.dynamics.test_terms import states
+from tests.json_reference import SCHEMA
+
+ROOT = Path(__file__).parent.parent.parent
+MOMENTS = [3.0, 2.0, 1.5]
+MATRIX = [[3.0, 0.1, 0.2], [0.1, 2.0, -0.3], [0.2, -0.3, 1.5]]
+INITIAL = {"omega": [1.0, 2.0, 3.0], "attitude": [0.5, 0.5, -0.5, 0.5]}
+BODY: dict[str, Any] = {"body": {"moments": MOMENTS}, "initial": INITIAL}
+WAVES: dict[str, Any] = {
+    "constant": [1.0, 2.0, 3.0], "rate": [0.1, 0.0, -0.2],
+    "sines": [{"amplitude": [0.5, 0.0, 1.0], "frequency": 2.0}],
+    "cosines": [{"amplitude": [0.0, 0.25, 0.0], "frequency": 0.1}],
+}  # fmt: skip
+LAW = TorqueLaw(
+    (1.0, 2.0, 3.0), (0.1, 0.0, -0.2), [((0.5, 0.0, 1.0), 2.0)], [((0.0, 0.25, 0.0), 0.1)]
+)
+SPACE = TorqueLaw(LAW.constant, LAW.rate, LAW.sines, LAW.cosines, "space")
+
+# Each term as a table of a scene file, and the torque that it must be.
+TERMS: list[tuple[dict[str, Any], Callable[[], StateTorque]]] = [
+    ({"kind": "damping", "matrix": 0.1}, lambda: torques.damping(0.1)),
+    ({"kind": "damping", "matrix": MATRIX}, lambda: torques.damping(MATRIX)),
+    ({"kind": "drag", "coefficients": [0, [1, 2, 3], MATRIX]},
+     lambda: torques.drag([0, [1, 2, 3], MATRIX])),
+    ({"kind": "drag", "coefficients": [1, 2], "per_axis": True},
+     lambda: torques.drag([1, 2], per_axis=True)),
+    ({"kind": "rate_control", "gain": 2}, lambda: torques.rate_control(2)),
+    ({"kind": "rate_control", "gain": MOMENTS, "target": [0, 0.5, 0]},
+     lambda: torques.rate_control(MOMENTS, (0, 0.5, 0))),
+    ({"kind": "attitude_control", "stiffness": 1, "gain": 2, "target": [1, 1, 0, 0]},
+     lambda: torques.attitude_control(1, 2, (1, 1, 0, 0))),
+    ({"kind": "wheels", "momentum": [1, 2, 3]}, lambda: torques.wheels((1, 2, 3))),
+    ({"kind": "wheels", "momentum": [1, 2, 3], "motor": [0, 0, 0.5]},
+     lambda: torques.wheels((1, 2, 3), (0, 0, 0.5))),
+    ({"kind": "wheels", "motor": WAVES, "momentum": [1, 2, 3]},
+     lambda: torques.wheels((1, 2, 3), LAW)),
+    ({"kind": "gravity_gradient", "rate": 0.5}, lambda: torques.gravity_gradient(MOMENTS, 0.5)),
+    ({"kind": "gravity_gradient", "rate": 0.5, "inertia": [5, 4, 3]},
+     lambda: torques.gravity_gradient((5, 4, 3), 0.5)),
+    ({"kind": "magnetic_dipole", "moment": [1, 0, 2], "field": [0, 1, 0]},
+     lambda: torques.magnetic_dipole((1, 0, 2), (0, 1, 0))),
+    ({"kind": "magnetic_dipole", "moment": [1, 0, 2], "field": WAVES},
+     lambda: torques.magnetic_dipole((1, 0, 2), SPACE)),
+    ({"kind": "magnetic_damping", "gain": 0.5, "field": WAVES},
+     lambda: torques.magnetic_damping(0.5, SPACE)),
+    ({"kind": "in_space", "torque": WAVES}, lambda: torques.in_space(SPACE)),
+    ({"kind": "in_space", "torque": {"constant": [1, 0, 0]}},
+     lambda: torques.in_space((1, 0, 0))),
+]  # fmt: skip
+DAMPING = {"kind": "damping", "matrix": 0.1}
+
+
+def scene_with(**torque: Any) -> Scene:
+    """Return the scene with a table [torque]."""
+    return scene_of(BODY | {"torque": torque}, "terms")
+
+
+def restored(scene: Scene, folder: Path) -> Scene:
+    """Return the scene that is read from the text of a scene."""
+    path = folder / "again.toml"
+    path.write_text(scene_text(scene))
+    return read_scene(path)
+
+
+def is_documented(record: dict[str, Any]) -> bool:
+    """Return whether the record of a scene has the form in the schema of the output."""
+    schema = {"$ref": "#/$defs/scene", "$defs": SCHEMA["$defs"]}
+    return bool(Draft202012Validator(schema).is_valid(json.loads(json.dumps(record))))
+
+
+def check_forms(scene: Scene, folder: Path) -> None:
+    """Check that the text and the record of a scene restore it."""
+    assert isinstance(scene.torque, StateTorque)
+    again = restored(scene, folder)
+    assert again == scene
+    assert repr(again) == repr(scene)
+    assert again.torque.tape == scene.torque.tape  # type: ignore[union-attr]
+    record = scene_record(scene)
+    assert is_documented(record)
+    again = scene_of({**BODY, "torque": json.loads(json.dumps(record["torque"]))}, scene.name)
+    assert again.torque == scene.torque
+
+
+def test_every_ready_term_is_a_kind_and_is_tried() -> None:
+    wanted = {name: getattr(torques, name) for name in torques.__all__}
+    assert wanted == KINDS | {"opaque": torques.opaque, "recorded": torques.recorded}
+    given = {(table["kind"], key) for table, _ in TERMS for key in table if key != "kind"}
+    assert given == {(kind, key) for kind, f in KINDS.items() for key in signature(f).parameters}
+
+
+@pytest.mark.parametrize(("table", "torque"), TERMS, ids=[table["kind"] for table, _ in TERMS])
+def test_term_is_the_function_of_its_name(
+    table: dict[str, Any], torque: Callable[[], StateTorque], tmp_path: Path
+) -> None:
+    scene = scene_with(terms=[table])
+    assert isinstance(scene.torque, StateTorque)
+    assert scene.torque.tape == torque().tape
+    assert scene.torque.needs_attitude == torque().needs_attitude
+    check_forms(scene, tmp_path)
+    assert f"N = {table['kind'].replace('_', ' ')}; omega(0)" in heading(scene)[1]
+    assert table["kind"] in repr(scene.torque)
+
+
+FIRST: dict[str, tuple[dict[str, Any], Any, str]] = {
+    "nothing": ({}, torques.damping(0.0), "N = damping"),
+    "zero": ({"constant": [0, 0, 0], "frame": "space"}, torques.damping(0.0), "N = damping"),
+    "body": (WAVES, LAW, "t + (0.5, 0, 1) sin 2t + (0, 0.25, 0) cos 0.1t N m + damping"),
+    "space": (WAVES | {"frame": "space"}, torques.in_space(SPACE),
+              "N m about the axes of space + damping"),
+    "expression": ({"expression": ["-k*w1**3", "q0", "0"], "constants": {"k": 0.1}},
+                   recorded(lambda t, w, q: [-0.1 * w[0] ** 3, q[0], 0.0]),
+                   "N = (-k*w1**3, q0, 0) N m with k = 0.1 + damping"),
+    "law in text": ({"expression": ["1", "2*t", "0"]}, TorqueLaw((1, 0, 0), (0, 2, 0)),
+                    "N = (1, 0, 0) + (0, 2, 0) t N m + damping"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("first", FIRST)
+def test_terms_are_added_to_the_rest_of_the_torque(first: str, tmp_path: Path) -> None:
+    given, torque, shown = FIRST[first]
+    terms = [table for table, _ in TERMS[::3]]
+    scene = scene_with(**given, terms=[DAMPING, *terms])
+    assert isinstance(scene.torque, StateTorque)
+    wanted = sum((make() for _, make in TERMS[::3]), torques.damping(0.1)) + torque
+    for t, omega, attitude in states(5):
+        found = scene.torque.at(t, omega, attitude)
+        assert found == pytest.approx(wanted.at(t, omega, attitude), rel=1e-12, abs=1e-12)
+    check_forms(scene, tmp_path)
+    assert shown in heading(scene)[1]
+
+
+def test_empty_list_of_terms_changes_nothing() -> None:
+    assert scene_with(terms=[]) == scene_with()
+    assert scene_with(terms=[], **WAVES).torque == LAW
+
+
+@pytest.mark.parametrize("key", ["moments", "inertia"])
+def test_gravity_gradient_takes_the_body_of_the_file(key: str, tmp_path: Path) -> None:
+    body = {"moments": MOMENTS, "inertia": MATRIX}[key]
+    table = {"kind": "gravity_gradient", "rate": 0.5}
+    data = {"body": {key: body}, "initial": INITIAL, "torque": {"terms": [table]}}
+    scene = scene_of(data, "satellite")
+    assert isinstance(scene.torque, StateTorque)
+    assert scene.torque.tape == torques.gravity_gradient(body, 0.5).tape  # type: ignore[arg-type]
+    assert restored(scene, tmp_path) == scene
+    # The text has the inertia of the torque, which remains if the scene's body is replaced.
+    assert f"inertia = {body}" in scene_text(scene).partition("[[torque.terms]]")[2]
+
+
+def test_text_of_a_scene_has_its_law_and_terms() -> None:
+    wheels = {"kind": "wheels", "momentum": [1, 2, 3], "motor": {"rate": [0, 0, 1]}}
+    text = scene_text(scene_with(constant=[1, 0, 0], terms=[DAMPING, wheels]))
+    _, _, torque = text.partition("[torque]\n")
+    assert torque.startswith(
+        "constant = [1.0, 0.0, 0.0]\nrate = [0.0, 0.0, 0.0]\nsines = []\ncosines = []\n"
+        '[[torque.terms]]\nkind = "damping"\nmatrix = 0.1\n'
+        '[[torque.terms]]\nkind = "wheels"\nmomentum = [1.0, 2.0, 3.0]\n'
+        "motor = { constant = [0.0, 0.0, 0.0], rate = [0.0, 0.0, 1.0], sines = [], cosines = [] }\n"
+        "[run]\n"
+    )
+
+
+def _terms(*tables: Any) -> dict[str, Any]:
+    return {"terms": list(tables)}
+
+
+MISTAKES: list[tuple[dict[str, Any], str]] = [
+    ({"terms": DAMPING}, "[torque] terms is a table; it must be a list of tables [[torque.terms]]"),
+    ({"terms": 3}, "[torque] terms is a whole number; it must be a list"),
+    (_terms(3), "[[torque.terms]] 1 is a whole number; it must be a table"),
+    (_terms(*[DAMPING] * 51), "[[torque.terms]]: 51 terms; allowed: at most 50"),
+    (_terms({"matrix": 1}), "[[torque.terms]] 1: kind is missing; allowed: damping, drag, rate"),
+    (_terms(DAMPING, {"kind": "dampin"}),
+     "[[torque.terms]] 2: unknown kind 'dampin'; did you mean 'damping'? allowed: damping, drag"),
+    (_terms({"kind": "opaque"}), "[[torque.terms]] 1: unknown kind 'opaque'; "),
+    (_terms({"kind": ["damping"]}), "[[torque.terms]] 1: kind is a list; allowed: damping"),
+    (_terms(DAMPING | {"matrx": 1}),
+     "[[torque.terms]] 1, damping: unknown key 'matrx'; did you mean 'matrix'? allowed: kind, m"),
+    (_terms({"kind": "damping"}), "[[torque.terms]] 1, damping: matrix is missing; keys: matrix"),
+    (_terms({"kind": "wheels", "motor": [0, 0, 1]}),
+     "[[torque.terms]] 1, wheels: momentum is missing; keys: momentum, motor"),
+    (_terms(DAMPING, {"kind": "damping", "matrix": [1, 2]}),
+     "[[torque.terms]] 2, damping matrix: 2 numbers or rows; allowed: a number, three numbers"),
+    (_terms({"kind": "damping", "matrix": float("nan")}), "[[torque.terms]] 1, damping matrix"),
+    (_terms({"kind": "damping", "matrix": {"a": 1}}), "[[torque.terms]] 1, damping matrix"),
+    (_terms({"kind": "damping", "matrix": 10**400}), "[[torque.terms]] 1, damping matrix"),
+    (_terms({"kind": "drag", "coefficients": [1], "per_axis": 1}),
+     "[[torque.terms]] 1, per_axis is a whole number; allowed: True or False"),
+    (_terms({"kind": "wheels", "momentum": [1, 2, 3], "motor": "x"}),
+     "[[torque.terms]] 1, motor is text; allowed: three numbers, or a table with constant, rate, "
+     "sines or cosines"),
+    (_terms({"kind": "wheels", "momentum": [1, 2, 3], "motor": {"frame": "body"}}),
+     "[[torque.terms]] 1, motor: unknown key 'frame'; "),
+    (_terms({"kind": "wheels", "momentum": [1, 2, 3], "motor": {"rate": [1, 2]}}),
+     "[[torque.terms]] 1, motor, rate: "),
+    (_terms({"kind": "in_space", "torque": {"sines": [{"amplitude": [1, 2, 3]}]}}),
+     "[[torque.terms]] 1, torque, sines: frequency is missing"),
+    (_terms({"kind": "gravity_gradient", "rate": "x"}),
+     "[[torque.terms]] 1, gravity gradient rate"),
+    (_terms({"kind": "attitude_control", "stiffness": 1, "gain": 1, "target": [0, 0, 0, 0]}),
+     "[[torque.terms]] 1, attitude control target"),
+    (_terms(DAMPING) | {"term": 1}, "[torque]: unknown key 'term'; did you mean 'terms'?"),
+    (_terms(DAMPING) | {"constants": {}}, "[torque]: constants without expression; give an"),
+    (_terms(DAMPING) | {"expression": ["0"] * 3, "rate": [0, 0, 1]},
+     "[torque]: expression and rate; allowed"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("torque", "words"), MISTAKES, ids=range(len(MISTAKES)))
+def test_mistake_in_a_term_is_one_line(torque: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError) as raised:
+        scene_with(**torque)
+    assert str(raised.value).startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ({"coefficients": [0.5, 0.5, 0.5]},
+         "[[torque.terms]] 1, gravity_gradient: inertia is missing, and [body] has no moments"),
+        ({}, "[[torque.terms]] 1, gravity_gradient: inertia is missing, and [body] has no"),
+        ({"moments": [1, 2, -3]}, "[body] moments: a moment is not above 0"),
+        ({"moments": "x"}, "[body] moments: "),
+        ({"inertia": [[1, 2, 3], [4, 5, 6], [7, 8, 9]]}, "[body] inertia"),
+    ],
+)  # fmt: skip
+def test_gravity_gradient_without_a_body_is_one_line(body: dict[str, Any], words: str) -> None:
+    terms = [{"kind": "gravity_gradient", "rate": 0.5}]
+    with pytest.raises(InputError) as raised:
+        scene_of({"body": body, "initial": INITIAL, "torque": {"terms": terms}}, "bad")
+    assert str(raised.value).startswith(words)
+
+
+def test_message_names_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(scene_text(scene_with(terms=[DAMPING])).replace("matrix", "matrx"))
+    with pytest.raises(InputError, match=r"^scene file '.*': \[\[torque.terms\]\] 1, damping: unk"):
+        read_scene(path)
+
+
+def test_warning_of_an_impossible_body_names_the_caller(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(scene_text(scene_with(terms=[DAMPING])).replace("[3.0, 2.0, 1.5]", "[9, 2, 1]"))
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        read_scene(path)
+    assert [each.filename for each in told] == [__file__]
+
+
+def test_schema_of_the_record_has_one_form_of_torque() -> None:
+    record = scene_record(scene_with(terms=[DAMPING]))
+    assert record["torque"] == {"terms": [DAMPING]}
+    wrong: list[dict[str, Any]] = [
+        {"terms": []},
+        {"terms": [{"matrix": 0.1}]},
+        {"terms": [DAMPING], "opaque": True},
+        {"terms": [DAMPING], "recorded": 1},
+        {"terms": [DAMPING], "frame": "space"},
+        {**WAVES, "terms": [DAMPING], "expression": ["0"] * 3, "constants": {}},
+    ]
+    for torque in wrong:
+        assert not is_documented(record | {"torque": torque})
+
+
+def test_terms_in_the_documents_are_read() -> None:
+    """The reference names every kind and key, and its example and that of the guide are read."""
+    text = (ROOT / "docs/reference/scene-files.md").read_text().partition("## Ready terms")[2]
+    (example,) = re.findall(r"```\n(\[\[torque.terms\]\].*?)```", text, re.DOTALL)
+    scene = scene_of(BODY | tomllib.loads(example), "reference")
+    assert isinstance(scene.torque, StateTorque)
+    rows = dict(re.findall(r"^\| `(\w+)` \| (.*?) \|", text, re.MULTILINE))
+    assert rows.pop("kind") == "keys"
+    keys = {kind: set(re.findall(r"`(\w+)`", row)) for kind, row in rows.items()}
+    assert keys == {kind: set(signature(function).parameters) for kind, function in KINDS.items()}
+    satellite = read_scene(ROOT / "docs/satellite.toml")
+    assert isinstance(satellite.torque, StateTorque)
+    found = satellite.torque.at(0.0, satellite.omega, (1.0, 0.0, 0.0, 0.0))
+    assert np.isfinite(found).all()

@@ -6,12 +6,25 @@ from typing import Any
 
 import numpy as np
 
-from pyharness import Scene
+from pyharness import Scene, TorqueLaw, torques
+from pyharness.model.state_torque import StateTorque
 
 # A torque over the size of the moments, for symbols or numbers: (t, omega, attitude).
 Term = Callable[[Any, Any, Any], Any]
 STEADY = ("damping", "wheel", "drag", "wave", "control", "quotient", "root", "decay", "swing")
 TURNING = ("gradient", "field", "spring", "mixed")
+
+READY = (
+    "damping",
+    "drag",
+    "rate_control",
+    "attitude_control",
+    "wheels",
+    "gravity_gradient",
+    "magnetic_dipole",
+    "magnetic_damping",
+    "in_space",
+)
 
 
 def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Scene, float]:
@@ -43,6 +56,47 @@ def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Sce
     )
     radians = 10.0 ** source.uniform(-0.5, 1.7)
     return scene, source.choice((1.0, 1.0, -0.3)) * radians / speed
+
+
+def draw_ready(source: Random) -> tuple[Scene, float]:
+    """Return a random scene whose torque is one or two ready terms, and a time (s)."""
+    chosen = source.sample(READY, source.choice((1, 2)))
+    size = 10.0 ** source.uniform(-2.0, 1.0)  # of the moments, kg m2
+    moments = [size * x for x in _moments(source)]
+    speed = 10.0 ** source.uniform(-1.0, 1.0)
+    torque = sum(ready(source, name, moments, speed) for name in chosen)
+    assert isinstance(torque, StateTorque)
+    scene = Scene(
+        " + ".join(chosen),
+        [source.uniform(-speed, speed) for _ in range(3)],
+        moments=moments,
+        torque=torque,
+        attitude=[source.gauss(0.0, 1.0) for _ in range(4)],
+    )
+    radians = 10.0 ** source.uniform(-0.5, 1.7)
+    return scene, source.choice((1.0, 1.0, -0.3)) * radians / speed
+
+
+def ready(source: Random, name: str, moments: list[float], speed: float) -> StateTorque:
+    """Return a ready term with random arguments, about the size of the gyroscopic torque."""
+    part = max(moments) * speed * source.uniform(0.05, 1.0)
+    vector = [source.uniform(-1.0, 1.0) for _ in range(3)]
+    several = [source.uniform(0.1, 0.5) * part for _ in range(3)]
+    rate = speed * 10.0 ** source.uniform(-1.0, 0.5)
+    field = TorqueLaw(vector, sines=[([part, 0.0, part], rate)], frame="space")
+    made: dict[str, Callable[[], Any]] = {
+        "damping": lambda: torques.damping(several),
+        "drag": lambda: torques.drag([0.1 * part, 0.2 * part / speed**2]),
+        "rate_control": lambda: torques.rate_control(several, [speed * x for x in vector]),
+        "attitude_control": lambda: torques.attitude_control(part * speed, several, [1.0, *vector]),
+        "wheels": lambda: torques.wheels([part * x for x in vector], [0.1 * part * speed, 0, 0]),
+        "gravity_gradient": lambda: torques.gravity_gradient(moments, rate),
+        "magnetic_dipole": lambda: torques.magnetic_dipole([speed * x for x in vector], field),
+        "magnetic_damping": lambda: torques.magnetic_damping(0.3 * part, vector),
+        "in_space": lambda: torques.in_space([part * speed * x for x in vector]),
+    }
+    found: StateTorque = made[name]()
+    return found
 
 
 def _moments(source: Random) -> list[float]:

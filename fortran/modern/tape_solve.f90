@@ -93,7 +93,9 @@ contains
     end do
     blurred = ROUNDING*outcome%growth*(1.0_dp + outcome%noise)
     solution%steps = outcome%steps
-    solution%error = max(outcome%error, min(outcome%least, UNSURE*request%tolerance)) + blurred
+    ! The propagated error may be small by chance at the end, although perturbations grew before.
+    error = min(outcome%least*sqrt(outcome%growth), UNSURE*request%tolerance)
+    solution%error = max(outcome%error, error) + blurred
     solution%growth = outcome%growth
     solution%spent = spent
     if (solution%status == COMPLETE .and. blurred > UNSURE*request%tolerance) then

@@ -124,6 +124,17 @@ def test_every_verb_with_a_scene_is_tried() -> None:
 
 
 @pytest.mark.usefixtures("damped")
+def test_methods_and_their_plan_take_a_torque_that_depends_on_the_state(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for method in ("auto", "taylor", "dop853", "reference"):
+        assert main(["run", "--scene", "damped.toml", "--method", method]) == 0
+        assert "complete" in capsys.readouterr().out
+    assert main(["plan", "--scene", "damped.toml"]) == 0
+    assert "its torque depends on the state" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("damped")
 def test_law_in_expressions_gives_the_output_of_the_law(capsys: pytest.CaptureFixture[str]) -> None:
     head, _, rest = DAMPED.partition("expression")
     tail = rest[rest.index("[run]") :]

@@ -10,6 +10,7 @@ from pyharness.dynamics.field_terms import (
     magnetic_damping,
     magnetic_dipole,
 )
+from pyharness.dynamics.table_terms import pulses, table
 from pyharness.dynamics.terms import attitude_control, damping, drag, rate_control, wheels
 from pyharness.model.state_torque import opaque, recorded
 
@@ -22,7 +23,9 @@ __all__ = [
     "magnetic_damping",
     "magnetic_dipole",
     "opaque",
+    "pulses",
     "rate_control",
     "recorded",
+    "table",
     "wheels",
 ]

@@ -11,6 +11,7 @@ from pyharness.dynamics.field_terms import (
     magnetic_damping,
     magnetic_dipole,
 )
+from pyharness.dynamics.table_terms import pulses, table
 from pyharness.dynamics.term_input import inertia_of
 from pyharness.dynamics.terms import attitude_control, damping, drag, rate_control, wheels
 from pyharness.model.errors import InputError, kind_of, unknown
@@ -28,6 +29,7 @@ KINDS: dict[str, Function] = {
     for each in (
         *(damping, drag, rate_control, attitude_control, wheels),
         *(gravity_gradient, magnetic_dipole, magnetic_damping, in_space),
+        *(table, pulses),
     )
 }
 # The arguments that may depend on time, and the axes of their components.
@@ -83,7 +85,12 @@ def _term(table: object, where: str, body: dict[str, Any]) -> Term:
     for name, parameter in parameters.items():
         if name not in given and parameter.default is Parameter.empty:
             raise InputError(f"{where}, {kind}: {name} is missing; keys: {', '.join(parameters)}")
-    arguments = {key: _argument(f"{where}, {key}", key, value) for key, value in given.items()}
+    # The torque of pulses has no law.
+    frames = {} if kind == "pulses" else _FRAMES
+    arguments = {
+        key: _argument(f"{where}, {key}", value, key, frames.get(key))
+        for key, value in given.items()
+    }
     try:
         torque = KINDS[kind](**arguments)
     except InputError as error:
@@ -104,16 +111,19 @@ def _inertia(body: dict[str, Any], where: str) -> Any:
     )
 
 
-def _argument(where: str, key: str, value: object) -> object:
-    """Return the argument of a term for the value of a key; a table becomes a torque law."""
+def _argument(where: str, value: object, key: str, frame: str | None) -> object:
+    """Return the argument of a term for the value of a key; a table becomes a torque law.
+
+    `frame` names the axes of the law; it is None if the argument is no law.
+    """
     if key == "per_axis":
         return boolean(where, value)
-    if key not in _FRAMES:
+    if frame is None:
         return value
     if isinstance(value, dict):
         check_keys(value, _LAW, where)
         try:
-            return TorqueLaw(**{**vars(law_of_table(value)), "frame": _FRAMES[key]})
+            return TorqueLaw(**{**vars(law_of_table(value)), "frame": frame})
         except InputError as error:
             raise _placed(error, where) from None
     if not isinstance(value, list):
@@ -134,7 +144,7 @@ def _placed(error: InputError, where: str) -> InputError:
 
 
 def _data(value: Any) -> Any:
-    """Return a checked argument of a term as floats in tuples; truth values and laws stay."""
+    """Return a checked argument of a term as floats in tuples; texts, truth values, laws stay."""
     if isinstance(value, list):
         return tuple(map(_data, value))
-    return value if isinstance(value, (bool, TorqueLaw)) else float(value)
+    return value if isinstance(value, (bool, str, TorqueLaw)) else float(value)

@@ -253,7 +253,7 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
     if tape is None or tape.inputs - {TIME}:
         return None
     frequencies, waves = {TIME: 1.0}, {}
-    for slot, (kind, operands, linear) in enumerate(tape.operations, N_INPUTS):
+    for slot, (kind, operands, linear, _) in enumerate(tape.operations, N_INPUTS):
         if linear is not None and not linear.constant and [x for x, _ in linear.terms] == [TIME]:
             ((_, frequencies[slot]),) = linear.terms
         elif kind in ("sine", "cosine") and operands[0] in frequencies:

@@ -12,7 +12,16 @@ from typing import Any
 import numpy as np
 
 from pyharness.model.errors import InputError
-from pyharness.model.tape import N_INPUTS, Functions, Linear, Operation, Tape, slots_of
+from pyharness.model.tape import (
+    N_INPUTS,
+    TIME,
+    Functions,
+    Linear,
+    Operation,
+    Table,
+    Tape,
+    slots_of,
+)
 from pyharness.model.values import converted
 
 # Largest number of operations and of terms of a linear combination; the kernel's memory and time
@@ -260,6 +269,13 @@ class Symbol:
         """Return the hyperbolic tangent."""
         return 1.0 - 2.0 / ((2.0 * self).exp() + 1.0)
 
+    def of_table(self, table: Table) -> "Symbol":
+        """Return the value of a table at this time; raise InputError if it isn't the plain time."""
+        if self._constant or self._terms != {TIME: 1.0}:
+            raise InputError("[torque]: a table of anything but the time can't be recorded")
+        slot = self._recorder.slot(Operation("table", (), None, table))
+        return Symbol(self._recorder, 0.0, {slot: 1.0})
+
     def conjugate(self) -> "Symbol":
         """Return the symbol itself, because it is real."""
         return self
@@ -303,7 +319,12 @@ class Symbol:
 
 # The functions with which a tape is evaluated in symbols of a recorder. A constant stays a float.
 SYMBOLS: Functions[Any] = Functions(
-    float, lambda x: np.sqrt(x), lambda x: np.exp(x), lambda x: np.sin(x), lambda x: np.cos(x)
+    float,
+    lambda x: np.sqrt(x),
+    lambda x: np.exp(x),
+    lambda x: np.sin(x),
+    lambda x: np.cos(x),
+    lambda table, time: time.of_table(table),
 )
 
 
@@ -321,11 +342,12 @@ def _without_unused(operations: Sequence[Operation], outputs: Sequence[Linear]) 
             used.update(slots_of(operations[number]))
     places = {slot: slot for slot in range(N_INPUTS)}
     kept: list[Operation] = []
-    for number, (kind, operands, linear) in enumerate(operations):
+    for number, (kind, operands, linear, table) in enumerate(operations):
         if N_INPUTS + number in used:
             places[N_INPUTS + number] = N_INPUTS + len(kept)
             moved = None if linear is None else _moved(linear, places)
-            kept.append(Operation(kind, tuple(places[slot] for slot in operands), moved))
+            moved_operands = tuple(places[slot] for slot in operands)
+            kept.append(Operation(kind, moved_operands, moved, table))
     return Tape(tuple(kept), tuple(_moved(each, places) for each in outputs))
 
 

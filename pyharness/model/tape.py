@@ -5,6 +5,7 @@ is then evaluated in every arithmetic: floats, decimal numbers, Taylor series, o
 """
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -30,16 +31,31 @@ class Linear(NamedTuple):
     terms: tuple[tuple[int, float], ...]
 
 
+class Table(NamedTuple):
+    """A function of time that consists of cubic polynomials.
+
+    `breaks` are the times (s), in ascending order, at which the pieces begin. Piece k, with the
+    coefficients c0 to c3, is c0 + c1 s + c2 s^2 + c3 s^3, where s is the time minus breaks[k]. It
+    holds until the next break. Piece 0 also holds at all times before its break, and the last piece
+    at all times after.
+    """
+
+    breaks: tuple[float, ...]
+    pieces: tuple[tuple[float, float, float, float], ...]
+
+
 class Operation(NamedTuple):
     """An operation of a tape.
 
     `kind` is "product", "quotient", "sqrt", "exp", "sine" or "cosine", and `operands` are its one
-    or two slots; or it is "linear", and `linear` is a linear combination of slots.
+    or two slots; or it is "linear", and `linear` is a linear combination of slots; or it is
+    "table", and `table` is a function of the time.
     """
 
     kind: str
     operands: tuple[int, ...]
     linear: Linear | None = None
+    table: Table | None = None
 
 
 @dataclass(frozen=True)
@@ -64,6 +80,8 @@ class Tape:
 
 def slots_of(operation: Operation) -> tuple[int, ...]:
     """Return the slots that an operation reads."""
+    if operation.table is not None:
+        return (TIME,)
     if operation.linear is None:
         return operation.operands
     return tuple(slot for slot, _ in operation.linear.terms)
@@ -78,6 +96,7 @@ class Functions(Generic[T]):
     exp: Callable[[T], T]
     sine: Callable[[T], T]
     cosine: Callable[[T], T]
+    table: Callable[[Table, T], T]  # the value of a table at a time
 
 
 def evaluate(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T]:
@@ -99,9 +118,11 @@ def evaluate(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T
             return functions.number(linear.constant)
         return total + functions.number(linear.constant) if linear.constant else total
 
-    for kind, operands, linear in tape.operations:
+    for kind, operands, linear, table in tape.operations:
         if linear is not None:
             values.append(combined(linear))
+        elif table is not None:
+            values.append(functions.table(table, values[TIME]))
         elif kind == "product":
             values.append(values[operands[0]] * values[operands[1]])
         elif kind == "quotient":
@@ -122,5 +143,12 @@ def _exp(x: float) -> float:
         return math.inf
 
 
+def _value(table: Table, time: float) -> float:
+    piece = max(0, bisect_right(table.breaks, time) - 1)
+    c0, c1, c2, c3 = table.pieces[piece]
+    s = time - table.breaks[piece]
+    return c0 + s * (c1 + s * (c2 + s * c3))
+
+
 # For arguments of type float. A division by zero raises ZeroDivisionError.
-FLOATS: Functions[float] = Functions(float, _sqrt, _exp, sine, cosine)
+FLOATS: Functions[float] = Functions(float, _sqrt, _exp, sine, cosine, _value)

@@ -55,10 +55,11 @@ def taylor_series(
     state += [Decimal(x) for x in scene.attitude or ()]
     begin = Decimal(0)
     rows: list[Row] = []
-    step = 0
+    forward = times[-1] >= 0
+    step = stops = 0
     while True:
         try:
-            series = equations.expand(begin, state, order)
+            series = equations.expand(begin, state, order, forward)
         except ArithmeticError:
             # The torque is singular here, or beyond the range of decimal arithmetic.
             return rows
@@ -69,16 +70,22 @@ def taylor_series(
         length = length.copy_sign(times[-1])
         if begin + length == begin and rest:
             return rows
-        limit.check(step, begin, length, rest)
-        while len(rows) < len(times) and abs(times[len(rows)]) <= abs(begin + length):
+        limit.check(step, stops, begin, length, rest)
+        end, stop = begin + length, equations.next_change(begin, forward)
+        # The Taylor series of a table is valid until the table changes.
+        if stop is not None and abs(stop) <= abs(end):
+            end, length = stop, stop - begin
+            stops += 1
+        else:
+            step += 1
+        while len(rows) < len(times) and abs(times[len(rows)]) <= abs(end):
             if equations.is_singular_before(times[len(rows)] - begin):
                 return rows
             rows.append(_evaluate(series, times[len(rows)] - begin))
         if len(rows) == len(times) or equations.is_singular_before(length):
             return rows
         state = _evaluate(series, length)
-        begin += length
-        step += 1
+        begin = end
 
 
 class _Limit:
@@ -94,20 +101,21 @@ class _Limit:
         self._next = max(2, _FIRST_STEPS * 5 // a_step)
         self._before: tuple[int, Decimal] = (0, Decimal(0))
 
-    def check(self, step: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
+    def check(self, step: int, stops: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
         """Raise InputError if the number of steps, so far or by forecast, exceeds the work limit.
 
         The number is checked before each step of an integration by Taylor series. The forecast is
-        the expected number of steps until the end. `step` is the number of steps taken, `begin` the
-        time reached (s), `length` the length of the next step (s), and `rest` the time left until
-        the end (s).
+        the expected number of steps until the end. `step` is the number of steps taken, without the
+        number `stops` of those that ended early because a table changed. `begin` is the time
+        reached (s), `length` the length of the next step (s) if no table changes, and `rest` the
+        time left until the end (s).
         """
-        if step == 0:
+        if step + stops >= self._most:
+            self._refuse(stops + (self._forecast(step, abs(begin), rest) if step else 0))
+        elif step == 0:
             # The first step alone justifies a refusal only if the limit would be exceeded tenfold.
             if rest > 10 * Decimal(self._most) * abs(length):
                 self._refuse(rest / abs(length))
-        elif step >= self._most:
-            self._refuse(self._forecast(step, abs(begin), rest))
         elif self._effort is not None and 2 * step >= self._next:
             if step >= self._next:
                 needed = self._forecast(step, abs(begin), rest)
@@ -136,8 +144,8 @@ class _Limit:
                 power = min(growth, Decimal(3))
         return step * (1 + rest / begin) ** power
 
-    def _refuse(self, needed: Decimal) -> None:
-        steps = float(min(Decimal("1e300"), needed))
+    def _refuse(self, needed: Decimal | int) -> None:
+        steps = float(min(Decimal("1e300"), Decimal(needed)))
         instead = "use a shorter time, slower motion or slower torques"
         if self._effort is not None:
             instead = advice(instead, self._effort, steps / self._ordinary)
@@ -225,13 +233,15 @@ class _Equations:
         self._velocity, self._attitude = velocity, scene.attitude is not None
         self._acceleration = [Decimal(force) / Decimal(scene.masses[0]) for force in scene.forces]
 
-    def expand(self, time: Decimal, state: Row, order: int) -> list[Row]:
+    def expand(self, time: Decimal, state: Row, order: int, forward: bool) -> list[Row]:
         """Return the Taylor coefficients 0 ... order of every unknown around `time` (s).
 
-        `state` contains the values of the unknowns at that time.
+        `state` contains the values of the unknowns at that time. If a table of the torque changes
+        at that time, the coefficients are those of the motion after it if `forward` is true, and
+        otherwise of the motion before it.
         """
         series = [[x] for x in state]
-        torque = self._torque_series(time, order, series)
+        torque = self._torque_series(time, order, series, forward)
         for k in range(order):
             # Cauchy products of the coefficients 0 ... k.
             backward = [list(reversed(each)) for each in series]
@@ -251,6 +261,13 @@ class _Equations:
                 each.append(rate / (k + 1))
         return series
 
+    def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
+        """Return the next time (s) at which a table of the torque changes, or None.
+
+        It is after `time` if `forward` is true, and otherwise before it.
+        """
+        return None if self._tape is None else self._tape.next_change(time, forward)
+
     def is_singular_before(self, offset: Decimal) -> bool:
         """Return whether the torque is singular between the expansion's time and `offset` (s) on.
 
@@ -258,7 +275,9 @@ class _Equations:
         """
         return self._tape is not None and self._tape.crosses_a_branch(offset)
 
-    def _torque_series(self, time: Decimal, order: int, series: list[Row]) -> Callable[[int], Row]:
+    def _torque_series(
+        self, time: Decimal, order: int, series: list[Row], forward: bool
+    ) -> Callable[[int], Row]:
         """Return a function that returns Taylor coefficient k of the torque over the moments.
 
         The expansion is around `time` (s). The function is called with 0, 1 ... `order` - 1. When
@@ -266,7 +285,7 @@ class _Equations:
         """
         if self._tape is not None:
             tape, moments = self._tape, self._moments
-            tape.begin(time, series[:3], series[-4:] if self._attitude else [])
+            tape.begin(time, series[:3], series[-4:] if self._attitude else [], forward)
             return lambda k: [x / moment for x, moment in zip(tape.next(), moments, strict=True)]
         terms = self._law_series(time, order)
         return lambda k: [each[k] for each in terms]

@@ -4,9 +4,10 @@ The recurrences are those of Jorba and Zou 2005, Experimental Mathematics 14. Th
 all operations are computed order by order, together with those of the solution.
 """
 
+from bisect import bisect_left, bisect_right
 from decimal import Decimal
 
-from pyharness.model.tape import N_INPUTS, Linear, Operation, Tape
+from pyharness.model.tape import N_INPUTS, Linear, Operation, Table, Tape
 from pyharness.truth.decimal_functions import Row, product, sine_cosine
 
 # An angle beyond the range of binary64 has no sine in any method. Its reduction would take as many
@@ -23,11 +24,11 @@ _Sum = tuple[Decimal, list[tuple[Decimal, int]]]
 def series_products(tape: Tape) -> int:
     """Return the number of products of two series that each order of a tape's series takes.
 
-    A sine and a cosine are computed together, by two products.
+    A sine and a cosine are computed together, by two products. A table takes none.
     """
     waves = ("sine", "cosine")
     angles = {each.operands for each in tape.operations if each.kind in waves}
-    others = [each for each in tape.operations if each.kind not in ("linear", *waves)]
+    others = [each for each in tape.operations if each.kind not in ("linear", "table", *waves)]
     return 2 * len(angles) + len(others)
 
 
@@ -42,15 +43,31 @@ class TapeSeries:
         """Convert the numbers of the tape to Decimal, in the current arithmetic."""
         self._operations = [(each, _sum(each.linear)) for each in tape.operations]
         self._outputs = [_sum(each) for each in tape.outputs]
+        # Each table, by the slot of its operation, and the exact times at which its pieces begin.
+        self._breaks = {
+            slot: (table, [Decimal(time) for time in table.breaks])
+            for slot, (_, _, _, table) in enumerate(tape.operations, N_INPUTS)
+            if table is not None
+        }
+        # The times at which a table changes. Its first piece holds before its first break too.
+        changes = {time for _, breaks in self._breaks.values() for time in breaks[1:]}
+        self._changes = sorted(changes)
         self._slots: list[Row] = []
 
-    def begin(self, time: Decimal, omega: list[Row], attitude: list[Row]) -> None:
+    def begin(
+        self, time: Decimal, omega: list[Row], attitude: list[Row], forward: bool = True
+    ) -> None:
         """Begin an expansion around `time` (s).
 
         `omega` and `attitude` are the lists of the Taylor coefficients of the unknowns. The caller
-        extends these lists. `attitude` is empty if the tape does not depend on the attitude.
+        extends these lists. `attitude` is empty if the tape does not depend on the attitude. If a
+        piece of a table ends at `time` and another begins, the later one is expanded if `forward`
+        is true, and otherwise the earlier one.
         """
         self._order = 0
+        self._tables = {
+            slot: _expanded(*each, time, forward) for slot, each in self._breaks.items()
+        }
         self._slots = [[time], *omega, *(attitude or [[] for _ in range(4)])]
         self._slots += [[] for _ in self._operations]
         # For each operand of a sine or a cosine: the series of the sine, and of the cosine.
@@ -79,9 +96,11 @@ class TapeSeries:
 
     def _coefficient(self, operation: Operation, linear: _Sum, slot: int, k: int) -> Decimal:
         """Return Taylor coefficient k of an operation, whose series has coefficients 0 to k - 1."""
-        kind, operands, _ = operation
+        kind, operands, _, table = operation
         if kind == "linear":
             return self._combined(linear, k)
+        if table is not None:
+            return self._tables[slot][k] if k < 4 else Decimal(0)
         x, found = self._slots[operands[0]], self._slots[slot]
         if kind == "product":
             return product(x, self._slots[operands[1]][::-1])
@@ -121,6 +140,14 @@ class TapeSeries:
             slope.append(k * self._slots[operand][k])
         return slope
 
+    def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
+        """Return the next time (s) after `time` at which a table changes, or None if there is none.
+
+        If `forward` is false, it is the next time before `time`.
+        """
+        place = (bisect_right if forward else bisect_left)(self._changes, time) - (not forward)
+        return self._changes[place] if 0 <= place < len(self._changes) else None
+
     def crosses_a_branch(self, offset: Decimal) -> bool:
         """Return whether a square root reaches 0 between the expansion's time and `offset` (s) on.
 
@@ -145,6 +172,18 @@ def _sum(linear: Linear | None) -> _Sum:
     if linear is None:
         return Decimal(0), []
     return +Decimal(linear.constant), [(+Decimal(factor), slot) for slot, factor in linear.terms]
+
+
+def _expanded(table: Table, breaks: Row, time: Decimal, forward: bool) -> Row:
+    """Return the Taylor coefficients 0 to 3 of a piece of a table around `time` (s).
+
+    It is the piece that holds from `time` on, or if `forward` is false, until `time`. `breaks` are
+    the breaks of the table.
+    """
+    piece = max(0, (bisect_right if forward else bisect_left)(breaks, time) - 1)
+    c0, c1, c2, c3 = map(Decimal, table.pieces[piece])
+    s = time - breaks[piece]
+    return [c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2 * c2 + s * 3 * c3), c2 + 3 * s * c3, +c3]
 
 
 def _root_coefficient(x: Row, root: Row, k: int) -> Decimal:

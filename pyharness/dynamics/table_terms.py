@@ -1,0 +1,265 @@
+"""Torque terms given by tables of values over time, and pulses; components about the body axes."""
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Sequence
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.state_torque import StateTorque, replayed
+from pyharness.model.symbols import SYMBOLS
+from pyharness.model.tape import Table
+from pyharness.model.values import Numbers, Triple, converted, finite, number_list, three
+
+_MOST_TIMES = 10_000
+_LARGEST_TIME = 1e300
+# Pulses touch if at most this many spacings of floats are between the end of one and the start of
+# the next, because the sum of a start and a duration is rounded.
+_TOUCHING = 4.0
+_Cubic = tuple[float, float, float, float]
+
+
+def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linear") -> StateTorque:
+    """Return a torque that a table of values over time specifies.
+
+    Before the first time the torque has the first value, and after the last time the last value.
+    The methods that integrate by Taylor series begin a step at each time at which the torque or a
+    derivative is discontinuous. Their accuracy is therefore that of a smooth torque.
+
+    Parameters
+    ----------
+    times : iterable of numbers, shape (n,)
+        The times (s) in ascending order, at least 2 and at most 10 000.
+    values : iterable of three numbers, shape (n, 3)
+        The torque about the body axes (N m) at each time.
+    interpolation : str
+        The torque between the times: ``held`` (each value holds until the next time), ``linear``,
+        or ``cubic`` (a cubic spline, whose first two pieces are one polynomial, as are the last
+        two; between the first time and the last, its first two derivatives are continuous).
+
+    Returns
+    -------
+    StateTorque
+        The torque about the body axes (N m).
+
+    Raises
+    ------
+    InputError
+        If the times are not in ascending order, if there are not as many values as times, if the
+        interpolation is unknown, or if a number is not finite.
+
+    References
+    ----------
+    C. de Boor, A Practical Guide to Splines, revised edition, 2001, chapter 4 (not-a-knot).
+
+    Examples
+    --------
+    >>> from pyharness.torques import table
+    >>> ramp = table([0.0, 1.0, 3.0], [(0, 0, 0), (2, 0, 0), (2, 0, 4)])
+    >>> ramp.at(0.5, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    (1.0, 0.0, 0.0)
+    >>> ramp.at(2.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    (2.0, 0.0, 2.0)
+    >>> steps = table([0.0, 1.0, 3.0], [(0, 0, 0), (2, 0, 0), (2, 0, 4)], interpolation="held")
+    >>> steps.at(2.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    (2.0, 0.0, 0.0)
+    """
+    if not isinstance(interpolation, str) or interpolation not in _PIECES:
+        raise unknown("interpolation", interpolation, _PIECES, "[torque] table")
+    found = _times("[torque] table times", times, 2)
+    if not all(a < b for a, b in itertools.pairwise(found)):
+        raise InputError("[torque] table times: not in ascending order; allowed: ascending times")
+    where = "[torque] table values"
+    given = list(islice(number_list(where, values, "allowed: a list of rows"), len(found) + 1))
+    if len(given) != len(found):
+        raise _other_number(where, "rows", len(given), len(found))
+    rows = [three(f"{where}, row {n}", row) for n, row in enumerate(given, 1)]
+    make = _PIECES[interpolation]
+    return _torque([make(found, list(axis)) for axis in zip(*rows, strict=True)])
+
+
+def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbers]) -> StateTorque:
+    """Return a torque that acts within pulses, and is 0 elsewhere.
+
+    The methods that integrate by Taylor series begin a step at each start and end of a pulse.
+
+    Parameters
+    ----------
+    starts : iterable of numbers, shape (n,)
+        The times (s) at which the pulses begin, in any order, at least 1 and at most 10 000.
+    durations : iterable of numbers, shape (n,)
+        The durations (s), above 0. A pulse may begin when another ends, but not before.
+    torque : three numbers, or iterable of three numbers, shape (n, 3)
+        The torque about the body axes (N m) of all pulses, or of each.
+
+    Returns
+    -------
+    StateTorque
+        The torque about the body axes (N m).
+
+    Raises
+    ------
+    InputError
+        If pulses overlap, if there are not as many durations or torques as starts, if a duration
+        is not above 0, or if a number is not finite.
+
+    References
+    ----------
+    B. Wie, Space Vehicle Dynamics and Control, 2nd edition, 2008, chapter 7 (thrusters).
+
+    Examples
+    --------
+    >>> from pyharness.torques import pulses
+    >>> thruster = pulses([1.0, 5.0], [0.5, 0.25], (0.0, 2.0, 0.0))
+    >>> thruster.at(1.25, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    (0.0, 2.0, 0.0)
+    >>> thruster.at(1.75, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    (0.0, 0.0, 0.0)
+    """
+    begins = _times("[torque] pulses starts", starts, 1)
+    where = "[torque] pulses durations"
+    allowed = "allowed: a list of numbers above 0, s"
+    given = list(islice(number_list(where, durations, allowed), len(begins) + 1))
+    if len(given) != len(begins):
+        raise _other_number(where, "numbers", len(given), len(begins))
+    lengths = [finite(f"{where}, number {n}", each) for n, each in enumerate(given, 1)]
+    for begin, length in zip(begins, lengths, strict=True):
+        if not length > 0.0:
+            raise InputError(f"{where}: {length:g} is not above 0; {allowed}")
+        if begin + length == begin or begin + length > _LARGEST_TIME:
+            raise InputError(
+                f"{where}: the pulse that begins at {begin:g} s ends at {begin + length:g} s in "
+                f"binary64; allowed: a later end, up to {_LARGEST_TIME:g} s"
+            )
+    torques = _torques_of_pulses(torque, len(begins))
+    ordered = sorted(zip(begins, lengths, torques, strict=True))
+    ends = [begin + length for begin, length, _ in ordered]
+    for n, (after, _, _) in enumerate(ordered[1:]):
+        begin = ordered[n][0]
+        if begin < after and abs(ends[n] - after) <= _TOUCHING * math.ulp(after):
+            ends[n] = after
+        if ends[n] > after:
+            raise InputError(
+                f"[torque] pulses: the pulse that begins at {begin:g} s overlaps the one that "
+                f"begins at {after:g} s; allowed: pulses that do not overlap"
+            )
+    times, values = [_before(ordered[0][0], ends[0])], [(0.0, 0.0, 0.0)]
+    for n, (begin, _, each) in enumerate(ordered):
+        if times[-1] == begin:
+            times.pop()
+            values.pop()
+        times += [begin, ends[n]]
+        values += [each, (0.0, 0.0, 0.0)]
+    return _torque([_held(times, list(axis)) for axis in zip(*values, strict=True)])
+
+
+def _torques_of_pulses(torque: object, count: int) -> list[Triple]:
+    """Return the torque of each of `count` pulses (N m) from one torque or from a list of them."""
+    where = "[torque] pulses torque"
+    allowed = "allowed: three numbers, or three numbers for each pulse"
+    given = list(islice(number_list(where, torque, allowed), max(count, 3) + 1))
+    if any(isinstance(converted(each), float) for each in given):
+        return [three(where, given)] * count
+    if len(given) != count:
+        raise _other_number(where, "rows", len(given), count)
+    return [three(f"{where}, row {n}", row) for n, row in enumerate(given, 1)]
+
+
+def _times(where: str, values: object, fewest: int) -> list[float]:
+    allowed = f"allowed: a list of {fewest} to {_MOST_TIMES} times, s"
+    given = list(islice(number_list(where, values, allowed), _MOST_TIMES + 1))
+    if not fewest <= len(given) <= _MOST_TIMES:
+        count = f"more than {_MOST_TIMES}" if len(given) > fewest else str(len(given))
+        raise InputError(f"{where}: {count} times; {allowed}")
+    found = [finite(f"{where}, number {n}", each) for n, each in enumerate(given, 1)]
+    if max(map(abs, found)) > _LARGEST_TIME:
+        raise InputError(
+            f"{where}: {max(found, key=abs):g}; allowed: from -{_LARGEST_TIME:g} to "
+            f"{_LARGEST_TIME:g} s"
+        )
+    return found
+
+
+def _other_number(where: str, what: str, given: int, wanted: int) -> InputError:
+    count = f"more than {wanted}" if given > wanted else str(given)
+    return InputError(f"{where}: {count} {what} for {wanted} times; allowed: one for each time")
+
+
+def _before(first: float, second: float) -> float:
+    """Return a time before the first one, where a constant piece may begin.
+
+    It is as far from the first time as the second is, so that no piece is shorter than the others.
+    """
+    return min(2.0 * first - second, math.nextafter(first, -math.inf))
+
+
+def _held(times: list[float], values: list[float]) -> Table:
+    return Table(tuple(times), tuple((value, 0.0, 0.0, 0.0) for value in values))
+
+
+def _linear(times: list[float], values: list[float]) -> Table:
+    pieces = [
+        (a, (b - a) / (end - begin), 0.0, 0.0)
+        for (begin, end), (a, b) in zip(
+            itertools.pairwise(times), itertools.pairwise(values), strict=True
+        )
+    ]
+    return _between(times, values, pieces)
+
+
+def _cubic(times: list[float], values: list[float]) -> Table:
+    # SciPy is imported here, because few scenes have a spline.
+    from scipy.interpolate import CubicSpline
+
+    with np.errstate(all="ignore"):
+        try:
+            rows = CubicSpline(times, values).c[::-1].T.tolist()
+        except (ValueError, ArithmeticError, np.linalg.LinAlgError):
+            rows = [[math.nan] * 4]
+    return _between(times, values, [(c0, c1, c2, c3) for c0, c1, c2, c3 in rows])
+
+
+def _between(times: list[float], values: list[float], pieces: Sequence[_Cubic]) -> Table:
+    """Return the table with `pieces` between the times, and constants before and after."""
+    if not all(map(math.isfinite, itertools.chain.from_iterable(pieces))):
+        raise InputError(
+            "[torque] table: a slope or a coefficient overflows; allowed: smaller values, or times "
+            "with a larger distance"
+        )
+    first, last = ((value, 0.0, 0.0, 0.0) for value in (values[0], values[-1]))
+    return Table((_before(times[0], times[1]), *times), (first, *pieces, last))
+
+
+_PIECES: dict[str, Callable[[list[float], list[float]], Table]] = {
+    "held": _held,
+    "linear": _linear,
+    "cubic": _cubic,
+}
+
+
+def _torque(axes: Sequence[Table]) -> StateTorque:
+    """Return the torque whose components are tables of the time."""
+    reduced = [_reduced(each) for each in axes]
+
+    def torque(time: Any, omega: Any, attitude: Any) -> list[Any]:
+        # A table with one constant piece is a number.
+        return [
+            SYMBOLS.table(each, time) if len(each.breaks) > 1 else each.pieces[0][0]
+            for each in reduced
+        ]
+
+    return replayed(torque)
+
+
+def _reduced(each: Table) -> Table:
+    """Return a table without the breaks between two pieces with the same constant."""
+    kept: list[tuple[float, _Cubic]] = []
+    for time, piece in zip(each.breaks, each.pieces, strict=True):
+        # Equal pieces are constants, because the table is continuous where pieces are not constant.
+        if not kept or kept[-1][1] != piece:
+            kept.append((time, piece))
+    breaks, pieces = zip(*kept, strict=True)
+    return Table(breaks, pieces)

@@ -1,0 +1,312 @@
+"""Torques given by tables of values over time, and pulses: values, refusals, and the motion."""
+
+import itertools
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from pyharness import InputError, Scene, StateTorque, TorqueLaw, solve
+from pyharness.dynamics.system import slopes_of, system_of
+from pyharness.model.state_torque import law_of, replayed
+from pyharness.model.symbols import SYMBOLS
+from pyharness.model.tape import TIME, Operation, Table
+from pyharness.model.trajectory import Array
+from pyharness.torques import damping, in_space, pulses, table
+from pyharness.truth.reference import reference
+
+SOURCE = np.random.default_rng(80)
+TIMES = np.cumsum(SOURCE.uniform(0.1, 1.0, 9)) - 2.0
+VALUES = SOURCE.normal(size=(9, 3))
+# Times within the pieces, at their breaks, and before and after the table.
+WITHIN = SOURCE.uniform(TIMES[0], TIMES[-1], 200)
+OUTSIDE = [-1e9, TIMES[0] - 1e-9, TIMES[0] - 0.5, TIMES[-1] + 1e-9, TIMES[-1] + 3.0, 1e9]
+STARTS, DURATIONS = [1.5, -1.0, 0.25, 2.75], [1.0, 0.5, 1.25, 0.5]
+TORQUES = SOURCE.normal(size=(4, 3))
+SPHERE: dict[str, Any] = {"moments": (2.0, 2.0, 2.0)}
+BODY: dict[str, Any] = {"moments": (1.5, 2.0, 3.0)}
+CASES: dict[str, StateTorque] = {
+    "held": table(TIMES, VALUES, "held"),
+    "linear": table(TIMES, VALUES),
+    "cubic": table(TIMES, VALUES, "cubic"),
+    "pulses": pulses(STARTS, DURATIONS, TORQUES),
+}
+
+
+def at(torque: StateTorque, t: float) -> Array:
+    """Return the torque at a time, which is the same in every state."""
+    return np.array(torque.at(t, (7.0, 8.0, 9.0), (0.0, 1.0, 0.0, 0.0)))
+
+
+def tables_of(torque: StateTorque) -> list[Table]:
+    """Return the tables on the tape of a torque."""
+    assert torque.tape is not None
+    return [each.table for each in torque.tape.operations if each.table is not None]
+
+
+def scene_with(torque: StateTorque, **body: Any) -> Scene:
+    """Return a scene with a torque."""
+    return Scene("table", (0.3, -1.1, 2.2), torque=torque, **body)
+
+
+# The values.
+
+
+@pytest.mark.parametrize("t", [*WITHIN[:50], *TIMES, *OUTSIDE])
+def test_linear_table_equals_that_of_numpy(t: float) -> None:
+    wanted = [np.interp(t, TIMES, column) for column in VALUES.T]
+    assert at(CASES["linear"], t) == pytest.approx(wanted, rel=1e-14, abs=1e-14)
+
+
+@pytest.mark.parametrize("t", [*WITHIN[:50], *TIMES, *OUTSIDE])
+def test_held_table_has_the_last_value_before(t: float) -> None:
+    place = max(0, sum(time <= t for time in TIMES) - 1)
+    assert at(CASES["held"], t).tolist() == VALUES[place].tolist()
+
+
+def test_cubic_table_equals_the_spline_of_scipy() -> None:
+    spline = CubicSpline(TIMES, VALUES)
+    for t in [*WITHIN, *TIMES]:
+        assert at(CASES["cubic"], t) == pytest.approx(spline(t), rel=1e-13, abs=1e-13)
+    for t in OUTSIDE:
+        end = VALUES[0] if t < TIMES[0] else VALUES[-1]
+        assert at(CASES["cubic"], t).tolist() == end.tolist()
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_cubic_table_of_few_times_is_the_polynomial_through_them(count: int) -> None:
+    torque = table(TIMES[:count], VALUES[:count], "cubic")
+    polynomial = np.polyfit(TIMES[:count], VALUES[:count], count - 1)
+    for t in np.linspace(TIMES[0], TIMES[count - 1], 7)[:-1]:
+        wanted = [np.polyval(column, t) for column in polynomial.T]
+        assert at(torque, t) == pytest.approx(wanted, rel=1e-11, abs=1e-11)
+
+
+def test_pulses_act_from_their_start_until_their_end() -> None:
+    for t in [*np.linspace(-2.0, 4.0, 97), -1e9, 1e9]:
+        wanted = np.zeros(3)
+        for start, duration, each in zip(STARTS, DURATIONS, TORQUES, strict=True):
+            if start <= t < start + duration:
+                wanted = each
+        assert at(CASES["pulses"], t).tolist() == wanted.tolist()
+
+
+def test_one_torque_is_that_of_all_pulses() -> None:
+    torque = pulses(STARTS, DURATIONS, TORQUES[0])
+    assert torque == pulses(STARTS, DURATIONS, [TORQUES[0]] * 4)
+    # Three rows are torques of three pulses, and three numbers are one torque.
+    assert at(pulses([0, 1, 2], [1, 1, 1], TORQUES[:3]), 1.5).tolist() == TORQUES[1].tolist()
+    assert at(pulses([0, 1, 2], [1, 1, 1], TORQUES[0]), 1.5).tolist() == TORQUES[0].tolist()
+
+
+def test_pulses_that_touch_but_for_rounding_have_no_gap_and_no_overlap() -> None:
+    starts = [n * 0.1 for n in range(50)]
+    torque = pulses(starts, [0.1] * 50, [(n, 0, 0) for n in range(1, 51)])
+    (found,) = tables_of(torque)
+    assert len(found.breaks) == 52
+    assert np.diff(found.breaks[1:]) == pytest.approx(0.1)
+    assert len(tables_of(pulses(starts, [0.1] * 50, (1, 0, 0)))[0].breaks) == 3
+
+
+def test_axes_that_are_constant_have_no_table() -> None:
+    torque = table([0, 1, 2], [(0, 5, 1), (0, 5, 1), (0, 5, 2)])
+    (found,) = tables_of(torque)
+    # Where the value remains, there is no break.
+    assert found.breaks[1:] == (1.0, 2.0)
+    assert at(torque, 1.5).tolist() == [0.0, 5.0, 1.5]
+    assert tables_of(table([0, 1], [(0, 0, 0), (0, 0, 0)])) == []
+
+
+@pytest.mark.parametrize(
+    "times", [[-1.0, -1.0 + 2.0**-53], [1e300 - 1e285, 1e300], [0.0, 1e-300], [-1e300, 1e300]]
+)
+@pytest.mark.parametrize("interpolation", ["held", "linear"])
+def test_breaks_are_in_order(times: list[float], interpolation: str) -> None:
+    (found,) = tables_of(table(times, [(0, 0, 0), (1e-9, 0, 0)], interpolation))
+    assert all(a < b for a, b in itertools.pairwise(found.breaks))
+    assert all(map(math.isfinite, found.breaks))
+
+
+# The tape.
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_tables_are_operations_of_the_tape(name: str) -> None:
+    torque = CASES[name]
+    assert torque.tape is not None
+    assert torque.tape.inputs == {TIME}
+    assert not torque.needs_attitude
+    assert law_of(torque) is None
+    for each in torque.tape.operations:
+        assert each == Operation("table", (), None, each.table)
+    # The tables remain in sums, in equations of motion, and about other axes.
+    total = torque + damping(0.5) + TorqueLaw((1.0, 0.0, 0.0))
+    assert tables_of(total) == tables_of(torque)
+    tape = system_of(scene_with(total, **BODY), True)
+    assert {each.table for each in tape.operations} - {None} == set(tables_of(torque))
+    assert at(total, 1.2) == pytest.approx(at(torque, 1.2) - [2.5, 4.0, 4.5])
+    axes = np.linalg.qr(SOURCE.normal(size=(3, 3)))[0]
+    assert at(torque.rotated(axes), 1.2) == pytest.approx(axes.T @ at(torque, 1.2))
+
+
+def test_table_of_anything_but_the_time_is_refused() -> None:
+    (found, *_) = tables_of(CASES["linear"])
+    for change in (lambda t, w: 2 * t, lambda t, w: t + 1, lambda t, w: w[0], lambda t, w: t * t):
+        with pytest.raises(InputError, match="a table of anything but the time can't be recorded"):
+            replayed(lambda t, w, q, f=change: [SYMBOLS.table(found, f(t, w)), 0.0, 0.0])
+
+
+FEW: Any = [(1, 2, 3), (4, 5, 6)]
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: table([0.0], [(1, 2, 3)]), "table times: 1 times; allowed: a list of 2 to 10000"),
+        (lambda: table(itertools.count(), FEW), "table times: more than 10000 times; allowed"),
+        (lambda: table(1.0, FEW), "table times: a number; allowed: a list of 2 to 10000"),  # type: ignore[arg-type]
+        (lambda: table([0, 0], FEW), "table times: not in ascending order; allowed"),
+        (lambda: table([1, 0], FEW), "table times: not in ascending order; allowed"),
+        (lambda: table([0, math.nan], FEW), "table times, number 2: nan is not finite"),
+        (lambda: table([0, "x"], FEW), "table times, number 2: text where a number belongs"),  # type: ignore[list-item]
+        (lambda: table([0, 1e301], FEW), "table times: 1e+301; allowed: from -1e+300 to 1e+300 s"),
+        (lambda: table([0, 1], FEW[:1]), "table values: 1 rows for 2 times; allowed: one for"),
+        (lambda: table([0, 1], iter(lambda: (1, 2, 3), 0)), "values: more than 2 rows for 2 times"),
+        (lambda: table([0, 1], [1, 2]), "table values, row 1: a whole number; allowed: three"),  # type: ignore[list-item]
+        (lambda: table([0, 1], [(1, 2, 3), (1, 2)]), "table values, row 2: 2 numbers; allowed"),
+        (lambda: table([0, 1], [(1, 2, 3), (1, 2, math.inf)]), "row 2: inf is not finite"),
+        (lambda: table([0, 1], FEW, "quadratic"), "table: unknown interpolation 'quadratic'; "),
+        (lambda: table([0, 1], FEW, 3), "table: interpolation is a whole number; allowed: held"),  # type: ignore[arg-type]
+        (lambda: table([0, 1e-320], FEW), "table: a slope or a coefficient overflows; allowed"),
+        (lambda: table([0, 1e-320, 1], [*FEW, (0, 0, 0)], "cubic"), "coefficient overflows"),
+        (lambda: pulses([], [], (1, 2, 3)), "pulses starts: 0 times; allowed: a list of 1 to"),
+        (lambda: pulses([0], [], (1, 2, 3)), "pulses durations: 0 numbers for 1 times; allowed"),
+        (lambda: pulses([0], [1, 1], (1, 2, 3)), "durations: more than 1 numbers for 1 times"),
+        (lambda: pulses([0], [0], (1, 2, 3)), "pulses durations: 0 is not above 0; allowed"),
+        (lambda: pulses([0], [math.nan], (1, 2, 3)), "durations, number 1: nan is not finite"),
+        (lambda: pulses([1e9], [1e-9], (1, 2, 3)), "the pulse that begins at 1e+09 s ends at 1e+"),
+        (lambda: pulses([0], [1e301], (1, 2, 3)), "ends at 1e+301 s in binary64; allowed: a later"),
+        (lambda: pulses([1, 0], [1, 1.5], (1, 2, 3)), "pulse that begins at 0 s overlaps the"),
+        (lambda: pulses([1, 1], [1, 1], (1, 2, 3)), "pulse that begins at 1 s overlaps the"),
+        (lambda: pulses([0, 1], [1, 1], (1, 2)), "pulses torque: 2 numbers; allowed: three"),
+        (lambda: pulses([0, 1], [1, 1], [(1, 2, 3)]), "pulses torque: 1 rows for 2 times; allowed"),
+        (lambda: pulses([0, 1], [1, 1], [(1, 2, 3), (1, 2)]), "pulses torque, row 2: 2 numbers"),
+        (lambda: pulses([0], [1], TorqueLaw()), "pulses torque: "),  # type: ignore[arg-type]
+        (lambda: in_space(CASES["held"]), "in space"),  # type: ignore[arg-type]
+    ],
+)  # fmt: skip
+def test_arguments_that_are_refused(make: Callable[[], Any], message: str) -> None:
+    with pytest.raises(InputError) as found:
+        make()
+    assert message in str(found.value)
+    assert str(found.value).startswith("[torque]")
+
+
+# The motion.
+
+
+def integral(each: Table, t: Fraction) -> Fraction:
+    """Return the exact integral of a table from 0 to the time `t`."""
+
+    def until(end: Fraction) -> Fraction:
+        """Return the integral from a time before all others."""
+        total, begins = Fraction(0), [Fraction(-100), *map(Fraction, each.breaks[1:])]
+        ends = [*begins[1:], Fraction(100)]
+        rows = zip(begins, ends, each.breaks, each.pieces, strict=True)
+        for begin, after, origin, piece in rows:
+            for power, c in enumerate(piece, 1):
+                low, high = (min(x, end) - Fraction(origin) for x in (begin, after))
+                total += Fraction(c) * (high**power - low**power) / power
+        return total
+
+    return until(t) - until(Fraction(0))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("name", CASES)
+def test_reference_of_a_sphere_is_the_integral(name: str, side: int) -> None:
+    torque = CASES[name]
+    breaks = {t for each in tables_of(torque) for t in each.breaks[1:]}
+    times = sorted({abs(t) for t in breaks if side * t > 0} | {0.4, 1.0, 1.7, 4.5})
+    found = reference(scene_with(torque, **SPHERE), [side * t for t in times])
+    assert len(found.time) == len(times)
+    assert found.remainder is not None
+    assert found.estimate < 1e-25
+    tables = tables_of(torque)
+    assert len(tables) == 3
+    for axis, start in enumerate((0.3, -1.1, 2.2)):
+        for n, t in enumerate(times):
+            wanted = Fraction(start) + integral(tables[axis], Fraction(side * t)) / 2
+            error = Fraction(found.omega[n, axis]) + Fraction(found.remainder[n, axis]) - wanted
+            assert abs(error) < 1e-25
+
+
+def test_reference_of_held_torques_is_the_sum_of_torque_times_duration() -> None:
+    torque = table([0.0, 0.5, 2.0, 3.0], [(1, 0, 0), (0, 4, 0), (-2, 0, 8), (0, 0, 0)], "held")
+    found = reference(Scene("held", (0.0, 0.0, 0.0), torque=torque, **SPHERE), [0.5, 1.0, 4.0])
+    assert found.omega.tolist() == [[0.25, 0, 0], [0.25, 1.0, 0], [-0.75, 3.0, 4.0]]
+    found = reference(Scene("held", (0.0, 0.0, 0.0), torque=torque, **SPHERE), [-1.0, -4.0])
+    assert found.omega.tolist() == [[-0.5, 0, 0], [-2.0, 0, 0]]
+
+
+def test_reference_accepts_a_short_pulse_in_a_long_motion() -> None:
+    """A step that ends early at a break is no sign of many steps until the end."""
+    torque = pulses([1e-9, 1e-6], [1e-9, 1e-9], (2e9, 0, 0))
+    scene = Scene("short", (0.0, 0.0, 0.0), torque=torque, **SPHERE)
+    found = reference(scene, [1e6], effort=0.01)
+    assert found.omega[0] == pytest.approx([2.0, 0.0, 0.0], rel=1e-9)
+
+
+def test_reference_accepts_many_pulses_before_a_long_motion() -> None:
+    starts = [1e-6 * n for n in range(200)]
+    torque = pulses(starts, [5e-7] * 200, (2e4, 0, 0))
+    scene = Scene("many", (0.0, 0.0, 0.0), torque=torque, **SPHERE)
+    found = reference(scene, [1e6], effort=1.0)
+    assert found.omega[0] == pytest.approx([1.0, 0.0, 0.0], rel=1e-9)
+    # Each pulse takes two steps, which count in the work limit.
+    with pytest.raises(InputError, match="more than 200 Taylor steps would be needed, some"):
+        reference(scene, [1e6], effort=0.01)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_reference_of_a_general_body_continues_at_a_break(name: str) -> None:
+    """A motion back from a state returns to the start; the breaks are in both directions."""
+    torque, end = CASES[name], 2.5
+    scene = scene_with(torque, **BODY)
+    there = reference(scene, [end])
+    # Time is shifted, so that the same table is on the other side of 0.
+    moved = [Table(tuple(t - end for t in each.breaks), each.pieces) for each in tables_of(torque)]
+    back = replayed(lambda t, w, q: [SYMBOLS.table(each, t) for each in moved])
+    again = reference(Scene("back", there.omega[0], torque=back, **BODY), [-end])
+    assert again.omega[0] == pytest.approx(scene.omega, abs=1e-13)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_scipys_method_agrees_with_the_reference(side: float) -> None:
+    scene = scene_with(CASES["linear"], **BODY)
+    times = [side * 1.0, side * 2.5]
+    found = solve(scene, times, "dop853", 1e-8)
+    error = np.abs(found.omega - reference(scene, times).omega)
+    assert error.max() < 1e-8 * np.abs(found.omega).max()
+
+
+def test_slopes_have_the_torque_over_the_moment() -> None:
+    scene = Scene("rest", (0.0, 0.0, 0.0), torque=CASES["linear"], **BODY)
+    found = slopes_of(scene)(1.2, [0.0] * 3)
+    assert found == pytest.approx(at(CASES["linear"], 1.2) / BODY["moments"])
+
+
+@pytest.mark.parametrize("body", [SPHERE, BODY], ids=["sphere", "general"])
+@pytest.mark.parametrize("name", CASES)
+def test_solve_agrees_with_the_reference(name: str, body: dict[str, Any]) -> None:
+    scene = scene_with(CASES[name], **body)
+    times = [-2.5, -1.0, -0.3, 0.0, 0.25, 0.9, 1.5, 2.0, 3.0, 5.0]
+    found = solve(scene, times, tolerance=1e-10)
+    assert found.time.tolist() == times
+    before, after = reference(scene, times[2::-1]), reference(scene, times[3:])
+    wanted = np.concatenate([before.omega[::-1], after.omega])
+    assert np.abs(found.omega - wanted).max() < 1e-10 * np.abs(wanted).max()

@@ -1,7 +1,8 @@
 ! The interface that f2py reads for scenes whose equations of motion are a tape.
 
 subroutine tape_rows(n_unknowns, n_slots, n_operations, operations, n_combinations, starts, &
-                     n_terms, slots, coefficients, constants, omega0, n_times, times, tolerance, &
+                     n_terms, slots, coefficients, constants, n_tables, table_starts, n_pieces, &
+                     breaks, pieces, omega0, n_times, times, tolerance, &
                      n_attitudes, attitudes, effort, rows, n_rows, status, steps)
   ! Integrate a tape by Taylor series: omega and, if n_attitudes > 0, the attitude at `times`, which
   ! have one sign and are ordered away from 0.
@@ -20,6 +21,11 @@ subroutine tape_rows(n_unknowns, n_slots, n_operations, operations, n_combinatio
   integer(4), intent(in), target :: slots(n_terms)
   real(8), intent(in), target :: coefficients(n_terms)
   real(8), intent(in), target :: constants(n_combinations)
+  integer(4), intent(in) :: n_tables
+  integer(4), intent(in), target :: table_starts(n_tables + 1)  ! of the pieces, from 1
+  integer(4), intent(in) :: n_pieces
+  real(8), intent(in), target :: breaks(n_pieces)               ! s
+  real(8), intent(in), target :: pieces(4, n_pieces)            ! coefficients in ascending order
   real(8), intent(in) :: omega0(3)              ! rad/s
   integer(4), intent(in) :: n_times
   real(8), intent(in), target :: times(n_times) ! s
@@ -37,7 +43,7 @@ subroutine tape_rows(n_unknowns, n_slots, n_operations, operations, n_combinatio
   solution%rows => rows
   if (n_attitudes > 0) solution%attitudes(1:4, 0:n_attitudes) => attitudes
   call tape_solve(tape_t(n_unknowns, n_slots, n_operations, operations, starts, slots, &
-                         coefficients, constants), &
+                         coefficients, constants, table_starts, breaks, pieces), &
                   request_t(omega0, tolerance, effort(1), times), solution)
   n_rows = solution%n_rows
   status = solution%status

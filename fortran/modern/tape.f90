@@ -22,6 +22,57 @@ module tape
     integer, pointer, contiguous :: slots(:)         !! of the terms
     real(dp), pointer, contiguous :: coefficients(:) !! of the terms
     real(dp), pointer, contiguous :: constants(:)    !! of the combinations
+    ! Table number n has the pieces table_starts(n) to table_starts(n + 1) - 1. Piece k is a cubic
+    ! polynomial of t - breaks(k), which holds from breaks(k) to the next breakpoint. The first
+    ! piece holds before its breakpoint too, and the last piece for all later times.
+    integer, pointer, contiguous :: table_starts(:)
+    real(dp), pointer, contiguous :: breaks(:)       !! s
+    real(dp), pointer, contiguous :: pieces(:, :)    !! (4, :): coefficients in ascending order
   end type tape_t
+
+  public :: next_break, piece_at
+
+contains
+
+  pure integer function piece_at(tape, table, t, forward)
+    !! Return the number of the piece that holds just after the time t, or just before it.
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: table
+    real(dp), intent(in) :: t        !! s
+    logical, intent(in) :: forward   !! whether the step is towards later times
+    integer :: low, high, middle
+
+    low = tape%table_starts(table)
+    high = tape%table_starts(table + 1)
+    do while (high - low > 1)
+      middle = (low + high)/2
+      if (tape%breaks(middle) < t .or. (forward .and. tape%breaks(middle) <= t)) then
+        low = middle
+      else
+        high = middle
+      end if
+    end do
+    piece_at = low
+  end function piece_at
+
+  pure real(dp) function next_break(tape, t, t_end)
+    !! Return the first breakpoint of any table between t and t_end; t_end if there is none.
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: t, t_end !! s
+    logical :: forward
+    integer :: n, place
+
+    next_break = t_end
+    forward = t_end > t
+    do n = 1, size(tape%table_starts) - 1
+      ! The breakpoint of the first piece is none, because this piece holds before it too.
+      place = piece_at(tape, n, t, forward)
+      if (forward .and. place < tape%table_starts(n + 1) - 1) then
+        next_break = min(next_break, tape%breaks(place + 1))
+      else if (.not. forward .and. place > tape%table_starts(n)) then
+        next_break = max(next_break, tape%breaks(place))
+      end if
+    end do
+  end function next_break
 
 end module tape

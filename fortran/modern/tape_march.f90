@@ -7,7 +7,7 @@ module tape_march
   use operations, only: SQUARE_ROOT => SQRT
   use problem, only: request_t, solution_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
-  use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
+  use tape, only: FIRST_UNKNOWN, next_break, tape_t, TIME_SLOT
   use tape_growth, only: begin, count_step, growth_of, MOST_UNKNOWNS, transitions_t
   use tape_series, only: expand, LAST_TERM, MOST_ORDER, noise_of, propagate, series_t, &
                          VARIATION_TOLERANCE
@@ -31,6 +31,8 @@ module tape_march
   ! Largest error for which the linearised equations hold.
   real(dp), parameter :: LINEAR_RANGE = 0.1_dp
   real(dp), parameter :: ROOT_TOLERANCE = 0.1_dp ! relative deviation of a squared root
+  ! Products of smaller omegas underflow, rad/s.
+  real(dp), parameter :: LEAST_SCALE = 2.0_dp**(-500)
   integer, parameter :: ROWS_BETWEEN_LOOKS = 2**17
 
   ! One integration of a request.
@@ -73,7 +75,9 @@ contains
     real(dp) :: t(2)                          ! time and its rounding error, s
     real(dp) :: t_end, rest, factor, local_tolerance, scale, power
     real(dp) :: t_half                        ! the time after half_way steps, s
-    logical :: at_end, from_rest, is_full, has_guess, short
+    real(dp) :: break_time                    ! next breakpoint of a table, or t_end, s
+    real(dp) :: to_stop                       ! time to it, s
+    logical :: arrives, at_end, from_rest, is_full, has_guess, short
     integer :: i, k, n, n_before, n_blocks, tries, last_terms(2)
     integer(int64) :: next_look, half_way
 
@@ -89,11 +93,10 @@ contains
     solution%n_rows = 0
     s%a = 0.0_dp
     s%b = 0.0_dp
-    s%v = 0.0_dp
+    s%v(:, :, TIME_SLOT, :) = 0.0_dp
     call begin(n, transitions)
     call begin_lanes()
     scale = maxval(abs(request%omega))
-    from_rest = .not. scale > 0.0_dp
     local_tolerance = max(LEAST_LOCAL_TOLERANCE, 0.125_dp*attempt%tolerance)
     s%order = order_for(local_tolerance)
     s%h = t_end
@@ -102,11 +105,14 @@ contains
     t_half = 0.0_dp
     tries = 0
     has_guess = .false.
+    from_rest = .not. scale > 0.0_dp
     do
       call set_unknowns()
       call expand(tape, t(2), s)
+      break_time = next_break(tape, t(1), t_end)
+      to_stop = (break_time - t(1)) - t(2)
       ! The scale of a body at rest is the omega that it is about to reach.
-      if (found%steps == 0 .and. from_rest) scale = largest_terms()
+      if (from_rest) scale = largest_terms()
       call weigh()
       factor = fitting(tape, s%order, local_tolerance, weights, s%a)
       if (.not. factor > 0.0_dp) then
@@ -121,7 +127,7 @@ contains
         s%h = 0.0625_dp*s%h
         cycle
       end if
-      if (found%steps == 0 .and. tries < MOST_TRIES) then
+      if ((found%steps == 0 .or. from_rest) .and. tries < MOST_TRIES) then
         ! The first step is a guess, and so is the omega that a body at rest is about to reach.
         if (factor < SHORTER) then
           tries = tries + 1
@@ -145,8 +151,9 @@ contains
         if (short) factor = factor*fitting_lanes(k)
       end do
       factor = before_zero_of_root(tape, s%order, s%a, factor)
-      at_end = abs(factor*s%h) >= abs(rest)*(1.0_dp - epsilon(s%h))
-      if (at_end) factor = rest/s%h
+      arrives = abs(factor*s%h) >= abs(to_stop)*(1.0_dp - epsilon(s%h))
+      if (arrives) factor = to_stop/s%h
+      at_end = arrives .and. .not. abs(break_time) < abs(t_end)
       call estimate_truncation()
       call noise_of(tape, s, noise)
       do i = 1, n
@@ -167,13 +174,18 @@ contains
         exit
       end if
       ! The steps shrink to nothing before a singularity.
-      if (abs(factor*s%h) <= spacing(t(1))) then
+      if (abs(factor*s%h) <= spacing(t(1)) .and. .not. arrives) then
         solution%status = OVERFLOW
         exit
       end if
       call count_step(solution%n_rows > n_before, transposed(lanes), transitions, is_full)
       if (is_full) call begin_block()
-      call two_sum((t(1)), factor*s%h + t(2), t(1), t(2))
+      if (arrives) then
+        t = [break_time, 0.0_dp]
+      else
+        call two_sum((t(1)), factor*s%h + t(2), t(1), t(2))
+      end if
+      from_rest = .not. scale > 0.0_dp
       rest = (t_end - t(1)) - t(2)
       s%h = factor*s%h
       if (abs(s%h) > abs(rest)) s%h = rest
@@ -280,19 +292,19 @@ contains
 
     subroutine weigh()
       !! Make errors of omega relative to the scale, and those of the quaternion angles.
-      weights(:3) = 1.0_dp/max(scale, tiny(scale))
+      weights(:3) = 1.0_dp/max(scale, LEAST_SCALE)
       weights(4:) = 2.0_dp
     end subroutine weigh
 
     real(dp) function to_end(factor)
-      !! Return the factor with which the steps near the end are equal.
+      !! Return the factor with which the steps near the end, or before a breakpoint, are equal.
       real(dp), intent(in) :: factor
 
       to_end = factor
-      if (factor*abs(s%h) >= abs(rest)) then
-        to_end = rest/s%h
-      else if (abs(rest) < 4.0_dp*factor*abs(s%h)) then
-        to_end = (rest/s%h)/ceiling(rest/(factor*s%h))
+      if (factor*abs(s%h) >= abs(to_stop)) then
+        to_end = to_stop/s%h
+      else if (abs(to_stop) < 4.0_dp*factor*abs(s%h)) then
+        to_end = (to_stop/s%h)/ceiling(to_stop/(factor*s%h))
       end if
     end function to_end
 

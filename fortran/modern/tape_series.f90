@@ -3,8 +3,8 @@ module tape_series
   !! the unknowns. A term includes its power of the step.
   use kinds, only: dp
   use operations, only: EXPONENTIAL => EXP, LINEAR, PRODUCT, QUOTIENT, SINE_COSINE, &
-                        SQUARE_ROOT => SQRT
-  use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
+                        SQUARE_ROOT => SQRT, TABLE
+  use tape, only: FIRST_UNKNOWN, piece_at, tape_t, TIME_SLOT
   use two_words, only: sine_cosine_of
   implicit none(type, external)
   private
@@ -12,6 +12,7 @@ module tape_series
   integer, parameter, public :: MOST_ORDER = 28
   ! A product sums four terms at once, and may read three terms beyond its last.
   integer, parameter, public :: LAST_TERM = MOST_ORDER + 3
+  integer, parameter :: CUBIC_TERMS = 4
   real(dp), parameter :: EPSILON_OF_FUNCTION = 2.0_dp ! rounding error of a function, in units
   ! Largest terms of perturbations that a step leaves out, relative.
   real(dp), parameter, public :: VARIATION_TOLERANCE = 1e-3_dp
@@ -97,6 +98,10 @@ contains
               b(MOST_ORDER - k, out) = 0.0_dp
               x = convolved(k, a(:, out + 1), b(:, out))/k
             end if
+          case (TABLE)
+            if (k == 0) call set_table_terms(tape, first, a(0, TIME_SLOT), t_low, h, a(:, out))
+            x = 0.0_dp
+            if (k < CUBIC_TERMS) x = a(k, out)
           case default
             a(k, out + 2) = k*a(k, first)
             if (k == 0) then
@@ -128,6 +133,25 @@ contains
       end do
     end do
   end subroutine expand_terms
+
+  pure subroutine set_table_terms(tape, number, t, t_low, h, terms)
+    !! Compute the terms of a table, which are those of a cubic polynomial.
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: number         !! of the table
+    real(dp), intent(in) :: t, t_low, h   !! s
+    real(dp), intent(inout) :: terms(0:LAST_TERM)
+    real(dp) :: u                         ! since the breakpoint, s
+    integer :: n
+
+    n = piece_at(tape, number, t, h > 0.0_dp)
+    u = (t - tape%breaks(n)) + t_low
+    associate (c => tape%pieces(:, n))
+      terms(0) = c(1) + u*(c(2) + u*(c(3) + u*c(4)))
+      terms(1) = h*(c(2) + u*(2.0_dp*c(3) + 3.0_dp*u*c(4)))
+      terms(2) = h*h*(c(3) + 3.0_dp*u*c(4))
+      terms(3) = h*h*h*c(4)
+    end associate
+  end subroutine set_table_terms
 
   pure real(dp) function convolved(k, a, b)
     !! Return term k of the product of two series. Four sums side by side fill a register.
@@ -237,6 +261,8 @@ contains
           x = (0.5_dp*v(:, k, first) - x)/a(0, out)
         case (EXPONENTIAL)
           call convolve(k, v(:, :, first), b(:, out), x)
+        case (TABLE)
+          continue
         case default
           y = 0.0_dp
           call convolve(k, v(:, :, first), b(:, out + 1), x)
@@ -326,6 +352,8 @@ contains
           s%noise(out) = abs(s%a(0, out)) + s%noise(first)/(2.0_dp*abs(s%a(0, out)))
         case (EXPONENTIAL)
           s%noise(out) = abs(s%a(0, out))*(EPSILON_OF_FUNCTION + s%noise(first))
+        case (TABLE)
+          s%noise(out) = EPSILON_OF_FUNCTION*abs(s%a(0, out))
         case default
           s%noise(out) = EPSILON_OF_FUNCTION
           s%noise(out + 1) = EPSILON_OF_FUNCTION

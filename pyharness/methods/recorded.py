@@ -16,7 +16,7 @@ from pyharness.model.errors import InputError, TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.tape import N_INPUTS, TIME, Linear, Tape
+from pyharness.model.tape import N_INPUTS, TIME, Linear, Table, Tape
 from pyharness.model.trajectory import Array, Trajectory
 
 _KINDS = {
@@ -26,6 +26,7 @@ _KINDS = {
     "sqrt": (Operations.SQRT, 1),
     "exp": (Operations.EXP, 2),
     "sine": (Operations.SINE_COSINE, 3),
+    "table": (Operations.TABLE, 1),
 }
 
 
@@ -39,6 +40,9 @@ class KernelTape(NamedTuple):
     slots: NDArray[np.int32]
     coefficients: Array
     constants: Array
+    table_starts: NDArray[np.int32]
+    breaks: Array
+    pieces: Array
 
 
 def recorded_series(
@@ -99,13 +103,14 @@ def kernel_tape(tape: Tape) -> KernelTape:
     combinations: list[tuple[float, list[tuple[int, float]]]] = []
     frequencies: dict[int, int] = {}  # the combination that is proportional to time, by slot
     waves: dict[int, int] = {}
+    tables: list[Table] = []
 
     def combined(linear: Linear) -> int:
         terms = [(places[slot], coefficient) for slot, coefficient in linear.terms]
         combinations.append((linear.constant, terms))
         return len(combinations)
 
-    for number, (kind, operands, linear) in enumerate(tape.operations, N_INPUTS):
+    for number, (kind, operands, linear, table) in enumerate(tape.operations, N_INPUTS):
         if kind in ("sine", "cosine") and operands[0] in waves:
             places[number] = waves[operands[0]] + (kind == "cosine")
             continue
@@ -115,6 +120,9 @@ def kernel_tape(tape: Tape) -> KernelTape:
             first = combined(linear)
             if not linear.constant and [slot for slot, _ in linear.terms] == [TIME]:
                 frequencies[number] = first
+        if table is not None:
+            tables.append(table)
+            first = len(tables)
         if code == Operations.SINE_COSINE:
             if operands[0] == TIME and TIME not in frequencies:
                 frequencies[TIME] = combined(Linear(0.0, ((TIME, 1.0),)))
@@ -135,4 +143,8 @@ def kernel_tape(tape: Tape) -> KernelTape:
         np.array([slot for slot, _ in terms], dtype=np.int32),
         np.array([coefficient for _, coefficient in terms]),
         np.array([constant for constant, _ in combinations]),
+        np.cumsum([1, *(len(each.breaks) for each in tables)]).astype(np.int32),
+        np.array([time for each in tables for time in each.breaks] or [0.0]),
+        # f2py refuses an empty array of two dimensions.
+        np.array([piece for each in tables for piece in each.pieces] or [(0.0,) * 4]).T.copy("F"),
     )

@@ -100,3 +100,4 @@ class Operations:
     SQRT = 4
     EXP = 5  # slots: the exponential, and the weighted terms of its argument
     SINE_COSINE = 6  # slots: the sine, the cosine, and the weighted terms of their argument
+    TABLE = 7  # cubic polynomials of time between breakpoints

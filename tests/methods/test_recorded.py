@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, prepare, solve, solve_many
+from pyharness import InputError, Scene, TorqueLaw, prepare, solve, solve_many, torques
 from pyharness.methods.recorded import kernel_tape, recorded_series, system
 from pyharness.methods.taylor import taylor
 from pyharness.model.extension import extension
@@ -250,6 +250,34 @@ def test_from_rest() -> None:
     for tolerance in (1e-5, 1e-11):
         found = solve(scene, [0.5, 4.0], tolerance=tolerance)
         assert error_of(scene, [0.5, 4.0], found) <= tolerance
+
+
+def test_a_step_ends_at_each_breakpoint() -> None:
+    # Pulses move a sphere that is at rest before them, and perturbations of it do not grow.
+    pulse = torques.pulses(
+        [1.0, 2.0, 5.0], [0.5, 0.25, 2.0**-20], [(2, 0, 0), (0, 4, 0), (0, 0, 2.0**21)]
+    )
+    scene = scene_of(pulse, omega=(0.0, 0.0, 0.0), moments=SPHERE)
+    times = [-1.0, 0.0, 0.5, 1.25, 1.5, 2.1, 4.0, 5.0, 7.0]
+    for tolerance in (1e-3, 1e-12):
+        found = solve(scene, times, tolerance=tolerance)
+        wanted = np.zeros((9, 3))
+        wanted[3:, 0] = (0.25, 0.5, 0.5, 0.5, 0.5, 0.5)
+        wanted[5:, 1] = (0.2, 0.5, 0.5, 0.5)
+        wanted[8, 2] = 1.0
+        assert found.omega == pytest.approx(wanted, abs=1e-15)
+        assert found.error is not None
+        assert found.error < 1e-14
+        assert found.growth == 1.0
+
+
+def test_a_table_is_solved_like_the_law_that_it_equals() -> None:
+    scene, time = scene_of(torques.table([-9.0, 9.0], [(0.1, -0.9, 0.0), (0.1, 0.9, 1.8)])), 6.0
+    law = TorqueLaw((0.1, 0.0, 0.9), (0.0, 0.1, 0.1))
+    for end in (time, -time):
+        found, wanted = solve(scene, end), solve(replace(scene, torque=law), end)
+        assert wanted.growth is not None
+        assert found.omega == pytest.approx(wanted.omega, abs=1e-12 + 1e-14 * wanted.growth)
 
 
 def test_work_limit() -> None:

@@ -70,12 +70,16 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
         if not raised:
             return answer
         found = dict(zip(results, answer if isinstance(answer, tuple) else (answer,), strict=True))
-        if name == "solve_packed" and args[0][Places.METHOD] in _TRIES_AGAIN:
+        has_infinity = bool(raised & TOO_LARGE) or not _finite((*args, *named.values()))
+        if name == "tape_rows" and found["status"] == OVERFLOW:
+            # The torque that the user wrote may be singular, as 1/0 is.
+            has_infinity = True
+        if name == "tape_rows" or (
+            name == "solve_packed" and args[0][Places.METHOD] in _TRIES_AGAIN
+        ):
             # An attempt with too long steps may overflow; shorter steps or the series then follow.
             found["status"] = OVERFLOW
-        untold = raised & ~_told(
-            found, bool(raised & TOO_LARGE) or not _finite((*args, *named.values()))
-        )
+        untold = raised & ~_told(found, has_infinity)
         if not untold or _are_extreme((*args, found.get("rows", 0.0))):
             return answer
         words = ", ".join(word for bit, word in _NAMES.items() if untold & bit)

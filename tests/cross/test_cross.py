@@ -179,6 +179,22 @@ def test_guard_knows_an_attempt_that_is_refused(
     assert _untold(guarded_entry(TOO_LARGE, COMPLETE, name="solve_packed"), packed) != is_told
 
 
+@pytest.mark.parametrize(
+    ("raised", "status", "is_told"),
+    [
+        (DIVIDE, OVERFLOW, True),
+        (INVALID, OVERFLOW, True),
+        (TOO_LARGE, COMPLETE, True),
+        (DIVIDE, COMPLETE, False),
+        (INVALID, COMPLETE, False),
+    ],
+)
+def test_guard_knows_that_a_users_torque_may_be_singular(
+    raised: int, status: int, is_told: bool, guarded_entry: Guarded
+) -> None:
+    assert _untold(guarded_entry(raised, status, name="tape_rows")) != is_told
+
+
 def test_guard_knows_an_infinity_that_was_given(guarded_entry: Guarded) -> None:
     call = guarded_entry(INVALID, OVERFLOW)
     assert not _untold(call, np.array([np.inf, 1.0]), 2)

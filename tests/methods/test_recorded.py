@@ -2,7 +2,6 @@
 
 import math
 import pickle
-from collections.abc import Callable
 from dataclasses import replace
 from random import Random
 from typing import Any
@@ -23,7 +22,7 @@ MOMENTS = (1.0, 2.0, 2.5)
 SPHERE = (2.0, 2.0, 2.0)
 
 
-def scene_of(torque: Callable[..., Any], omega: Any = (1.0, 2.0, 3.0), **own: Any) -> Scene:
+def scene_of(torque: Any, omega: Any = (1.0, 2.0, 3.0), **own: Any) -> Scene:
     """Return a scene with moments 1, 2, 2.5 kg m2 unless `own` has others."""
     return Scene("test", omega, **{"moments": MOMENTS, "torque": torque, **own})
 

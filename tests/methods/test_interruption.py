@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import scipy.integrate  # noqa: F401  (an interrupt within its import may be lost)
 
+from pyharness import torques
 from pyharness.methods.many import solve_many
 from pyharness.methods.prepared import prepare
 from pyharness.methods.solve import solve
@@ -40,6 +41,7 @@ def _waves(count: int) -> tuple[Wave, ...]:
 DRIVEN = replace(FREE, torque=TorqueLaw(sines=_waves(3)))
 CROWDED = replace(FREE, torque=TorqueLaw(sines=_waves(15_000)))
 IN_SPACE = replace(PUSHED, torque=TorqueLaw((1.0, 2.0, 3.0), frame="space"))
+RECORDED = replace(FREE, torque=torques.wheels((1.0, 2.0, 3.0)))
 SPHERE = replace(CROWDED, moments=(40.0, 40.0, 40.0))
 BUSY = replace(FREE, torque=TorqueLaw(cosines=_waves(300)), step_size=1e-6, steps=1_000_000)
 TIMES = [0.001 * n for n in range(1, 50_000)]
@@ -77,6 +79,8 @@ LONG: dict[str, Callable[[], object]] = {
     "taylor": _method(PUSHED, "taylor", 1e5),
     "taylor-waves": _method(CROWDED, "taylor", 1e5),
     "space-torque": lambda: solve(IN_SPACE, [1e5], effort=1e6, attitude=True),
+    "recorded": _method(RECORDED, "taylor", 1e9),
+    "recorded-prepared": _prepared(RECORDED, "taylor", 1e9, 1e-12),
     "quick": _prepared(FREE, "quick", 1e6, 1e-6),
     "quick-waves": _prepared(DRIVEN, "quick", 1e6, 1e-6),
     "prepared-series": _prepared(CROWDED, "auto", 1e6, 1e-12),
@@ -133,6 +137,7 @@ def test_kernel_ends_at_once(
     name: str, keyboard: _Keyboard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rooms = [f"methods.{each}" for each in ("taylor", "fixed_step", "closed_form", "gauss", "many")]
+    rooms += ["methods.recorded", "methods.prepared_recorded"]
     for each in (*rooms, "original.compiled", "original.many", "model.extension"):
         monkeypatch.setattr(f"pyharness.{each}.extension", keyboard.door)
     if name in DOORLESS:

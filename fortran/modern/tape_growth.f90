@@ -8,6 +8,7 @@ module tape_growth
   integer, parameter :: MOST_UNKNOWNS = 7
   integer, parameter :: STEPS_IN_BLOCK = 4
   integer, parameter :: MOST_BLOCKS = 64 ! even
+  integer, parameter :: MOST_STEPS_IN_BLOCK = 2**28 ! within the range of the counter
   ! A larger norm would have no further meaning; the square of a product of two such is in range.
   real(dp), parameter :: LARGEST = 1e75_dp
 
@@ -39,7 +40,7 @@ contains
   end subroutine begin
 
   pure subroutine count_step(with_row, matrix, transitions, is_full)
-    !! Count one more step. When its block is full, store the matrix of the block.
+    !! Count one more step. When its block is full or has a row, store the matrix of the block.
     logical, intent(in) :: with_row        !! whether the step has a row before the last
     real(dp), intent(in) :: matrix(:, :)   !! of the open block
     type(transitions_t), intent(inout) :: transitions
@@ -50,7 +51,8 @@ contains
       n = t%n
       t%steps = t%steps + 1
       t%has_row(t%closed + 1) = t%has_row(t%closed + 1) .or. with_row
-      is_full = t%steps >= t%steps_a_block
+      ! Perturbations may be larger at a row than at later times.
+      is_full = t%steps >= t%steps_a_block .or. with_row
       if (.not. is_full) return
       t%steps = 0
       t%closed = t%closed + 1
@@ -62,7 +64,7 @@ contains
           t%has_row(m) = t%has_row(2*m - 1) .or. t%has_row(2*m)
         end do
         t%closed = MOST_BLOCKS/2
-        t%steps_a_block = 2*t%steps_a_block
+        t%steps_a_block = min(MOST_STEPS_IN_BLOCK, 2*t%steps_a_block)
       end if
       t%has_row(t%closed + 1) = .false.
     end associate

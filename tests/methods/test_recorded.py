@@ -205,6 +205,27 @@ def test_growth_is_the_derivative_by_the_start(rate: Any) -> None:
     assert found.growth > 1.15
 
 
+def test_growth_counts_every_requested_time() -> None:
+    # Perturbations of the first component grow by exp(2) until pi, and are gone at 2 pi.
+    scene = scene_of(
+        lambda t, omega: [omega[0] * np.sin(t), 0.0, 0.0], (1.0, 0.0, 0.0), moments=(1, 1, 1)
+    )
+    end = solve(scene, 2.0 * math.pi)
+    assert end.growth == pytest.approx(1.0, abs=0.01)
+    both = solve(scene, [math.pi, 2.0 * math.pi])
+    assert both.growth == pytest.approx(math.exp(2.0), rel=0.05)
+
+
+def test_a_result_is_sensitive_where_rounding_reaches_the_tolerance() -> None:
+    scene = scene_of(
+        lambda t, omega: [2.0 * omega[0], 0.0, 0.0], (1.0, 0.0, 0.0), moments=(1, 1, 1)
+    )
+    for tolerance, ended in ((1e-11, "sensitive"), (1e-9, "complete")):
+        found = solve(scene, 5.5, tolerance=tolerance)
+        assert found.growth == pytest.approx(math.exp(11.0), rel=0.01)
+        assert found.ended == ended
+
+
 def test_a_motion_that_amplifies_rounding_errors_is_sensitive() -> None:
     # Negative damping of the perturbation about an unstable rotation.
     scene = scene_of(lambda t, omega: 0.01 * omega, omega=(1e-9, 1.0, 1e-9))

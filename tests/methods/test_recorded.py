@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, prepare, solve, solve_many, torques
+from pyharness import (
+    InputError,
+    Scene,
+    TorqueLaw,
+    case_scene,
+    prepare,
+    solve,
+    solve_many,
+    torques,
+)
 from pyharness.methods.recorded import kernel_tape, recorded_series, system
 from pyharness.methods.taylor import taylor
 from pyharness.model.extension import extension
@@ -87,6 +96,16 @@ def _law_in_symbols(law: TorqueLaw, t: Any) -> Any:
     for amplitude, frequency in law.cosines:
         torque = torque + np.array(amplitude) * np.cos(frequency * t)
     return torque
+
+
+@pytest.mark.filterwarnings("ignore::pyharness.ImpossibleBodyWarning")
+@pytest.mark.parametrize("case", range(1, 8))
+def test_a_case_written_as_a_function_has_the_bits_of_the_case(case: int) -> None:
+    scene = case_scene(case)
+    function: Any = lambda t, omega: _law_in_symbols(scene.law, t)  # noqa: E731
+    written = replace(scene, torque=function)
+    assert written == scene
+    assert solve(written, 1.0).omega.tolist() == solve(scene, 1.0).omega.tolist()
 
 
 @pytest.mark.parametrize("time", [0.0, 3.0, -3.0, 400.0])

@@ -11,6 +11,7 @@ module space_torque
   use space_torque_plan, only: LEAST_LOCAL_TOLERANCE, order_for, plan
   use space_torque_series, only: evaluate, expand, fitting, LONGER, series_t, torque_terms
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, SENSITIVE
+  use step_limit, only: check_steps, limit_of, step_limit_t
   use torque_noise, only: torque_noise_of, wave_rounding_of
   use two_words, only: two_sum
   implicit none(type, external)
@@ -31,11 +32,6 @@ module space_torque
   real(dp), parameter :: A_WAVE = 0.2_dp        ! cost of a wave, in steps
   real(dp), parameter :: BETWEEN_LOOKS = 5e4_dp ! steps between polls for an interrupt
   integer, parameter :: ROWS_BETWEEN_LOOKS = 2**17
-  ! If the first step forecasts more than this multiple of the steps allowed, the integration ends.
-  real(dp), parameter :: HOPELESS = 10.0_dp
-  ! If the steps increase with a larger power of time, this is not by chance.
-  real(dp), parameter :: GROWING = 1.3_dp
-  real(dp), parameter :: COUNTABLE = 4e18_dp
   real(dp), parameter :: MARCHES = 2.3_dp       ! steps of all integrations over those of the first
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: NO_DIGIT = 1e100_dp    ! a relative error that leaves no digit
@@ -192,8 +188,7 @@ contains
     real(dp) :: h, rest, factor, power
     logical :: at_end
     integer :: k, order, tries
-    integer(int64) :: next_look, half_way ! steps; the latter: half of those allowed
-    real(dp) :: t_half                    ! the time after half_way steps, s
+    type(step_limit_t) :: limit
 
     order = attempt%order
     t_end = request%times(size(request%times))
@@ -205,9 +200,7 @@ contains
     solution%status = COMPLETE
     solution%n_rows = 0
     found = outcome_t(0_int64, maxval(abs(request%omega)), 0.0_dp)
-    next_look = 1
-    half_way = max(1_int64, int(0.5_dp*min(COUNTABLE, attempt%most_steps), int64))
-    t_half = 0.0_dp
+    limit = limit_of(attempt%most_steps, attempt%stride)
     tries = 0
     h = attempt%guess
     do
@@ -266,29 +259,8 @@ contains
       end if
       call two_sum((t(1)), h + t(2), t(1), t(2))
       rest = (t_end - t(1)) - t(2)
-      if (found%steps >= next_look) then
-        next_look = max(found%steps + 1, int(min(COUNTABLE, attempt%most_steps), int64))
-        next_look = min(found%steps + attempt%stride, next_look)
-        if (found%steps == half_way) t_half = t(1)
-        if (found%steps < half_way) next_look = min(next_look, half_way)
-        ! Extrapolate the steps so far in proportion to the time, or faster if the motion becomes
-        ! faster.
-        power = 1.0_dp
-        if (found%steps > half_way) then
-          power = log(real(found%steps, dp)/real(half_way, dp))/log(t(1)/t_half)
-        end if
-        power = merge(min(3.0_dp, power), 1.0_dp, power > GROWING)
-        found%ahead = real(found%steps, dp)*(1.0_dp + abs(rest/t(1)))**power
-        if (real(found%steps, dp) >= attempt%most_steps &
-            .or. (found%steps == 1 .and. found%ahead > HOPELESS*attempt%most_steps)) then
-          solution%status = GAVE_UP
-          return
-        end if
-        if (interrupt_raised() /= 0) then
-          solution%status = INTERRUPTED
-          return
-        end if
-      end if
+      call check_steps(found%steps, t(1), rest, limit, found%ahead, solution%status)
+      if (solution%status /= COMPLETE) return
     end do
   end subroutine march
 

@@ -4,33 +4,25 @@ module tape_march
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
-  use operations, only: SQUARE_ROOT => SQRT
   use problem, only: request_t, solution_t
-  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
+  use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW
+  use step_limit, only: check_steps, limit_of, step_limit_t
   use tape, only: FIRST_UNKNOWN, next_break, tape_t, TIME_SLOT
   use tape_growth, only: begin, count_step, growth_of, MOST_UNKNOWNS, transitions_t
+  use tape_plan, only: before_zero_of_root, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
+                       MOST_TRIES, order_for
   use tape_series, only: expand, LAST_TERM, MOST_ORDER, noise_of, propagate, series_t, &
                          VARIATION_TOLERANCE
   use two_words, only: two_sum
   implicit none(type, external)
   private
 
-  integer, parameter :: LEAST_ORDER = 8
-  integer, parameter :: MOST_TRIES = 80
-  integer, parameter :: CHECKED = 3  ! last terms checked: from rest a ramp makes only every third
   integer, parameter :: FITTED = 4   ! last terms from which the truncation error is estimated
   integer, parameter :: FEW = 3      ! terms whose decay bounds the truncation error
-  real(dp), parameter :: LONGER = 16.0_dp  ! largest factor on the step that was tried
   real(dp), parameter :: SHORTER = 0.5_dp  ! least factor on the first step that was tried
-  real(dp), parameter :: LEAST_LOCAL_TOLERANCE = 1e-18_dp ! below rounding
-  ! If the first step forecasts more than this multiple of the steps allowed, the integration ends.
-  real(dp), parameter :: HOPELESS = 10.0_dp
-  ! If the steps increase with a larger power of time, this is not by chance.
-  real(dp), parameter :: GROWING = 1.3_dp
   real(dp), parameter :: RIDGE = 1.001_dp  ! makes the fit work for one pole or none
   ! Largest error for which the linearised equations hold.
   real(dp), parameter :: LINEAR_RANGE = 0.1_dp
-  real(dp), parameter :: ROOT_TOLERANCE = 0.1_dp ! relative deviation of a squared root
   ! Products of smaller omegas underflow, rad/s.
   real(dp), parameter :: LEAST_SCALE = 2.0_dp**(-500)
   integer, parameter :: ROWS_BETWEEN_LOOKS = 2**17
@@ -74,12 +66,11 @@ contains
     real(dp) :: lanes(8, MOST_UNKNOWNS)       ! the error, and a perturbation of each unknown
     real(dp) :: t(2)                          ! time and its rounding error, s
     real(dp) :: t_end, rest, factor, local_tolerance, scale, power
-    real(dp) :: t_half                        ! the time after half_way steps, s
     real(dp) :: break_time                    ! next breakpoint of a table, or t_end, s
     real(dp) :: to_stop                       ! time to it, s
     logical :: arrives, at_end, from_rest, is_full, has_guess, short
     integer :: i, k, n, n_before, n_blocks, tries, last_terms(2)
-    integer(int64) :: next_look, half_way
+    type(step_limit_t) :: limit
 
     n = tape%n_unknowns
     n_blocks = merge(1, 2, n == 3)
@@ -100,9 +91,7 @@ contains
     local_tolerance = max(LEAST_LOCAL_TOLERANCE, 0.125_dp*attempt%tolerance)
     s%order = order_for(local_tolerance)
     s%h = t_end
-    next_look = 1
-    half_way = max(1_int64, int(0.5_dp*min(4e18_dp, attempt%most_steps), int64))
-    t_half = 0.0_dp
+    limit = limit_of(attempt%most_steps, attempt%stride)
     tries = 0
     has_guess = .false.
     from_rest = .not. scale > 0.0_dp
@@ -189,29 +178,8 @@ contains
       rest = (t_end - t(1)) - t(2)
       s%h = factor*s%h
       if (abs(s%h) > abs(rest)) s%h = rest
-      if (found%steps >= next_look) then
-        next_look = max(found%steps + 1, int(min(4e18_dp, attempt%most_steps), int64))
-        next_look = min(found%steps + attempt%stride, next_look)
-        if (found%steps == half_way) t_half = t(1)
-        if (found%steps < half_way) next_look = min(next_look, half_way)
-        ! Extrapolate the steps so far in proportion to the time, or faster if the motion becomes
-        ! faster.
-        power = 1.0_dp
-        if (found%steps > half_way) then
-          power = log(real(found%steps, dp)/real(half_way, dp))/log(t(1)/t_half)
-        end if
-        power = merge(min(3.0_dp, power), 1.0_dp, power > GROWING)
-        found%ahead = real(found%steps, dp)*(1.0_dp + abs(rest/t(1)))**power
-        if (real(found%steps, dp) >= attempt%most_steps &
-            .or. (found%steps == 1 .and. found%ahead > HOPELESS*attempt%most_steps)) then
-          solution%status = GAVE_UP
-          exit
-        end if
-        if (interrupt_raised() /= 0) then
-          solution%status = INTERRUPTED
-          exit
-        end if
-      end if
+      call check_steps(found%steps, t(1), rest, limit, found%ahead, solution%status)
+      if (solution%status /= COMPLETE) exit
     end do
     call weigh()
     found%growth = growth_of(transposed(lanes), 1.0_dp/weights, transitions)
@@ -450,81 +418,5 @@ contains
 
     matrix = transpose(lanes(2:, :))
   end function transposed
-
-  pure real(dp) function fitting(tape, order, local_tolerance, weights, a)
-    !! Return the factor on the step with which the last terms would be as large as allowed; 0 if
-    !! they are not finite.
-    type(tape_t), intent(in) :: tape
-    integer, intent(in) :: order
-    real(dp), intent(in) :: local_tolerance
-    real(dp), intent(in) :: weights(:)
-    real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots)
-    real(dp) :: largest
-    integer :: i, k
-
-    fitting = LONGER
-    do k = order - CHECKED + 1, order
-      largest = 0.0_dp
-      do i = 1, tape%n_unknowns
-        ! NaN must not be lost in the maximum.
-        if (.not. weights(i)*abs(a(k, FIRST_UNKNOWN - 1 + i)) <= largest) then
-          largest = weights(i)*abs(a(k, FIRST_UNKNOWN - 1 + i))
-        end if
-        if (.not. largest <= huge(largest)) then
-          fitting = 0.0_dp
-          return
-        end if
-      end do
-      if (largest > local_tolerance*fitting**(-k)) then
-        fitting = exp((log(local_tolerance) - log(largest))/k)
-      end if
-    end do
-  end function fitting
-
-  pure real(dp) function before_zero_of_root(tape, order, a, factor)
-    !! Return the factor on the step, reduced until each series of a square root is the root of the
-    !! series of its argument at the end of the step. The series of a root continues with the wrong
-    !! sign where its argument touches zero.
-    type(tape_t), intent(in) :: tape
-    integer, intent(in) :: order
-    real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots)
-    real(dp), intent(in) :: factor
-    real(dp) :: argument, root
-    integer :: k, n, tries
-
-    before_zero_of_root = factor
-    do n = 1, tape%n_operations
-      if (tape%operations(1, n) /= SQUARE_ROOT) cycle
-      do tries = 1, MOST_TRIES
-        argument = 0.0_dp
-        root = 0.0_dp
-        do k = order - 1, 0, -1
-          argument = before_zero_of_root*argument + a(k, tape%operations(2, n))
-          root = before_zero_of_root*root + a(k, tape%operations(4, n))
-        end do
-        if (root >= 0.0_dp .and. abs(root*root - argument) <= ROOT_TOLERANCE*argument) exit
-        before_zero_of_root = 0.5_dp*before_zero_of_root
-      end do
-    end do
-  end function before_zero_of_root
-
-  pure integer function order_for(local_tolerance)
-    !! Return the order with the least work for the requested digits (Jorba and Zou 2005).
-    real(dp), intent(in) :: local_tolerance
-
-    order_for = max(LEAST_ORDER, min(MOST_ORDER, 1 + ceiling(-0.7_dp*log(local_tolerance))))
-  end function order_for
-
-  pure real(dp) function local_tolerance_of(tolerance, steps)
-    !! Return the largest last terms. An error of omega becomes an error of phase, which grows with
-    !! time; the weights are those of the special kernel for 0.4 radians in a step.
-    real(dp), intent(in) :: tolerance
-    real(dp), intent(in) :: steps !! expected number
-    real(dp) :: way
-
-    way = 0.12_dp*abs(steps)
-    local_tolerance_of = max(LEAST_LOCAL_TOLERANCE, &
-                             tolerance/(8.0_dp + way + way*(way/14.0_dp)))
-  end function local_tolerance_of
 
 end module tape_march

@@ -29,6 +29,7 @@ MODULES = (
     "taylor",
     "tape_series",
     "tape_growth",
+    "tape_plan",
     "tape_march",
     "tape_solve",
     "many_circular",

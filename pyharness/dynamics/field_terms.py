@@ -163,7 +163,7 @@ def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque R^T N, where N has components about the axes of space.
 
     It is meant for sums with other torques. A scene whose whole torque is a
-    ``TorqueLaw(..., frame="space")`` is solved faster, and has the same motion.
+    ``TorqueLaw(..., frame="space")`` specifies the same torque, and is solved faster.
 
     Parameters
     ----------

@@ -26,10 +26,7 @@ from pyharness.model.trajectory import Array
 
 _REST: Triple = (0.0, 0.0, 0.0)
 _BODIES = ("moments", "inertia", "coefficients")
-NO_ATTITUDE = (
-    "the torque needs the attitude, and none is given; allowed: attitude0, or scenes with an "
-    "attitude"
-)
+NO_ATTITUDE = "the torque needs the initial attitude; give attitude0, or scenes with an attitude"
 
 
 def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
@@ -45,7 +42,8 @@ def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
     if isinstance(scene.torque, StateTorque):
         for name in named:
             raise InputError(
-                f"{name} is given beside a torque that depends on the state; allowed: one of both"
+                f"{name} is given beside a torque that depends on the state; allowed: only one of "
+                "the two"
             )
         return True
     return scene.torque.in_space or (scene.law.frame == "space" and bool(named))

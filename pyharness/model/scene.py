@@ -41,8 +41,8 @@ FULL_INERTIA = (
     "scene of pyharness.principal"
 )
 STATE_TORQUE = (
-    "the torque is a recorded or opaque function, and this takes a torque law: constant, linear "
-    "and sinusoidal terms of time; allowed: solve, prepare, solve_many and the verb run --method"
+    "the scene's torque is a function, and this needs a TorqueLaw: constant, linear and sinusoidal "
+    "terms of time; allowed for functions: solve, prepare, solve_many, and the verb run --method"
 )
 SPACE_TORQUE = (
     "the torque is about the axes of space, and this takes one about those of the body; allowed: "

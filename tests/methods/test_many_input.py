@@ -120,7 +120,7 @@ def test_scenes_that_do_not_go_side_by_side() -> None:
         ([TOP, body], "some bodies are given by coefficients"),
         ([TOP, replace(TOP, step_size=0.5)], "the scenes have different step sizes"),
         ([TOP, replace(TOP, attitude=(1.0, 0.0, 0.0, 0.0))], "some of the scenes have an attitude"),
-        (space, "the torque needs the attitude"),
+        (space, "the torque needs the initial attitude"),
     ):
         with pytest.raises(InputError) as raised:
             solve_many(scenes, 1.0)

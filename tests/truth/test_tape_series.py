@@ -276,5 +276,5 @@ def test_the_truths_of_torque_laws_refuse_a_torque_of_the_state() -> None:
         lambda: torque_free(scene, 1.0),
         lambda: free_attitude(scene, 1.0),
     ):
-        with pytest.raises(InputError, match="takes a torque law"):
+        with pytest.raises(InputError, match="needs a TorqueLaw"):
             truth()

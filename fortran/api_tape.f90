@@ -1,31 +1,16 @@
 ! The interface that f2py reads for scenes whose equations of motion are a tape.
 
-subroutine tape_rows(n_unknowns, n_slots, n_operations, operations, n_combinations, starts, &
-                     n_terms, slots, coefficients, constants, n_tables, table_starts, n_pieces, &
-                     breaks, pieces, omega0, n_times, times, tolerance, &
-                     n_attitudes, attitudes, effort, rows, n_rows, status, steps)
+subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_attitudes, &
+                     attitudes, effort, rows, n_rows, status, steps)
   ! Integrate a tape by Taylor series: omega and, if n_attitudes > 0, the attitude at `times`, which
   ! have one sign and are ordered away from 0.
   !f2py threadsafe
   use levels, only: tape_solve
   use problem, only: request_t, solution_t
-  use tape, only: tape_t
+  use tape, only: tape_of
   implicit none
-  integer(4), intent(in) :: n_unknowns          ! 3, or 7 with attitude
-  integer(4), intent(in) :: n_slots
-  integer(4), intent(in) :: n_operations
-  integer(4), intent(in), target :: operations(4, n_operations) ! kind, two operands, result
-  integer(4), intent(in) :: n_combinations
-  integer(4), intent(in), target :: starts(n_combinations + 1)  ! of the terms, from 1
-  integer(4), intent(in) :: n_terms
-  integer(4), intent(in), target :: slots(n_terms)
-  real(8), intent(in), target :: coefficients(n_terms)
-  real(8), intent(in), target :: constants(n_combinations)
-  integer(4), intent(in) :: n_tables
-  integer(4), intent(in), target :: table_starts(n_tables + 1)  ! of the pieces, from 1
-  integer(4), intent(in) :: n_pieces
-  real(8), intent(in), target :: breaks(n_pieces)               ! s
-  real(8), intent(in), target :: pieces(4, n_pieces)            ! coefficients in ascending order
+  integer(4), intent(in) :: n_numbers
+  real(8), intent(in), target :: numbers(n_numbers) ! the tape, as tape.f90 describes it
   real(8), intent(in) :: omega0(3)              ! rad/s
   integer(4), intent(in) :: n_times
   real(8), intent(in), target :: times(n_times) ! s
@@ -42,9 +27,7 @@ subroutine tape_rows(n_unknowns, n_slots, n_operations, operations, n_combinatio
 
   solution%rows => rows
   if (n_attitudes > 0) solution%attitudes(1:4, 0:n_attitudes) => attitudes
-  call tape_solve(tape_t(n_unknowns, n_slots, n_operations, operations, starts, slots, &
-                         coefficients, constants, table_starts, breaks, pieces), &
-                  request_t(omega0, tolerance, effort(1), times), solution)
+  call tape_solve(tape_of(numbers), request_t(omega0, tolerance, effort(1), times), solution)
   n_rows = solution%n_rows
   status = solution%status
   steps = solution%steps

@@ -1,4 +1,8 @@
-"""Write the constants that Python and the kernels share as Fortran modules, one for each class."""
+"""Write the constants that Python and the kernels share.
+
+The constants of each class are written as a Fortran module, or those of the operations as a C
+header.
+"""
 
 import runpy
 import sys
@@ -10,6 +14,13 @@ def modules(source: str) -> str:
     """Return the text of the Fortran modules for the classes in pyharness/model/codes.py."""
     classes = [each for each in runpy.run_path(source).values() if isinstance(each, type)]
     return "".join(f"{line}\n" for each in classes for line in _module(each))
+
+
+def header(source: str) -> str:
+    """Return the text of a C header with the operations of tapes."""
+    codes = runpy.run_path(source)["Operations"]
+    numbers = (f"{each} = {value}" for each, value in vars(codes).items() if each.isupper())
+    return f"enum {{ {', '.join(numbers)} }};\n"
 
 
 def _module(codes: type) -> Iterator[str]:
@@ -30,4 +41,5 @@ def _module(codes: type) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    Path(sys.argv[2]).write_text(modules(sys.argv[1]))
+    write = header if sys.argv[2].endswith(".h") else modules
+    Path(sys.argv[2]).write_text(write(sys.argv[1]))

@@ -5,15 +5,16 @@ module prepared
   use fixed_step, only: fixed_step_rows
   use gauss_collocation, only: gauss_rows
   use kinds, only: dp
-  use levels, only: quick_solve, taylor_solve
+  use levels, only: quick_solve, tape_solve, taylor_solve
   use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, GAUSS, IMPROVED_EULER, QUICK, &
-                     QUICK_OR_TAYLOR, RK4, SPACE_TORQUE, SPHERE, TAYLOR
+                     QUICK_OR_TAYLOR, RK4, SPACE_TORQUE, SPHERE, TAPE, TAYLOR
   use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, MOMENTS, &
                     MOMENTS_LOW, N_COSINES, N_SINES, RATE, STEP, TOLERANCE, WAVES
   use problem, only: problem_t, request_t, solution_t
   use space_torque, only: space_torque_solve
   use sphere, only: sphere_rows
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, REFUSED, SENSITIVE
+  use tape, only: tape_of
   use torque_free, only: torque_free_rows
   use torque_free_attitude, only: torque_free_attitude_rows
   implicit none(type, external)
@@ -41,7 +42,9 @@ contains
     real(dp) :: largest
 
     largest = max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3)))
-    if (largest <= LARGE .and. largest*LARGE >= 1.0_dp) then
+    if (int(packed(METHOD)) == TAPE) then
+      call solve_recorded(packed, omega0, t_end, omega, status, steps, found)
+    else if (largest <= LARGE .and. largest*LARGE >= 1.0_dp) then
       call solve_as_given(packed, n_packed, omega0, t_end, omega, status, steps, found)
     else
       call solve_near_one(packed, n_packed, omega0, t_end, omega, status, steps, found)
@@ -49,6 +52,40 @@ contains
     ! ieee_value is not used: its module makes the binary depend on libgfortran.
     if (.not. is_result(status)) omega = transfer(huge(0_int64), 1.0_dp)
   end subroutine solve_prepared
+
+  subroutine solve_recorded(packed, start, t_end, state, status, steps, found)
+    !! Solve a scene with a recorded torque: omega, or omega and attitude.
+    real(dp), intent(in), target, contiguous :: packed(0:)
+    real(dp), intent(in), contiguous :: start(:) !! (3 or 7): rad/s, and a unit quaternion
+    real(dp), intent(in) :: t_end      !! s
+    real(dp), intent(inout), target, contiguous :: state(:) !! as start
+    integer, intent(out) :: status     !! code of the module statuses
+    integer(int64), intent(out) :: steps
+    real(dp), intent(out) :: found(2)  !! estimated relative error, amplification; negative: unknown
+    type(solution_t) :: solution
+    real(dp), target :: times(1), attitudes(4, 0:1)
+    real(dp) :: largest
+
+    times(1) = t_end
+    steps = 0
+    found = -1.0_dp
+    status = REFUSED
+    if (.not. (all(abs(start) <= huge(t_end)) .and. abs(t_end) <= huge(t_end))) return
+    largest = maxval(abs(start(:3)))
+    ! A recorded torque is not rescaled here; `solve` does that.
+    if (.not. (largest <= LARGE .and. (largest*LARGE >= 1.0_dp .or. .not. largest > 0.0_dp))) return
+    solution%rows(1:3, 1:1) => state(:3)
+    if (size(start) > 3) then
+      attitudes(:, 0) = start(4:)
+      solution%attitudes(1:4, 0:1) => attitudes
+    end if
+    call tape_solve(tape_of(packed(WAVES:)), &
+                    request_t(start(:3), packed(TOLERANCE), packed(EFFORT), times), solution)
+    if (size(start) > 3) state(4:) = attitudes(:, 1)
+    status = solution%status
+    steps = solution%steps
+    found = [solution%error, solution%growth]
+  end subroutine solve_recorded
 
   subroutine solve_near_one(packed, n_packed, omega0, t_end, omega, status, steps, found)
     !! Solve in units that bring omega near 1. The scale is a power of two, so no digit changes.
@@ -241,7 +278,9 @@ contains
     times(1) = t_end
     steps = 0
     found = -1.0_dp
-    if (.not. (all(abs(start) <= huge(t_end)) .and. abs(t_end) <= huge(t_end))) then
+    if (code == TAPE) then
+      call solve_recorded(packed, start, t_end, state, status, steps, found)
+    else if (.not. (all(abs(start) <= huge(t_end)) .and. abs(t_end) <= huge(t_end))) then
       status = OVERFLOW
     else
       status = REFUSED

@@ -1,6 +1,7 @@
 module tape
   !! The equations of motion as a tape: a list of operations, each of which writes a slot. Slot 1 is
   !! the time, slots 2 to 4 are omega, and slots 5 to 8 are the attitude, a quaternion.
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int, c_loc, c_ptr
   use kinds, only: dp
   implicit none(type, external)
   private
@@ -30,9 +31,70 @@ module tape
     real(dp), pointer, contiguous :: pieces(:, :)    !! (4, :): coefficients in ascending order
   end type tape_t
 
-  public :: next_break, piece_at
+  ! What C reads of a tape, and the terms that it computes.
+  type, bind(c), public :: tape_arrays_t
+    integer(c_int) :: n_unknowns, n_operations, n_combinations
+    type(c_ptr) :: operations, starts, slots, coefficients, constants, a, v
+  end type tape_arrays_t
+
+  public :: arrays_of, next_break, piece_at, tape_of
 
 contains
+
+  function tape_of(numbers) result(tape)
+    !! Return the tape that an array contains. Its first numbers are the counts of unknowns, slots,
+    !! operations, combinations, terms, tables and pieces. The arrays of the tape follow: those of
+    !! integers, two integers in the place of a number, then the others.
+    real(dp), intent(in), target :: numbers(0:)
+    type(tape_t) :: tape
+    integer, parameter :: COUNTS = 7
+    integer, pointer, contiguous :: integers(:)
+    integer :: n_combinations, n_terms, n_tables, n_pieces, at
+
+    tape%n_unknowns = int(numbers(0))
+    tape%n_slots = int(numbers(1))
+    tape%n_operations = int(numbers(2))
+    n_combinations = int(numbers(3))
+    n_terms = int(numbers(4))
+    n_tables = int(numbers(5))
+    n_pieces = int(numbers(6))
+    at = COUNTS
+    call take_integers(4*tape%n_operations)
+    tape%operations(1:4, 1:tape%n_operations) => integers
+    call take_integers(n_combinations + 1)
+    tape%starts => integers
+    call take_integers(n_terms)
+    tape%slots => integers
+    call take_integers(n_tables + 1)
+    tape%table_starts => integers
+    tape%coefficients => numbers(at:at + n_terms - 1)
+    at = at + n_terms
+    tape%constants => numbers(at:at + n_combinations - 1)
+    at = at + n_combinations
+    tape%breaks => numbers(at:at + n_pieces - 1)
+    at = at + n_pieces
+    tape%pieces(1:4, 1:n_pieces) => numbers(at:at + 4*n_pieces - 1)
+
+  contains
+
+    subroutine take_integers(n)
+      integer, intent(in) :: n
+
+      call c_f_pointer(c_loc(numbers(at)), integers, [n])
+      at = at + (n + 1)/2
+    end subroutine take_integers
+
+  end function tape_of
+
+  type(tape_arrays_t) function arrays_of(tape, a, v)
+    !! Return what C reads of a tape.
+    type(tape_t), intent(in) :: tape
+    type(c_ptr), intent(in) :: a, v  !! the terms of the slots and of perturbations, as in series_t
+
+    arrays_of = tape_arrays_t(tape%n_unknowns, tape%n_operations, size(tape%constants), &
+                              c_loc(tape%operations), c_loc(tape%starts), c_loc(tape%slots), &
+                              c_loc(tape%coefficients), c_loc(tape%constants), a, v)
+  end function arrays_of
 
   pure integer function piece_at(tape, table, t, forward)
     !! Return the number of the piece that holds just after the time t, or just before it.

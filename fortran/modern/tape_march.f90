@@ -11,8 +11,8 @@ module tape_march
   use tape_growth, only: begin, count_step, growth_of, MOST_UNKNOWNS, transitions_t
   use tape_plan, only: before_zero_of_root, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
                        MOST_TRIES, order_for
-  use tape_series, only: expand, LAST_TERM, MOST_ORDER, noise_of, propagate, series_t, &
-                         VARIATION_TOLERANCE
+  use tape_series, only: expand, noise_of, perturb_tape, series_t, SIDE_BY_SIDE, &
+                         sum_perturbations, VARIATION_TOLERANCE
   use two_words, only: two_sum
   implicit none(type, external)
   private
@@ -63,17 +63,17 @@ contains
     real(dp) :: left(tape%n_unknowns)         ! truncation error of the step
     real(dp) :: weights(tape%n_unknowns)      ! which make the unknowns comparable
     real(dp) :: noise(tape%n_unknowns)
-    real(dp) :: lanes(8, MOST_UNKNOWNS)       ! the error, and a perturbation of each unknown
+    real(dp) :: lanes(SIDE_BY_SIDE, MOST_UNKNOWNS) ! the error, and a perturbation of each unknown
     real(dp) :: t(2)                          ! time and its rounding error, s
     real(dp) :: t_end, rest, factor, local_tolerance, scale, power
     real(dp) :: break_time                    ! next breakpoint of a table, or t_end, s
     real(dp) :: to_stop                       ! time to it, s
-    logical :: arrives, at_end, from_rest, is_full, has_guess, short
-    integer :: i, k, n, n_before, n_blocks, tries, last_terms(2)
+    logical :: arrives, at_end, from_rest, is_full, has_guess
+    integer :: is_short
+    integer :: i, k, n, n_before, tries, last_term
     type(step_limit_t) :: limit
 
     n = tape%n_unknowns
-    n_blocks = merge(1, 2, n == 3)
     t_end = request%times(size(request%times))
     y(:3) = request%omega
     y(4:) = attitude(:n - 3)
@@ -83,8 +83,7 @@ contains
     solution%status = COMPLETE
     solution%n_rows = 0
     s%a = 0.0_dp
-    s%b = 0.0_dp
-    s%v(:, :, TIME_SLOT, :) = 0.0_dp
+    s%v(:, :, TIME_SLOT) = 0.0_dp
     call begin(n, transitions)
     call begin_lanes()
     scale = maxval(abs(request%omega))
@@ -112,7 +111,6 @@ contains
           exit
         end if
         s%a = 0.0_dp
-        s%b = 0.0_dp
         s%h = 0.0625_dp*s%h
         cycle
       end if
@@ -133,12 +131,11 @@ contains
       end if
       tries = 0
       factor = to_end(factor)
-      do k = 1, n_blocks
-        call set_lanes(k)
-        call propagate(tape, s, factor, weights, k, last_terms(k), short)
-        ! Perturbations may change faster than the motion, as about a steady rotation.
-        if (short) factor = factor*fitting_lanes(k)
-      end do
+      call set_lanes()
+      last_term = perturb_tape(s%arrays, s%h, s%order, factor, weights, VARIATION_TOLERANCE, &
+                               is_short)
+      ! Perturbations may change faster than the motion, as about a steady rotation.
+      if (is_short /= 0) factor = factor*fitting_lanes()
       factor = before_zero_of_root(tape, s%order, s%a, factor)
       arrives = abs(factor*s%h) >= abs(to_stop)*(1.0_dp - epsilon(s%h))
       if (arrives) factor = to_stop/s%h
@@ -212,44 +209,38 @@ contains
 
       s%a(0, TIME_SLOT) = t(1)
       s%a(1, TIME_SLOT) = s%h
-      s%b(MOST_ORDER, TIME_SLOT) = t(1)
-      s%b(MOST_ORDER - 1, TIME_SLOT) = s%h
       do i = 1, n
         s%a(0, FIRST_UNKNOWN - 1 + i) = y(i)
-        s%b(MOST_ORDER, FIRST_UNKNOWN - 1 + i) = y(i)
       end do
     end subroutine set_unknowns
 
-    subroutine set_lanes(k)
-      !! Set term 0 of four perturbations. Those of omega are relative to its scale, so that all
-      !! terms are comparable.
-      integer, intent(in) :: k
+    subroutine set_lanes()
+      !! Set term 0 of the perturbations.
       integer :: i
 
       do i = 1, n
-        s%v(:, 0, FIRST_UNKNOWN - 1 + i, k) = lanes(4*k - 3:4*k, i)
+        s%v(:, 0, FIRST_UNKNOWN - 1 + i) = lanes(:, i)
       end do
     end subroutine set_lanes
 
-    real(dp) function fitting_lanes(k)
+    real(dp) function fitting_lanes()
       !! Return the factor on the step with which the last terms of the perturbations are small.
-      integer, intent(in) :: k
-      real(dp) :: first, last_term
+      real(dp) :: first, size_of_last
       integer :: i
 
       first = 0.0_dp
-      last_term = 0.0_dp
+      size_of_last = 0.0_dp
       do i = 1, n
         associate (slot => FIRST_UNKNOWN - 1 + i)
-          first = max(first, weights(i)*maxval(abs(s%v(2:, 0, slot, k))))
-          last_term = max(last_term, weights(i)*maxval(abs(s%v(2:, s%order, slot, k))), &
-                          weights(i)*maxval(abs(s%v(2:, s%order - 1, slot, k)))/factor)
+          first = max(first, weights(i)*maxval(abs(s%v(2:, 0, slot))))
+          size_of_last = max(size_of_last, weights(i)*maxval(abs(s%v(2:, s%order, slot))), &
+                             weights(i)*maxval(abs(s%v(2:, s%order - 1, slot)))/factor)
         end associate
       end do
-      last_term = last_term*factor**s%order
+      size_of_last = size_of_last*factor**s%order
       fitting_lanes = 0.25_dp
-      if (last_term <= huge(s%h) .and. last_term > 0.0_dp .and. first > 0.0_dp) then
-        fitting_lanes = min(1.0_dp, (VARIATION_TOLERANCE*first/last_term)**(1.0_dp/s%order))
+      if (size_of_last <= huge(s%h) .and. size_of_last > 0.0_dp .and. first > 0.0_dp) then
+        fitting_lanes = min(1.0_dp, (VARIATION_TOLERANCE*first/size_of_last)**(1.0_dp/s%order))
       end if
     end function fitting_lanes
 
@@ -333,23 +324,16 @@ contains
 
     subroutine take_step()
       !! Advance the unknowns, the error and the perturbations to the end of the step.
-      real(dp) :: x(4)
       real(dp) :: change
-      integer :: i, k, m
+      integer :: i, k
 
+      call sum_perturbations(s%arrays, last_term, factor, lanes)
       do i = 1, n
         change = 0.0_dp
         do k = s%order, 1, -1
           change = factor*(change + s%a(k, FIRST_UNKNOWN - 1 + i))
         end do
         call two_sum((y(i)), change + y_low(i), y(i), y_low(i))
-        do m = 1, n_blocks
-          x = s%v(:, last_terms(m), FIRST_UNKNOWN - 1 + i, m)
-          do k = last_terms(m) - 1, 0, -1
-            x = factor*x + s%v(:, k, FIRST_UNKNOWN - 1 + i, m)
-          end do
-          lanes(4*m - 3:4*m, i) = x
-        end do
         lanes(1, i) = lanes(1, i) - left(i)
       end do
     end subroutine take_step
@@ -369,9 +353,9 @@ contains
           do k = s%order, 1, -1
             change(i) = part*(change(i) + s%a(k, FIRST_UNKNOWN - 1 + i))
           end do
-          error(i) = s%v(1, last_terms(1), FIRST_UNKNOWN - 1 + i, 1)
-          do k = last_terms(1) - 1, 0, -1
-            error(i) = part*error(i) + s%v(1, k, FIRST_UNKNOWN - 1 + i, 1)
+          error(i) = s%v(1, last_term, FIRST_UNKNOWN - 1 + i)
+          do k = last_term - 1, 0, -1
+            error(i) = part*error(i) + s%v(1, k, FIRST_UNKNOWN - 1 + i)
           end do
         end do
         call add_row(y, y_low + change, error - (part/factor)**(s%order + 1)*left, &
@@ -413,7 +397,7 @@ contains
 
   pure function transposed(lanes) result(matrix)
     !! Compute the matrix of the open block from the perturbations in the lanes.
-    real(dp), intent(in) :: lanes(8, MOST_UNKNOWNS)
+    real(dp), intent(in) :: lanes(SIDE_BY_SIDE, MOST_UNKNOWNS)
     real(dp) :: matrix(MOST_UNKNOWNS, MOST_UNKNOWNS)
 
     matrix = transpose(lanes(2:, :))

@@ -38,6 +38,7 @@ contains
     type(tape_t), pointer :: tape
     type(request_t), pointer :: request
     type(solution_t), pointer :: solution
+    real(dp), allocatable, target :: memory(:)
     type(series_t) :: s
     type(attempt_t) :: attempt
     type(outcome_t) :: outcome
@@ -65,7 +66,7 @@ contains
       solution%growth = 1.0_dp
       return
     end if
-    call allocate_series(tape%n_slots, s, fits)
+    call allocate_series(tape, memory, s, fits)
     if (.not. fits) return
     cost = max(1.0_dp, tape%n_slots/CHEAP_SLOTS)
     most = min(4e18_dp, request%effort*(MOST_STEPS/cost))

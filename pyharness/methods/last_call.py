@@ -13,8 +13,9 @@ from pyharness.methods.sensitivity import (
     torque_noise,
 )
 from pyharness.model.extension import ENDS
-from pyharness.model.trajectory import WITH_ALL_ROWS, digits_left
-from pyharness.model.values import Triple
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import WITH_ALL_ROWS, Trajectory, digits_left
+from pyharness.model.values import Number, Numbers, Triple, three
 
 
 class LastCall:
@@ -27,6 +28,7 @@ class LastCall:
 
     plan: Plan
     _given: tuple[float, str, float]  # requested tolerance, method, and factor on the work limit
+    _with_attitude = False
 
     if TYPE_CHECKING:
 
@@ -40,6 +42,29 @@ class LastCall:
     def __repr__(self) -> str:
         """Return a text that names the solver's class, its scene and its method."""
         return f"<{type(self).__name__} of '{self.plan.scene.name}' by {self.plan.method}>"
+
+    @property
+    def _scene_of_calls(self) -> Scene:
+        """The scene about the axes to which the arguments and results of calls refer."""
+        return self.plan.scene
+
+    def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
+        """Return the trajectory from `omega0` (rad/s) at `times` (s), as `solve` computes it.
+
+        `omega0` is the angular velocity at time 0. The times must be strictly monotonic; they may
+        be positive and negative. A solver of the attitude starts from the attitude of the scene, or
+        from (1, 0, 0, 0) if the scene has none. Raise InputError if `omega0` is not three finite
+        numbers, or if the times are not strictly monotonic.
+        """
+        from pyharness.methods.registry import METHODS
+        from pyharness.methods.solve import solve
+
+        scene = replace(self._scene_of_calls, omega=three("omega0", omega0))
+        tolerance, asked, effort = self._given
+        method = "taylor" if asked == "quick" else asked
+        # A method with a fixed step takes no tolerance. For such a method `solve` expects 1.
+        tolerance = max(tolerance, METHODS[method].finest)
+        return solve(scene, times, method, tolerance, effort=effort, attitude=self._with_attitude)
 
     @property
     def status(self) -> str:

@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from pyharness.dynamics.system import is_recorded, with_constant_body
 from pyharness.methods.problem import normalized, normalized_in_space, remainders
+from pyharness.methods.recorded import kernel_tape, system
 from pyharness.model.codes import Places
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
@@ -14,19 +16,22 @@ def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Ar
     A prepared solver, which `prepare` returns, solves one scene for many initial omegas.
     `pyharness.model.codes.Places` defines the order of the elements. `code` is the integer of
     `pyharness.model.codes.Methods` that selects the method. `tolerance` is the largest allowed
-    error, relative to the largest |omega|. `effort` multiplies the work limit.
+    error, relative to the largest |omega|. `effort` multiplies the work limit. Raise InputError if
+    the torque is opaque.
     """
-    coefficients, constant, rate, sines, cosines = _torque_of(scene)
     packed = np.zeros(Places.WAVES)
     packed[Places.METHOD] = code
     packed[Places.TOLERANCE] = tolerance
     packed[Places.STEP] = scene.step_size
+    packed[Places.EFFORT] = effort
+    if is_recorded(scene):
+        return np.concatenate([packed, kernel_tape(system(with_constant_body(scene)))])
+    coefficients, constant, rate, sines, cosines = _torque_of(scene)
     packed[Places.N_SINES] = sines.shape[1]
     packed[Places.N_COSINES] = cosines.shape[1]
     packed[Places.COEFFICIENTS : Places.CONSTANT] = coefficients
     packed[Places.CONSTANT : Places.RATE] = constant
     packed[Places.RATE : Places.EFFORT] = rate
-    packed[Places.EFFORT] = effort
     packed[Places.COEFFICIENTS_LOW : Places.MOMENTS] = remainders(scene)
     packed[Places.MOMENTS : Places.MOMENTS_LOW] = scene.moments or (1.0, 1.0, 1.0)
     packed[Places.MOMENTS_LOW : Places.WAVES] = scene.moments_low

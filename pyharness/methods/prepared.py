@@ -6,15 +6,14 @@ the kernel. Therefore it takes little longer than the kernel itself.
 """
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Literal, overload
 
 from pyharness.methods.plan import plan
-from pyharness.methods.registry import check_torque, requested_tolerance
+from pyharness.methods.registry import check_prepared, check_torque, requested_tolerance
 from pyharness.methods.solver import PREPARED, Solver
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import unknown
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.state_torque import StateTorque
 from pyharness.model.values import Number
 from pyharness.model.waves import with_merged_waves
 
@@ -76,15 +75,16 @@ def prepare(
     Solver or AttitudeSolver
         A callable. ``solver(omega0, t_end)`` returns omega (rad/s, shape (3,)) at `t_end` (s). If
         `attitude` is true, it returns two arrays: omega, and a quaternion from body to space,
-        scalar first, shape (4,). If the torque depends on the state, the solver is called in the
-        same way, but a call takes some ten microseconds longer.
+        scalar first, shape (4,). If the inertia changes with time, a call raises InputError if a
+        moment reaches 0 before `t_end`. Under a torque that depends on the state, an initial omega
+        above 2**300 rad/s or below 2**-300 rad/s has the status `refused`; `solve` takes any.
 
     Raises
     ------
     InputError
         If the method is unknown, or can't take the scene or propagate its attitude; if a torque
         that needs the attitude comes without `attitude`; if the tolerance or the effort is out of
-        range.
+        range. A call raises it if a moment that changes with time reaches 0 before `t_end`.
     NotBuiltError
         If the extension is not built.
 
@@ -96,19 +96,17 @@ def prepare(
     >>> np.round(solver(np.array([0.0, 1.0, 10.0]), 1.0), 6) + 0.0
     array([-0.958924,  0.283662, 10.      ])
     """
-    checked_scene(scene, any_axes=True, any_torque=True, any_state=True)
+    checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
     if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)
     tolerance = requested_tolerance(method, tolerance)
     effort = checked_effort(effort)
     check_torque(scene, method, attitude)
-    if isinstance(scene.torque, StateTorque):
-        from pyharness.methods.prepared_recorded import RecordedAttitudeSolver, RecordedSolver
+    check_prepared(scene, method)
+    if scene.changing is not None:
+        from pyharness.methods.prepared_changing import prepared_changing
 
-        # They have the attributes of a Solver, but no kernel that is bound in C.
-        kind: Any = RecordedAttitudeSolver if attitude else RecordedSolver
-        recorded: Solver | AttitudeSolver = kind(scene, method, tolerance, effort)
-        return recorded
+        return prepared_changing(scene, method, tolerance, effort, attitude)
     if scene.inertia is not None:
         from pyharness.methods.prepared_inertia import prepared_inertia, prepared_inertia_attitude
 

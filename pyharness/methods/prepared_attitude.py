@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Self
 
+from pyharness.dynamics.system import is_recorded
 from pyharness.methods.last_call import LastCall
 from pyharness.methods.packed import packed_scene
 from pyharness.methods.plan import Plan, plan
@@ -43,6 +44,8 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
         The chosen method, and the parts of the computation that are carried out, with reasons.
     """
 
+    _with_attitude = True
+
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
         """Create a solver and pack the data that all calls share; users call `prepare` instead.
 
@@ -52,7 +55,9 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
         """
         scene, code = chosen.scene, Methods.TAYLOR
         attitude = scene.attitude or IDENTITY
-        if scene.torque.in_space:
+        if is_recorded(scene):
+            code = Methods.TAPE
+        elif scene.torque.in_space:
             code = Methods.SPACE_TORQUE
         elif chosen.closed_form:
             code = Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else Methods.CLOSED_FORM

@@ -20,8 +20,8 @@ from pyharness.model.attitude import IDENTITY, Quaternion, product, unit_quatern
 from pyharness.model.errors import InputError
 from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import Array, Trajectory
-from pyharness.model.values import Number, Numbers, three, three_floats
+from pyharness.model.trajectory import Array
+from pyharness.model.values import Number, Numbers, three_floats
 from pyharness.model.waves import with_merged_waves
 
 
@@ -93,13 +93,9 @@ class InertiaSolver(Solver):
         ends[:] = rotated(ends, self._axes)
         return ends, status
 
-    def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
-        """Return the trajectory from the initial `omega0` (rad/s) at `times` (s).
-
-        The initial omega and the trajectory are about the axes of the inertia matrix. For the
-        arguments see `Solver.trajectory`.
-        """
-        return self._rows(replace(self._scene, omega=three("omega0", omega0)), times)
+    @property
+    def _scene_of_calls(self) -> Scene:
+        return self._scene
 
 
 class InertiaAttitudeSolver(AttitudeSolver):
@@ -153,6 +149,10 @@ class InertiaAttitudeSolver(AttitudeSolver):
             rotated(start, self._axes.T), t_end, product(attitude, self._turn)
         )
         return rotated(omega, self._axes), turned_back(found, self._turn)
+
+    @property
+    def _scene_of_calls(self) -> Scene:
+        return self._scene
 
 
 def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,21 +29,6 @@ _KINDS = {
 }
 
 
-class KernelTape(NamedTuple):
-    """A tape as the arrays that the kernel reads; fortran/modern/tape.f90 describes them."""
-
-    n_unknowns: int
-    n_slots: int
-    operations: NDArray[np.int32]
-    starts: NDArray[np.int32]
-    slots: NDArray[np.int32]
-    coefficients: Array
-    constants: Array
-    table_starts: NDArray[np.int32]
-    breaks: Array
-    pieces: Array
-
-
 def recorded_series(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
@@ -63,7 +47,7 @@ def recorded_series(
     joint = np.empty((4, n_attitudes + 1), order="F")
     joint[:, 0] = scene.attitude or IDENTITY
     rows, n_rows, status, steps = extension().tape_rows(
-        *tape, scene.omega, times, tolerance, joint, work
+        tape, scene.omega, times, tolerance, joint, work
     )
     if status == GAVE_UP:
         count = "1 step" if steps == 1 else f"{steps} steps"
@@ -92,8 +76,8 @@ def system(scene: Scene) -> Tape:
 
 
 @lru_cache(maxsize=64)
-def kernel_tape(tape: Tape) -> KernelTape:
-    """Return a tape as arrays for the kernel.
+def kernel_tape(tape: Tape) -> Array:
+    """Return a tape as the array that the kernel reads; fortran/modern/tape.f90 describes it.
 
     Sine and cosine of one angle become one operation, because each recurrence needs the other.
     """
@@ -135,16 +119,32 @@ def kernel_tape(tape: Tape) -> KernelTape:
         combined(output)
     terms = [term for _, each in combinations for term in each]
     starts = np.cumsum([1, *(len(each) for _, each in combinations)])
-    return KernelTape(
-        len(tape.outputs),
-        n_slots,
-        np.array(operations, dtype=np.int32).reshape(-1, 4).T.copy(order="F"),
-        starts.astype(np.int32),
-        np.array([slot for slot, _ in terms], dtype=np.int32),
-        np.array([coefficient for _, coefficient in terms]),
-        np.array([constant for constant, _ in combinations]),
-        np.cumsum([1, *(len(each.breaks) for each in tables)]).astype(np.int32),
-        np.array([time for each in tables for time in each.breaks] or [0.0]),
-        # f2py refuses an empty array of two dimensions.
-        np.array([piece for each in tables for piece in each.pieces] or [(0.0,) * 4]).T.copy("F"),
+    # f2py refuses an empty array, and a table of no piece is never read.
+    breaks = [time for each in tables for time in each.breaks] or [0.0]
+    pieces = [number for each in tables for piece in each.pieces for number in piece] or [0.0] * 4
+    counts = [
+        len(tape.outputs), n_slots, len(operations), len(combinations), len(terms), len(tables),
+        len(breaks),
+    ]  # fmt: skip
+    packed = np.concatenate(
+        [
+            np.array(counts, dtype=float),
+            _in_pairs([number for operation in operations for number in operation]),
+            _in_pairs(starts),
+            _in_pairs([slot for slot, _ in terms]),
+            _in_pairs(np.cumsum([1, *(len(each.breaks) for each in tables)])),
+            [coefficient for _, coefficient in terms],
+            [constant for constant, _ in combinations],
+            breaks,
+            pieces,
+        ]
     )
+    packed.flags.writeable = False
+    return packed
+
+
+def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
+    """Return integers as bits in an array of floats, two integers in a float."""
+    pairs = np.zeros(len(integers) + len(integers) % 2, dtype=np.int32)
+    pairs[: len(integers)] = integers
+    return pairs.view(np.float64)

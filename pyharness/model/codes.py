@@ -24,6 +24,7 @@ class Methods:
     conditions.
     """
 
+    TAPE = 0  # the Taylor series of a recorded torque
     CLOSED_FORM = 1  # for scenes without torque
     SPHERE = 2  # for bodies with three equal moments
     TAYLOR = 3
@@ -56,7 +57,7 @@ class Places:
     COEFFICIENTS_LOW = 15  # three: exact minus rounded A, B, C, for the closed form
     MOMENTS = 18  # three, kg m2: for the closed form with attitude, and for a torque in space
     MOMENTS_LOW = 21  # three, kg m2: exact minus rounded moments
-    WAVES = 24  # four numbers for each sine, then four for each cosine
+    WAVES = 24  # four numbers for each sine, then four for each cosine; or a tape
 
 
 class Series:

@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from inspect import Parameter, signature
 from typing import Any
 
@@ -14,7 +14,7 @@ from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.law_symbols import body_torque
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, refusal
 from pyharness.model.tape import FLOATS, N_INPUTS, TIME, Tape, evaluate
-from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.torque_law import FRAMES, TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Triple, three_floats
 
@@ -43,9 +43,11 @@ class StateTorque:
     constants : tuple of pairs
         The names and values of the constants in `expression`.
     terms : tuple
-        The other summands of a torque that was read from a scene file: at most one `TorqueLaw`, and
-        then the ready terms. A term is a tuple of pairs of keys and values, of which the first is
-        its kind.
+        The other summands as data of a scene file: at most one `TorqueLaw`, and then the ready
+        terms. A term is a tuple of pairs of keys and values, of which the first is its kind. Empty
+        for an expression alone, and if no scene file can describe the torque.
+    parts : tuple
+        The torques and torque laws of a sum; empty for a torque that is no sum.
     is_zero, varies, in_space : bool
         False, True and False. A `TorqueLaw` has these attributes too.
     """
@@ -56,6 +58,7 @@ class StateTorque:
     expression: tuple[str, ...] = ()
     constants: tuple[tuple[str, float], ...] = ()
     terms: tuple[TorqueLaw | tuple[tuple[str, Any], ...], ...] = ()
+    parts: "tuple[StateTorque | TorqueLaw, ...]" = field(default=(), compare=False, repr=False)
     # A torque law has these attributes too.
     is_zero: bool = field(default=False, init=False, repr=False)
     varies: bool = field(default=True, init=False, repr=False)
@@ -99,16 +102,13 @@ class StateTorque:
         """
         if type(other) is int and other == 0:
             return self
-        if isinstance(other, TorqueLaw):
-            law = other
-            second = replayed(lambda time, omega, attitude: body_torque(law, time, attitude))
-        elif isinstance(other, StateTorque):
+        if isinstance(other, (StateTorque, TorqueLaw)):
             second = other
         elif callable(other):
             second = recorded(other)
         else:
             return NotImplemented
-        return _sum(self.tape, second.tape)
+        return _sum([*_parts(self), *_parts(second)])
 
     __radd__ = __add__
 
@@ -139,6 +139,11 @@ def replayed(function: Function) -> StateTorque:
     omega, attitude = np.array(state[:3], dtype=object), np.array(state[3:], dtype=object)
     tape = recorder.tape(list(function(time, omega, attitude)))
     return StateTorque(tape, None, tape.needs_attitude)
+
+
+def of_law(law: TorqueLaw) -> StateTorque:
+    """Return a torque law, about the axes of the body or of space, as a recorded torque."""
+    return replayed(lambda time, omega, attitude: body_torque(law, time, attitude))
 
 
 def recorded(function: Function) -> StateTorque:
@@ -274,14 +279,46 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
     return TorqueLaw(constant, amplitude(TIME), those("sine"), those("cosine"))
 
 
-def _sum(first: Tape | None, second: Tape | None) -> StateTorque:
-    if first is None or second is None:
+def _parts(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, ...]":
+    """Return the summands of a torque; a torque law that is 0 has none."""
+    if isinstance(torque, TorqueLaw):
+        return () if torque.is_zero else (torque,)
+    return torque.parts or (torque,)
+
+
+def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
+    """Return the sum of torques, of which at least one depends on the state.
+
+    The operations are recorded in the order of a scene file, so that the sum of terms and the scene
+    that is read from its text have the same tape.
+    """
+    torques = [each for each in parts if isinstance(each, StateTorque)]
+    torques.sort(key=lambda each: bool(each.expression))
+    tapes = [each.tape for each in torques if each.tape is not None]
+    if len(tapes) < len(torques):
         raise InputError(
             "[torque]: an opaque torque can't be added to another; allowed: one opaque function "
             "that returns the sum"
         )
-    a, b = first, second
-    return replayed(lambda *state: torque_of(a, *state) + torque_of(b, *state))
+    if len(parts) == 1:
+        return torques[0]
+    given = [each for each in parts if isinstance(each, TorqueLaw)]
+    frames = [[law for law in given if law.frame == frame] for frame in FRAMES]
+    laws = [law for each in frames if not (law := sum(each, TorqueLaw())).is_zero]
+
+    def total(time: Any, omega: Any, attitude: Any) -> Any:
+        values = [torque_of(tape, time, omega, attitude) for tape in tapes]
+        values += [body_torque(law, time, attitude) for law in laws]
+        return sum(values[1:], values[0])
+
+    found = replace(replayed(total), parts=tuple(parts))
+    expressions = [each for each in torques if each.expression]
+    terms = [term for each in torques for term in each.terms]
+    if len(terms) + len(expressions) < len(torques) or len(expressions) + len(laws) > 1:
+        return found
+    for each in expressions:
+        found = replace(found, expression=each.expression, constants=each.constants)
+    return replace(found, terms=(*laws, *terms))
 
 
 def _takes_attitude(function: object) -> bool:

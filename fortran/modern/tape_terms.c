@@ -1,0 +1,276 @@
+/* Taylor series of all slots of a tape, order by order, and those of eight perturbations side by
+   side. A term includes its power of the step. This is C because no Fortran compiler keeps eight
+   sums in registers. Registers of fewer than eight numbers work too: the compiler divides them. */
+#include <string.h>
+
+#include "codes.h"
+
+#define JOINED(name, level) name##_##level
+#define OF_LEVEL(name, level) JOINED(name, level)
+
+enum { SIDE_BY_SIDE = 8, TERMS = 40, TERMS_OF_PERTURBATION = 29 };
+
+typedef double lanes __attribute__((vector_size(8 * SIDE_BY_SIDE)));
+typedef long long bits __attribute__((vector_size(8 * SIDE_BY_SIDE)));
+typedef double series[TERMS];
+typedef double perturbations[TERMS_OF_PERTURBATION][SIDE_BY_SIDE];
+
+/* tape_arrays_t of tape.f90. Numbers of slots and combinations begin with 1. */
+struct tape {
+  int n_unknowns, n_operations, n_combinations;
+  const int (*operations)[4]; /* kind, two operands and result */
+  const int *starts, *slots;
+  const double *coefficients, *constants;
+  series *a;        /* terms of each slot */
+  perturbations *v; /* terms of the perturbations of each slot */
+};
+enum { FIRST_UNKNOWN = 1 }; /* the slot of omega's first component, from 0 */
+
+/* The same at any address. */
+typedef lanes lanes_anywhere __attribute__((aligned(8)));
+
+static inline lanes loaded(const double *from) { return *(const lanes_anywhere *)from; }
+
+static inline void store(double *to, lanes x) { *(lanes_anywhere *)to = x; }
+
+/* Return a mask of the first n numbers. */
+static inline bits first_of(int n)
+{
+  static const long long ones[2 * SIDE_BY_SIDE] = {-1, -1, -1, -1, -1, -1, -1, -1};
+  bits mask;
+  n = n < 0 ? 0 : n < SIDE_BY_SIDE ? n : SIDE_BY_SIDE;
+  memcpy(&mask, ones + SIDE_BY_SIDE - n, sizeof mask);
+  return mask;
+}
+
+/* The terms of two factors, from term 1 on, that add_products takes: at most two registers. */
+struct range {
+  int k, registers;
+  bits of_a[2], of_b[2];
+};
+
+static inline struct range range_of(int k, int order)
+{
+  const int last = k - 1 < order - k ? k - 1 : order - k; /* at most 14 */
+  struct range range = {k, (last + SIDE_BY_SIDE - 1) / SIDE_BY_SIDE};
+  for (int i = 0; i < 2; i++) {
+    range.of_a[i] = first_of(k - 2 - i * SIDE_BY_SIDE);
+    range.of_b[i] = first_of(k - 1 - i * SIDE_BY_SIDE);
+  }
+  return range;
+}
+
+/* Add to the terms of a sum, from term k on, all products of which one factor is term k - 1 and the
+   other a term from 1 to k - 1 (relaxed multiplication: van der Hoeven 2002, section 4). Return term
+   k, which then lacks the products with terms 0 alone. The factors were stored one order before:
+   a load would have to wait for a store that it overlaps. */
+static inline double add_products(double *sum, const double *a, const double *b, double sign,
+                                  const struct range *range)
+{
+  const int k = range->k;
+  const double x = sign * a[k - 1], y = sign * b[k - 1];
+  double newest = 0.0;
+  for (int i = 0; i < range->registers; i++) {
+    const int from = 1 + i * SIDE_BY_SIDE;
+    lanes u = (lanes)((bits)loaded(b + from) & range->of_b[i]);
+    lanes v = (lanes)((bits)loaded(a + from) & range->of_a[i]);
+    double *to = sum + k - 1 + from;
+    lanes total = loaded(to) + (x * u + y * v);
+    store(to, total);
+    if (i == 0) newest = total[0];
+  }
+  return newest;
+}
+
+static inline double combined(const struct tape *tape, int n, int k, const series *a)
+{
+  double sum = k == 0 ? tape->constants[n] : 0.0;
+  for (int i = tape->starts[n] - 1; i < tape->starts[n + 1] - 1; i++)
+    sum += tape->coefficients[i] * a[tape->slots[i] - 1][k];
+  return sum;
+}
+
+/* Compute the terms of all slots below the order, and those of the unknowns up to it. Inputs are
+   term 0 of all slots, and all terms of the time and of tables. */
+void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
+{
+  series *const a = tape->a;
+  const int derivatives = tape->n_combinations - tape->n_unknowns;
+
+  for (int n = 0; n < tape->n_operations; n++) {
+    double *out = a[tape->operations[n][3] - 1];
+    if (tape->operations[n][0] == TABLE) continue;
+    /* Terms beyond the order are zeroed too: sums in the other places of a register must not grow
+       from step to step. */
+    memset(out + 1, 0, (TERMS - 1) * sizeof *out);
+    if (tape->operations[n][0] == SINE_COSINE) memset(out + TERMS + 1, 0, (TERMS - 1) * sizeof *out);
+  }
+  for (int k = 0; k < order; k++) {
+    const struct range range = range_of(k, order);
+    for (int n = 0; k > 0 && n < tape->n_operations; n++) {
+      const int *operation = tape->operations[n];
+      const double *x = a[operation[1] - 1], *y = a[operation[2] - 1];
+      double *out = a[operation[3] - 1], *angle, sum;
+      switch (operation[0]) {
+      case LINEAR:
+        out[k] = combined(tape, operation[1] - 1, k, a);
+        break;
+      case PRODUCT:
+        out[k] = add_products(out, x, y, 1.0, &range) + (x[k] * y[0] + x[0] * y[k]);
+        break;
+      case QUOTIENT:
+        sum = add_products(out, y, out, -1.0, &range);
+        out[k] = (x[k] + sum - y[k] * out[0]) / y[0];
+        break;
+      case SQRT:
+        out[k] = (x[k] + add_products(out, out, out, -1.0, &range)) / (2.0 * out[0]);
+        break;
+      case EXP:
+        /* The second slot has k times the terms of the argument. */
+        angle = out + TERMS;
+        angle[k] = k * x[k];
+        out[k] = (add_products(out, angle, out, 1.0, &range) + angle[k] * out[0]) / k;
+        break;
+      case SINE_COSINE:
+        angle = out + 2 * TERMS;
+        angle[k] = k * x[k];
+        sum = add_products(out, angle, out + TERMS, 1.0, &range);
+        out[TERMS + k] = (add_products(out + TERMS, angle, out, -1.0, &range) - angle[k] * out[0]) / k;
+        out[k] = (sum + angle[k] * out[TERMS]) / k;
+        break;
+      default: /* a table */
+        break;
+      }
+    }
+    for (int i = 0; i < tape->n_unknowns; i++)
+      a[FIRST_UNKNOWN + i][k + 1] = h / (k + 1) * combined(tape, derivatives + i, k, a);
+  }
+}
+
+/* Return the sum of the products of the terms of perturbations with those of a series, for two of
+   each. The newest term of the perturbations is left to the caller, who adds it last: the sum of
+   the others need not wait for it. */
+static inline lanes convolved(const double (*v)[SIDE_BY_SIDE], const double *a,
+                              const double (*w)[SIDE_BY_SIDE], const double *b, int k)
+{
+  lanes first = {0.0}, second = {0.0};
+  for (int j = 0; j < k; j++) {
+    first += loaded(v[j]) * a[k - j];
+    second += loaded(w[j]) * b[k - j];
+  }
+  return first + second;
+}
+
+/* Return the same sum for one of each. */
+static inline lanes convolved_one(const double (*v)[SIDE_BY_SIDE], const double *a, int k)
+{
+  const int half = k / 2;
+  lanes sum = convolved(v, a + (k - half), v + half, a + k % 2, half);
+  return k % 2 ? sum + loaded(v[k - 1]) * a[1] : sum;
+}
+
+static inline lanes perturbed(const struct tape *tape, int n, int k, const perturbations *v)
+{
+  lanes sum = {0.0};
+  for (int i = tape->starts[n] - 1; i < tape->starts[n + 1] - 1; i++)
+    sum += tape->coefficients[i] * loaded(v[tape->slots[i] - 1][k]);
+  return sum;
+}
+
+/* Compute term k of eight perturbations of all slots, and term k + 1 of those of the unknowns. */
+static void perturb(const struct tape *tape, double h, int k)
+{
+  const series *const a = (const series *)tape->a;
+  perturbations *const v = tape->v;
+  const int derivatives = tape->n_combinations - tape->n_unknowns;
+
+  for (int n = 0; n < tape->n_operations; n++) {
+    const int *operation = tape->operations[n];
+    const int first = operation[1] - 1, second = operation[2] - 1, out = operation[3] - 1;
+    lanes x;
+    switch (operation[0]) {
+    case LINEAR:
+      x = perturbed(tape, first, k, (const perturbations *)v);
+      break;
+    case PRODUCT:
+      x = convolved(v[first], a[second], v[second], a[first], k);
+      x += loaded(v[first][k]) * a[second][0] + loaded(v[second][k]) * a[first][0];
+      break;
+    case QUOTIENT:
+      x = convolved(v[second], a[out], v[out], a[second], k);
+      x = (loaded(v[first][k]) - loaded(v[second][k]) * a[out][0] - x) / a[second][0];
+      break;
+    case SQRT:
+      x = (0.5 * loaded(v[first][k]) - convolved_one(v[out], a[out], k)) / a[out][0];
+      break;
+    case EXP:
+      x = convolved_one(v[first], a[out], k) + loaded(v[first][k]) * a[out][0];
+      break;
+    case SINE_COSINE:
+      x = convolved_one(v[first], a[out], k) + loaded(v[first][k]) * a[out][0];
+      store(v[out + 1][k], -x);
+      x = convolved_one(v[first], a[out + 1], k) + loaded(v[first][k]) * a[out + 1][0];
+      break;
+    default: /* a table, which has no perturbation */
+      x = (lanes){0.0};
+      break;
+    }
+    store(v[out][k], x);
+  }
+  for (int i = 0; i < tape->n_unknowns; i++)
+    store(v[FIRST_UNKNOWN + i][k + 1],
+          h / (k + 1) * perturbed(tape, derivatives + i, k, (const perturbations *)v));
+}
+
+/* Return the largest term k of the perturbations of the unknowns, with weights that make the unknowns
+   comparable. `units` makes the perturbations comparable. */
+static inline double largest(const struct tape *tape, int k, const double *weights, lanes units)
+{
+  const bits magnitude = ~(bits)(-(lanes){0.0});
+  lanes most = {0.0};
+  double found = 0.0;
+  for (int i = 0; i < tape->n_unknowns; i++) {
+    lanes x = weights[i] * units * (lanes)((bits)loaded(tape->v[FIRST_UNKNOWN + i][k]) & magnitude);
+    bits is_larger = x > most;
+    most = (lanes)(((bits)x & is_larger) | ((bits)most & ~is_larger));
+  }
+  for (int lane = 1; lane < SIDE_BY_SIDE; lane++)
+    if (most[lane] > found) found = most[lane];
+  return found;
+}
+
+/* Expand the perturbations, whose values are terms 0 of the unknowns, to as many terms as they need
+   for the part `factor` of the step, and return the number of the last term. `is_short` says that
+   all terms do not suffice. `tolerance` is the largest relative size of a term that is left out. */
+int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, double h, int order, double factor,
+                                  const double *weights, double tolerance, int *is_short)
+{
+  /* Perturbation n was a unit of unknown n when it began. The error, perturbation 0, does not count,
+     because it may be zero. */
+  lanes units = {0.0};
+  for (int i = 0; i < tape->n_unknowns; i++) units[i + 1] = 1.0 / weights[i];
+  const double first = largest(tape, 0, weights, units);
+  double before = first, power = 1.0;
+  int k = 0;
+  do {
+    perturb(tape, h, k++);
+    power *= factor;
+    const double size = power * largest(tape, k, weights, units);
+    /* Every other term may be zero. */
+    *is_short = !(size <= tolerance * first && before <= tolerance * first);
+    before = size;
+  } while (*is_short && k < order);
+  return k;
+}
+
+/* Sum the terms of the perturbations of each unknown up to `last` for the part `factor` of the
+   step. */
+void OF_LEVEL(sum_perturbations, LEVEL)(const struct tape *tape, int last, double factor,
+                                        double (*sums)[SIDE_BY_SIDE])
+{
+  for (int i = 0; i < tape->n_unknowns; i++) {
+    lanes sum = loaded(tape->v[FIRST_UNKNOWN + i][last]);
+    for (int k = last - 1; k >= 0; k--) sum = factor * sum + loaded(tape->v[FIRST_UNKNOWN + i][k]);
+    store(sums[i], sum);
+  }
+}

@@ -1,0 +1,83 @@
+"""Prepared solvers of scenes whose inertia changes with time."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.methods.many_starts import many_starts
+from pyharness.methods.plan import plan
+from pyharness.methods.prepared_attitude import AttitudeSolver, attitude_plan
+from pyharness.methods.solver import Solver
+from pyharness.model.arrays import rows_of
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+from pyharness.model.values import Number, Numbers, number
+
+
+class ChangingSolver(Solver):
+    """A solver of omega, which is called in the same way as a `Solver`.
+
+    A call raises InputError if a principal moment reaches 0 before the final time.
+    """
+
+    def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array:
+        """Return omega (rad/s) at `t_end` (s), shape (3,); see `Solver` for the arguments."""
+        _check_time(self.plan.scene, number("t_end", t_end))
+        return super().__call__(omega0, t_end, out=out)
+
+    @property
+    def many(self) -> Any:
+        """Return the function that solves the scene from many initial omegas in one call.
+
+        Call it as ``solver.many(omega0, t_end)``; `Solver.many` describes its arguments. A row is
+        NaN, with the status REFUSED, if a moment reaches 0 before its time.
+        """
+        return self._many
+
+    def _many(
+        self, omega0: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
+    ) -> tuple[Array, NDArray[np.int8]]:
+        assert self.plan.scene.changing is not None
+        first, last = self.plan.scene.changing.span
+        times = rows_of("t_end", t_end)
+        # The kernel refuses a time that is not finite.
+        reached = np.where((first < times) & (times < last), times, math.nan)
+        return many_starts(self._packed, omega0, reached, threads=threads, out=out)
+
+
+class ChangingAttitudeSolver(AttitudeSolver):
+    """A solver of omega and attitude, which is called in the same way as an `AttitudeSolver`.
+
+    A call raises InputError if a principal moment reaches 0 before the final time.
+    """
+
+    def __call__(
+        self, omega0: Numbers, t_end: Number, attitude0: Numbers | None = None
+    ) -> tuple[Array, Array]:
+        """Return omega (rad/s) and the attitude at `t_end` (s); see `AttitudeSolver`."""
+        _check_time(self.plan.scene, number("t_end", t_end))
+        return super().__call__(omega0, t_end, attitude0)
+
+
+def prepared_changing(
+    scene: Scene, method: str, tolerance: float, effort: float, attitude: bool
+) -> ChangingSolver | ChangingAttitudeSolver:
+    """Return a solver of a scene whose inertia changes, prepared for many calls with it.
+
+    The arguments are those of `prepare`.
+    """
+    if attitude:
+        chosen = attitude_plan(scene, method, tolerance)
+        return ChangingAttitudeSolver(chosen, tolerance, method, effort)
+    chosen = plan(replace(scene, attitude=None), method, tolerance)
+    return ChangingSolver(chosen, tolerance, method, effort)
+
+
+def _check_time(scene: Scene, time: float) -> None:
+    """Raise InputError if a moment reaches 0 before `time` (s)."""
+    assert scene.changing is not None
+    if math.isfinite(time):
+        scene.changing.check([time])

@@ -11,6 +11,7 @@ from typing import Protocol
 
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, number
 
@@ -87,7 +88,12 @@ def suggested(effort: float, needed: float | None = None) -> str:
 
 
 def waves(scene: Scene) -> int:
-    """Return the number of waves, which are sine and cosine terms, in the torque of a scene."""
+    """Return the number of waves, which are sine and cosine terms, in the torque of a scene.
+
+    It is 0 if the torque depends on the state, because the terms of such a torque are unknown.
+    """
+    if isinstance(scene.torque, StateTorque):
+        return 0
     return len(scene.law.sines) + len(scene.law.cosines)
 
 

@@ -6,14 +6,15 @@ from fractions import Fraction
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyharness.model.diagonal import diagonalised
 from pyharness.model.errors import InputError
-from pyharness.model.trajectory import Array
 from pyharness.model.values import Matrix as Matrix
 from pyharness.model.values import Triple, number_list, three
 
 Exact = tuple[Fraction, Fraction, Fraction]
+Array = NDArray[np.float64]
 
 _ALIKE = 1e-12  # allowed difference of elements that should be equal, over the largest element
 # The most by which rounding of the matrix may change a moment, relative to the largest moment.
@@ -61,6 +62,22 @@ def checked_inertia(where: str, values: object) -> Matrix:
     Raise InputError, with `where` in front of the message, unless `values` are three rows of three
     finite numbers, symmetric up to rounding, with positive principal moments.
     """
+    matrix = symmetric_matrix(where, values)
+    least = min(principal_frame(matrix).exact_moments)
+    if not least > 0:
+        raise InputError(
+            f"{where}: its least principal moment is {nearest_float(least):g}; allowed: a positive "
+            "definite matrix"
+        )
+    return matrix
+
+
+def symmetric_matrix(where: str, values: object) -> Matrix:
+    """Return a user's symmetric matrix as a tuple of rows, made exactly symmetric.
+
+    Raise InputError, with `where` in front of the message, unless `values` are three rows of three
+    finite numbers, symmetric up to rounding.
+    """
     allowed = "allowed: three rows of three finite numbers, kg m2"
     given = [three(where, row) for row in number_list(where, values, allowed)]
     if len(given) != 3:
@@ -75,14 +92,7 @@ def checked_inertia(where: str, values: object) -> Matrix:
                 )
     half = [[0.5 * given[i][j] + 0.5 * given[j][i] for j in range(3)] for i in range(3)]
     (a, b, c), (d, e, f), (g, h, k) = half
-    matrix = ((a, b, c), (d, e, f), (g, h, k))
-    least = min(principal_frame(matrix).exact_moments)
-    if not least > 0:
-        raise InputError(
-            f"{where}: its least principal moment is {nearest_float(least):g}; allowed: a positive "
-            "definite matrix"
-        )
-    return matrix
+    return (a, b, c), (d, e, f), (g, h, k)
 
 
 @lru_cache(maxsize=_KEPT)

@@ -6,10 +6,11 @@ Every value is checked when a scene is created.
 import math
 import os
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from pyharness.model.attitude import Quaternion, unit_quaternion
+from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
 from pyharness.model.impossible import warn_of_impossible
@@ -42,7 +43,12 @@ FULL_INERTIA = (
 )
 STATE_TORQUE = (
     "the scene's torque is a function, and this needs a TorqueLaw: constant, linear and sinusoidal "
-    "terms of time; allowed for functions: solve, prepare, solve_many, and the verb run --method"
+    "terms of time; allowed for functions: solve, prepare, solve_many, compare_methods, and the "
+    "verbs run and compare with --method, plan, stress, and sweep with a method"
+)
+CHANGING = (
+    "the scene's inertia changes with time, and this takes a constant one; allowed for a changing "
+    "inertia: solve, prepare, solve_many, and the verb run --method"
 )
 SPACE_TORQUE = (
     "the torque is about the axes of space, and this takes one about those of the body; allowed: "
@@ -63,8 +69,9 @@ class Scene:
         A title. It is shortened to one line of 60 characters, with unprintable characters escaped.
     omega : three numbers
         The angular velocity about the body axes at time 0 (rad/s).
-    moments : three numbers, optional
-        The principal moments of inertia (kg m2).
+    moments : three numbers, or ChangingMoments, optional
+        The principal moments of inertia (kg m2), constant or as polynomials of time. For moments
+        that change, the attribute `moments` is None, and the attribute `changing` has them.
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
     torque : TorqueLaw, or function of (t, omega) or (t, omega, attitude)
@@ -83,8 +90,11 @@ class Scene:
         The number of the case in Table 1 of the thesis, if the scene is one of these cases.
     attitude : four numbers, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
-    inertia : three rows of three numbers, optional
-        A full symmetric inertia matrix about the body axes (kg m2).
+    inertia : three rows of three numbers, or ChangingInertia, optional
+        A full symmetric inertia matrix about the body axes (kg m2), constant or as a polynomial of
+        time. For a matrix that changes, the attribute `inertia` is None, and `changing` has it.
+    changing : ChangingMoments or ChangingInertia, optional
+        An inertia that changes with time, as in `moments` and `inertia`.
 
     Raises
     ------
@@ -111,6 +121,7 @@ class Scene:
     case: int | None = None
     attitude: Quaternion | None = None
     inertia: Matrix | None = None
+    changing: ChangingMoments | ChangingInertia | None = None
     # Norm of the attitude before it was normalised.
     attitude_length: float = field(default=1.0, init=False, compare=False, repr=False)
 
@@ -120,7 +131,7 @@ class Scene:
             self,
             name: str,
             omega: Numbers,
-            moments: Numbers | None = None,
+            moments: Numbers | ChangingMoments | None = None,
             coefficients: Numbers | None = None,
             torque: TorqueLaw | StateTorque | Callable[..., Any] = ...,
             step_size: Number = 0.01,
@@ -129,7 +140,8 @@ class Scene:
             forces: Numbers = ...,
             case: SupportsIndex | None = None,
             attitude: Numbers | None = None,
-            inertia: Iterable[Numbers] | None = None,
+            inertia: Iterable[Numbers] | ChangingInertia | None = None,
+            changing: ChangingMoments | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -140,7 +152,8 @@ class Scene:
         if not isinstance(self.name, str):
             raise InputError(f"name is {kind_of(self.name)}; it must be text")
         self._set("name", printable(" ".join(self.name.split()))[:_LONGEST_NAME].rstrip())
-        bodies = (self.moments, self.coefficients, self.inertia)
+        self._set_changing()
+        bodies = (self.moments, self.coefficients, self.inertia, self.changing)
         if sum(each is not None for each in bodies) != 1:
             raise InputError(
                 "[body]: give either moments or coefficients, three numbers, or inertia, three rows"
@@ -186,20 +199,43 @@ class Scene:
             self._set("case", integer("case", self.case))
         warn_of_impossible(self)
 
+    def __repr__(self) -> str:
+        """Return the fields as the arguments of a call; `changing` only if it is not None."""
+        names = [each.name for each in fields(self) if each.repr]
+        shown = [x for x in names if x != "changing" or self.changing is not None]
+        return f"Scene({', '.join(f'{x}={getattr(self, x)!r}' for x in shown)})"
+
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
+
+    def _set_changing(self) -> None:
+        # Code that takes a constant inertia finds none in a scene whose inertia changes.
+        for kind in (ChangingMoments, ChangingInertia):
+            if isinstance(getattr(self, kind.place), kind) and self.changing is None:
+                self._set("changing", getattr(self, kind.place))
+                self._set(kind.place, None)
+        if self.changing is None:
+            return
+        if not isinstance(self.changing, Changing):
+            raise InputError(
+                f"changing is {kind_of(self.changing)}; it must be ChangingMoments or "
+                "ChangingInertia"
+            )
+        if self.changing.is_constant and getattr(self, self.changing.place) is None:
+            self._set(self.changing.place, self.changing.at(0.0))
+            self._set("changing", None)
 
     @property
     def euler_coefficients(self) -> Triple:
         """The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
 
         A is (I2 - I3)/I1; B and C follow by cyclic permutation. Raise InputError if the scene has a
-        full inertia matrix.
+        full inertia matrix, or an inertia that changes with time.
         """
         if self.coefficients is not None:
             return self.coefficients
         if self.moments is None:
-            raise InputError(FULL_INERTIA)
+            raise InputError(FULL_INERTIA if self.changing is None else CHANGING)
         first, second, third = self.moments
         return (second - third) / first, (third - first) / second, (first - second) / third
 
@@ -208,12 +244,12 @@ class Scene:
         """The principal moments (kg m2) as exact fractions; None for a body with coefficients.
 
         The coefficients A, B, C of Euler's equations do not determine the moments. Raise InputError
-        if the scene has a full inertia matrix.
+        if the scene has a full inertia matrix, or an inertia that changes with time.
         """
         if self.coefficients is not None:
             return None
         if self.moments is None:
-            raise InputError(FULL_INERTIA)
+            raise InputError(FULL_INERTIA if self.changing is None else CHANGING)
         # Imported only here, because the programs need no exact numbers.
         from fractions import Fraction
 
@@ -230,24 +266,31 @@ class Scene:
         """Whether no rigid body has the moments of inertia of the scene.
 
         The largest moment then exceeds the sum of the other two. The result is false for a body
-        with coefficients.
+        with coefficients. An inertia that changes with time is that at time 0.
         """
-        if self.inertia is not None:
+        moments, inertia = self.moments, self.inertia
+        if isinstance(self.changing, ChangingMoments):
+            moments = self.changing.at(0.0)
+        elif self.changing is not None:
+            inertia = self.changing.at(0.0)
+        if inertia is not None:
             from pyharness.model.inertia import breaks_triangle
 
-            return breaks_triangle(self.inertia)
-        if self.moments is None:
+            return breaks_triangle(inertia)
+        if moments is None:
             return False
-        low, middle, high = sorted(self.moments)
+        low, middle, high = sorted(moments)
         return high > low + middle
 
     @property
     def law(self) -> TorqueLaw:
         """The torque law, which depends on time alone.
 
-        Raise InputError if the torque depends on the state. Code that cannot treat such a torque
-        therefore reads this property instead of `torque`.
+        Raise InputError if the torque depends on the state, or if the inertia changes with time.
+        Code that cannot treat such a scene therefore reads this property instead of `torque`.
         """
+        if self.changing is not None:
+            raise InputError(CHANGING)
         if isinstance(self.torque, StateTorque):
             raise InputError(STATE_TORQUE)
         return self.torque
@@ -256,8 +299,9 @@ class Scene:
     def body_torque(self) -> TorqueLaw:
         """The torque law about the axes of the body.
 
-        Raise InputError if the torque is about the axes of space, or depends on the state. Code
-        that cannot treat such a torque therefore reads this property instead of `torque`.
+        Raise InputError if the torque is about the axes of space, or depends on the state, or if
+        the inertia changes with time. Code that cannot treat such a scene therefore reads this
+        property instead of `torque`.
         """
         if self.torque.in_space:
             raise InputError(SPACE_TORQUE)
@@ -321,14 +365,21 @@ def _size(steps: int, limit: int) -> str:
 
 
 def checked_scene(
-    scene: object, any_axes: bool = False, any_torque: bool = False, any_state: bool = False
+    scene: object,
+    any_axes: bool = False,
+    any_torque: bool = False,
+    any_state: bool = False,
+    changing: bool = False,
 ) -> Scene:
     """Return the argument `scene`; raise InputError unless it is a Scene that the caller accepts.
 
     A full inertia matrix is accepted if `any_axes` is true, a torque about the axes of space if
-    `any_torque` is true, and a torque that depends on the state if `any_state` is true.
+    `any_torque` is true, a torque that depends on the state if `any_state` is true, and an
+    inertia that changes with time if `changing` is true.
     """
     if isinstance(scene, Scene):
+        if scene.changing is not None and not changing:
+            raise InputError(CHANGING)
         if isinstance(scene.torque, StateTorque) and not any_state:
             raise InputError(STATE_TORQUE)
         if scene.torque.in_space and not any_torque:

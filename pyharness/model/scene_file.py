@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Iterable
 from typing import Any, SupportsIndex
 
+from pyharness.model.changing import Changing, ChangingMoments
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts
 from pyharness.model.pipes import read_input
@@ -18,6 +19,7 @@ from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import integer
 
 _LARGEST_FILE = 1_000_000
+MOST_TERMS = 50  # ready terms of a scene file
 _WAVES = ("sines", "cosines")
 
 
@@ -107,12 +109,13 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
 
     The restored numbers are bit-for-bit identical. Masses, forces and the number of the case are
     not written, because scene files have no keys for them. `comments` are lines at the beginning of
-    the text. Raise InputError if the torque is an opaque function, or was recorded from a function.
+    the text. Raise InputError for a torque that no scene file can describe, as one that is an
+    opaque function or was recorded from a function, and for a text of more than 1 000 000 bytes.
     """
     import json
 
     body, values = body_of(scene)
-    torque = _torque_lines(scene.torque)
+    torque = _torque_lines(scene)
     lines = [f"# {line}" for line in comments]
     lines.append(f"schema = {SCHEMAS['scene file']}")
     lines += [f"name = {json.dumps(scene.name, ensure_ascii=False)}", "[body]"]
@@ -122,19 +125,34 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
         lines.append(f"attitude = {list(scene.attitude)}")
     lines += torque
     lines += ["[run]", f"step_size = {scene.step_size!r}", f"steps = {scene.steps}"]
-    return "\n".join(lines) + "\n"
+    text = "\n".join(lines) + "\n"
+    if (size := len(text.encode())) > _LARGEST_FILE:
+        raise InputError(
+            f"[torque]: the scene file would have {size} bytes; allowed: at most {_LARGEST_FILE}; "
+            "use shorter tables or fewer pulses"
+        )
+    return text
 
 
-def _torque_lines(torque: TorqueLaw | StateTorque) -> list[str]:
-    """Return the lines of a scene file with the tables of a torque."""
+def _torque_lines(scene: Scene) -> list[str]:
+    """Return the lines of a scene file with the tables of a scene's torque."""
+    torque = scene.torque
     if isinstance(torque, TorqueLaw):
         return ["[torque]", *_law_lines(torque)]
     if not (torque.expression or torque.terms):
-        kind = "an opaque function" if torque.tape is None else "recorded from a function"
+        if torque.tape is None:
+            kind = "an opaque function"
+        elif torque.parts and all(map(_has_form, torque.parts)):
+            kind = "a sum of several expressions or laws"
+        else:
+            kind = "recorded from a function"
         raise InputError(
-            f"[torque]: a torque that is {kind} can't be written to a file; allowed: "
-            "expressions, and terms that were read from a file"
+            f"[torque]: a torque that is {kind} can't be written to a file; allowed: ready terms, "
+            "expressions or a TorqueLaw, and the sum of ready terms and one of these"
         )
+    count = sum(not isinstance(part, TorqueLaw) for part in torque.terms)
+    if count > MOST_TERMS:
+        raise InputError(f"[[torque.terms]]: {count} terms; allowed: at most {MOST_TERMS}")
     lines = ["[torque]"]
     if torque.expression:
         # The texts have printable characters of ASCII alone, and neither quotes nor backslashes.
@@ -145,8 +163,23 @@ def _torque_lines(torque: TorqueLaw | StateTorque) -> list[str]:
         if isinstance(part, TorqueLaw):
             lines += _law_lines(part)
         else:
-            lines += ["[[torque.terms]]", *(f"{key} = {_toml(value)}" for key, value in part)]
+            lines += ["[[torque.terms]]", *_term_lines(part, scene.changing)]
     return lines
+
+
+def _term_lines(term: tuple[tuple[str, Any], ...], changing: Changing | None) -> list[str]:
+    """Return the lines of a ready term, without an inertia that changes as that of the body."""
+    if any(isinstance(value, Changing) and value != changing for _, value in term):
+        raise InputError(
+            f"[torque]: a term {term[0][1]} whose inertia changes otherwise than that of the body "
+            "can't be written to a file; allowed: the inertia of the body"
+        )
+    return [f"{key} = {_toml(value)}" for key, value in term if not isinstance(value, Changing)]
+
+
+def _has_form(torque: TorqueLaw | StateTorque) -> bool:
+    """Return whether a scene file can describe a torque."""
+    return isinstance(torque, TorqueLaw) or bool(torque.expression or torque.terms)
 
 
 def _law_lines(law: TorqueLaw) -> list[str]:
@@ -174,10 +207,16 @@ def _toml(value: Any) -> str:
 def body_of(scene: Scene) -> tuple[str, list[Any]]:
     """Return the key and the value with which a scene file specifies the body of `scene`.
 
-    The key is "moments" (kg m2), "coefficients" or "inertia" (kg m2). The value is a list.
+    The key is "moments" (kg m2), "coefficients" or "inertia" (kg m2). The value is a list. If the
+    inertia changes with time, it has the coefficients of polynomials of time: a list for each of
+    the moments, or a list of matrices.
     """
     if scene.inertia is not None:
         return "inertia", [list(row) for row in scene.inertia]
+    if isinstance(scene.changing, ChangingMoments):
+        return "moments", [list(each) for each in scene.changing.polynomials]
+    if scene.changing is not None:
+        return "inertia", [[list(row) for row in each] for each in scene.changing.matrices]
     if scene.moments is not None:
         return "moments", list(scene.moments)
     return "coefficients", list(scene.coefficients or ())

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from pyharness.model.changing import ChangingMoments
 from pyharness.model.report import counted, short
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
@@ -21,6 +22,10 @@ def heading(scene: Scene) -> list[str]:
     """
     if scene.inertia is not None:
         body = f"I = {', '.join(map(_tuple, scene.inertia))} kg m2"
+    elif isinstance(scene.changing, ChangingMoments):
+        body = f"I = {_polynomials(scene.changing.polynomials)} kg m2"
+    elif scene.changing is not None:
+        body = f"I = {', '.join(map(_polynomials, scene.changing.elements))} kg m2"
     elif scene.moments is not None:
         body = f"I = {_tuple(scene.moments)} kg m2"
     else:
@@ -37,6 +42,21 @@ def heading(scene: Scene) -> list[str]:
     if scene.attitude is not None:
         lines.append(f"attitude(0) = {_tuple(scene.attitude)}")
     return lines
+
+
+def _polynomials(coefficients: Sequence[Sequence[float]]) -> str:
+    return f"({', '.join(map(_polynomial, coefficients))})"
+
+
+def _polynomial(coefficients: Sequence[float]) -> str:
+    """Return a polynomial of time as text, as in "40 + 0.5 t - 0.01 t^2"."""
+    text = ""
+    for power, coefficient in enumerate(coefficients):
+        if coefficient:
+            minus, plus = (" - ", " + ") if text else ("-", "")
+            factor = ("", " t", f" t^{power}")[min(power, 2)]
+            text += f"{minus if coefficient < 0.0 else plus}{abs(coefficient):g}{factor}"
+    return text or "0"
 
 
 def _torque(scene: Scene, unit: str) -> str:

@@ -42,7 +42,9 @@ def refusal(what: str) -> InputError:
 class Recorder:
     """A tape while it is being recorded."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = MOST_OPERATIONS) -> None:
+        """Begin an empty tape, on which at most `most` operations can be recorded."""
+        self._most = most
         self._operations: list[Operation] = []
         self._slots: dict[Operation, int] = {}
 
@@ -57,9 +59,9 @@ class Recorder:
     def slot(self, operation: Operation) -> int:
         """Return the slot of the result of `operation`, which is recorded if it is new."""
         if operation not in self._slots:
-            if len(self._operations) == MOST_OPERATIONS:
+            if len(self._operations) == self._most:
                 raise InputError(
-                    f"[torque]: more than {MOST_OPERATIONS} operations; use fewer, or a table"
+                    f"[torque]: more than {self._most} operations; use fewer, or a table"
                 )
             self._slots[operation] = N_INPUTS + len(self._operations)
             self._operations.append(operation)

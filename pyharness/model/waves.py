@@ -159,9 +159,12 @@ def _rounded(values: Exact) -> Triple:
 def with_merged_waves(scene: Scene) -> Scene:
     """Return the scene with at most one sine and one cosine per frequency in its torque.
 
-    Terms of the same frequency are added exactly, by the function `merged`.
+    Terms of the same frequency are added exactly, by the function `merged`. A torque that depends
+    on the state is unchanged.
     """
-    law = merged(scene.law)
+    if not isinstance(scene.torque, TorqueLaw):
+        return scene
+    law = merged(scene.torque)
     return scene if law is scene.torque else replace(scene, torque=law)
 
 

@@ -219,7 +219,9 @@ class _Equations:
 
     If `velocity` is true, the equation dV/dt = F/m - omega x V of the translational velocity V is
     added, with the force F on the mass m. If the scene has an attitude, the equation dq/dt = q (0,
-    omega)/2 of its quaternion q is added. `coefficients` are A, B, C of Euler's equations.
+    omega)/2 of its quaternion q is added. `coefficients` are A, B, C of Euler's equations. For
+    an inertia I that changes with time, the equations are (I omega)' = N - omega x (I omega), with
+    the torque N, and `coefficients` are not used.
     """
 
     def __init__(self, scene: Scene, coefficients: Row, velocity: bool) -> None:
@@ -229,7 +231,10 @@ class _Equations:
             self._tape = TapeSeries(scene.torque.tape)
         else:
             self._law = scene.body_torque
-        self._moments = [Decimal(x.numerator) / x.denominator for x in divisors(scene)]
+        self._changing = scene.changing
+        # The equations of an inertia that changes take the torque itself.
+        exact = divisors(scene) if scene.changing is None else (Fraction(1),) * 3
+        self._moments = [Decimal(x.numerator) / x.denominator for x in exact]
         self._velocity, self._attitude = velocity, scene.attitude is not None
         self._acceleration = [Decimal(force) / Decimal(scene.masses[0]) for force in scene.forces]
 
@@ -242,13 +247,20 @@ class _Equations:
         """
         series = [[x] for x in state]
         torque = self._torque_series(time, order, series, forward)
+        inertia = self._inertia_series(time)
+        momentum: list[Row] = [[], [], []]
         for k in range(order):
             # Cauchy products of the coefficients 0 ... k.
             backward = [list(reversed(each)) for each in series]
-            rates = [
-                self._abc[i] * product(series[(i + 1) % 3], backward[(i + 2) % 3]) + push
-                for i, push in enumerate(torque(k))
-            ]
+            if inertia:
+                for each, row in zip(momentum, inertia, strict=True):
+                    each.append(sum(map(product, row, backward), Decimal(0)))
+                rates = _rates_by_momentum(torque(k), momentum, inertia, series, backward)
+            else:
+                rates = [
+                    self._abc[i] * product(series[(i + 1) % 3], backward[(i + 2) % 3]) + push
+                    for i, push in enumerate(torque(k))
+                ]
             if self._velocity:
                 for i in range(3):
                     j, m = (i + 1) % 3, (i + 2) % 3
@@ -260,6 +272,16 @@ class _Equations:
             for each, rate in zip(series, rates, strict=True):
                 each.append(rate / (k + 1))
         return series
+
+    def _inertia_series(self, time: Decimal) -> list[list[Row]]:
+        """Return the Taylor coefficients of an inertia matrix that changes, around `time` (s).
+
+        The result has three rows of three elements, each with a list of coefficients. It is empty
+        for a constant inertia.
+        """
+        if self._changing is None:
+            return []
+        return [[_moved(each, time) for each in row] for row in self._changing.elements]
 
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
         """Return the next time (s) at which a table of the torque changes, or None.
@@ -317,6 +339,60 @@ class _Equations:
             [term / moment for term in terms]
             for terms, moment in zip(series, self._moments, strict=True)
         ]
+
+
+def _moved(polynomial: Sequence[float], time: Decimal) -> Row:
+    """Return the Taylor coefficients around `time` of a polynomial with given ones around 0."""
+    row = [Decimal(c) for c in polynomial]
+    # Horner's scheme, repeated, moves the centre of a polynomial.
+    for first in range(len(row) - 1):
+        for k in range(len(row) - 2, first - 1, -1):
+            row[k] += time * row[k + 1]
+    return row
+
+
+def _rates_by_momentum(
+    torque: Row,
+    momentum: list[Row],
+    inertia: list[list[Row]],
+    series: list[Row],
+    backward: list[Row],
+) -> Row:
+    """Return Taylor coefficient k of the derivative of omega, for an inertia that changes.
+
+    `torque` contains Taylor coefficient k of the torque N. `momentum` and `series` contain the
+    coefficients 0 to k of the momentum L = I omega and of omega; `backward` has those of omega in
+    reversed order. `inertia` has those of the matrix I. The equation is L' = N - omega x L.
+    """
+    right = []
+    for i in range(3):
+        j, m = (i + 1) % 3, (i + 2) % 3
+        push = torque[i] - product(series[j], momentum[m][::-1])
+        push += product(series[m], momentum[j][::-1])
+        # Coefficient k of L' is k + 1 times coefficient k + 1 of L, whose only term with
+        # coefficient k + 1 of omega is its product with coefficient 0 of I.
+        others = sum(
+            (product(each[1:], omega) for each, omega in zip(inertia[i], backward, strict=False)),
+            Decimal(0),
+        )
+        right.append(push - len(backward[i]) * others)
+    first, second, third = ([each[0] if each else Decimal(0) for each in row] for row in inertia)
+    # Cramer's rule; the digits that it loses are among those beyond binary64.
+    determinant = _triple(first, second, third)
+    return [
+        _triple(right, second, third) / determinant,
+        _triple(first, right, third) / determinant,
+        _triple(first, second, right) / determinant,
+    ]
+
+
+def _triple(x: Row, y: Row, z: Row) -> Decimal:
+    """Return the determinant of the matrix with three given columns."""
+    return (
+        x[0] * (y[1] * z[2] - y[2] * z[1])
+        + x[1] * (y[2] * z[0] - y[0] * z[2])
+        + x[2] * (y[0] * z[1] - y[1] * z[0])
+    )
 
 
 def _attitude_rates(q: list[Row], omega: list[Row]) -> Row:

@@ -17,7 +17,8 @@ import numpy as np
 
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import StateTorque
+from pyharness.model.state_torque import StateTorque, of_law
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.decimal_series import Row, divisors, taylor_series
@@ -82,10 +83,15 @@ def reference(
     None, the limit is 100 000 steps. If the scene has an attitude, the result contains attitudes,
     which are always computed by the series. `velocity` requests the translational velocity.
 
-    Raise InputError if the times are not in order, or if the series needs too many steps. A torque
+    Raise InputError if the times are not in order, if a moment that changes with time reaches 0, or
+    if the series needs too many steps. A torque
     that depends on the state must be recorded, and needs the scene's attitude if it depends on it.
     The result ends before the first time at which such a torque is singular.
     """
+    if scene.changing is not None:
+        scene.changing.check(times)
+        if isinstance(scene.torque, TorqueLaw):
+            scene = replace(scene, torque=of_law(scene.torque))
     _check_torque(scene)
     away = [abs(t) for t in times]
     one_side = min(times) >= 0.0 or max(times) <= 0.0
@@ -101,7 +107,7 @@ def reference(
             estimate = min(Decimal(1), largest).scaleb(3 - DIGITS)
             within = list(itertools.takewhile(lambda row: all(map(_is_number, row)), known))
             return _rounded(times[: len(within)], within, None, "known solution", estimate)
-        coefficients = exact_coefficients(scene)
+        coefficients = exact_coefficients(scene) if scene.changing is None else []
         coarse, fine = _PRECISE if precise else _QUICK
         first = taylor_series(scene, coefficients, exact, False, *coarse, effort)
         second = taylor_series(scene, coefficients, exact, velocity, *fine, effort)

@@ -1,0 +1,256 @@
+"""Inertias that are polynomials of time: principal moments, and full matrices."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.model.errors import InputError
+from pyharness.model.polynomials import Polynomial, derivative, powers, value
+from pyharness.model.values import Matrix, Numbers, Triple, finite, number_list
+
+# Largest number of coefficients. Higher powers of time have no physical use, and lose digits.
+_MOST = 10
+_POLYNOMIALS = f"allowed: three lists of 1 to {_MOST} numbers"
+_MATRICES = f"allowed: a list of 1 to {_MOST} matrices, each of three rows of three numbers"
+
+
+class Changing:
+    """The common part of inertias that are polynomials of time."""
+
+    place: ClassVar[str]  # the key of a scene file
+
+    @property
+    def elements(self) -> Sequence[Sequence[Polynomial]]:
+        """The polynomials of the elements of the inertia matrix: three rows of three."""
+        raise NotImplementedError
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether the inertia does not change with time."""
+        return not any(any(each[1:]) for row in self.elements for each in row)
+
+    def _check_derivative(self) -> None:
+        coefficients = (c for row in self.elements for each in row for c in derivative(each))
+        if not all(map(math.isfinite, coefficients)):
+            raise InputError(
+                f"[body] {self.place}: a coefficient of the derivative overflows; allowed: finite "
+                "numbers, also when multiplied by their power of time"
+            )
+
+    def matrix(self, time: Any) -> list[list[Any]]:
+        """Return the inertia matrix (kg m2) at a time (s), which may be a symbol or an array."""
+        return self._values(self.elements, time)
+
+    def matrix_rate(self, time: Any) -> list[list[Any]]:
+        """Return the derivative of the inertia matrix (kg m2/s) at a time (s), also a symbol."""
+        return self._values([[derivative(each) for each in row] for row in self.elements], time)
+
+    def _values(self, elements: Sequence[Sequence[Polynomial]], time: Any) -> list[list[Any]]:
+        known = powers(time, max(len(each) for row in elements for each in row))
+        return [[value(each, known) for each in row] for row in elements]
+
+    def momentum(
+        self, times: NDArray[np.float64], omega: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the angular momentum (kg m2/s) of n rows, shape (n, 3), about the body axes.
+
+        `times` (s) has shape (n,), and `omega` (rad/s) has shape (n, 3).
+        """
+        matrix = self.matrix(times)
+        rows = [sum(each * omega[:, k] for k, each in enumerate(row)) for row in matrix]
+        return np.stack([np.asarray(row) for row in rows], axis=-1)
+
+    @cached_property
+    def span(self) -> tuple[float, float]:
+        """The times (s) before and after 0 between which the matrix is positive definite.
+
+        They are infinite if no principal moment reaches 0.
+        """
+        # Imported only here, because the programs need no exact numbers.
+        from pyharness.model.exact_zeros import determinant, first_zeros
+
+        if isinstance(self, ChangingMoments):
+            zeros = [first_zeros(each) for each in self.polynomials]
+        else:
+            # The least principal moment is 0 where the determinant is 0 for the first time.
+            zeros = [first_zeros(determinant(self.elements))]
+        return max(first for first, _ in zeros), min(last for _, last in zeros)
+
+    def check(self, times: Iterable[float]) -> None:
+        """Raise InputError if a moment reaches 0 between time 0 and one of `times` (s)."""
+        first, last = self.span
+        for time in times:
+            if not first < time < last:
+                zero = first if time < 0.0 else last
+                raise InputError(
+                    f"[body] {self.place}: a principal moment reaches 0 at t = {zero:g} s, and the "
+                    f"time {time:g} s is not before it; allowed: times between 0 and {zero:g} s"
+                )
+
+
+@dataclass(frozen=True)
+class ChangingMoments(Changing):
+    """Principal moments of inertia that are polynomials of time.
+
+    A scene with these moments is a body whose mass moves relative to its axes, for example along
+    booms that extend, or a body that uses propellant. The principal axes remain fixed in the body.
+    Mass that moves within the body is assumed to have no angular momentum relative to its axes, and
+    mass that leaves the body none about the centre of mass. The equations of motion are then
+    I omega' = N - I' omega - omega x (I omega), with the moments I and the torque N.
+
+    Parameters
+    ----------
+    polynomials : three lists of numbers
+        The polynomial of each principal moment: its coefficients in ascending order of the powers
+        of time (s), at most ten. Their units are kg m2, kg m2/s, kg m2/s2, and so on.
+
+    Raises
+    ------
+    InputError
+        If the polynomials are not three lists of finite numbers, if a moment is not above 0 at
+        time 0, or if the numbers are the rows of a symmetric matrix.
+
+    Examples
+    --------
+    >>> from pyharness import ChangingMoments, Scene, solve
+    >>> moments = ChangingMoments([[40.0, 1.0], [40.0, 1.0], [20.0]])
+    >>> moments.at(2.0)
+    (42.0, 42.0, 20.0)
+    >>> scene = Scene("booms", (1.0, 0.0, 0.0), moments=moments)
+    >>> solve(scene, [0.0, 40.0]).omega
+    array([[1. , 0. , 0. ],
+           [0.5, 0. , 0. ]])
+    """
+
+    polynomials: tuple[Polynomial, Polynomial, Polynomial]
+    place: ClassVar[str] = "moments"
+
+    if TYPE_CHECKING:
+
+        def __init__(self, polynomials: Iterable[Numbers]) -> None: ...
+
+    def __post_init__(self) -> None:
+        """Check the polynomials, and convert their coefficients to floats.
+
+        Raise InputError for an invalid value.
+        """
+        where = "[body] moments"
+        given = _items(where, self.polynomials, 4, _POLYNOMIALS)
+        if len(given) != 3:
+            raise InputError(f"{where}: {_count(given, 3)} lists; {_POLYNOMIALS}")
+        first, second, third = (_polynomial(f"{where}, I{n}", x) for n, x in enumerate(given, 1))
+        object.__setattr__(self, "polynomials", (first, second, third))
+        for axis, polynomial in enumerate(self.polynomials, 1):
+            if not polynomial[0] > 0.0:
+                raise InputError(
+                    f"{where}: I{axis} is {polynomial[0]:g} at time 0; "
+                    "allowed: a finite number above 0"
+                )
+        is_square = len(first) == len(second) == len(third) == 3
+        if is_square and (first[1], first[2], second[2]) == (second[0], third[0], third[1]):
+            raise InputError(
+                f"{where}: the rows of a symmetric matrix; allowed: inertia for a matrix, or for "
+                "polynomials a further coefficient 0"
+            )
+        self._check_derivative()
+
+    @property
+    def elements(self) -> Sequence[Sequence[Polynomial]]:
+        """The polynomials of the elements of the inertia matrix; those of zeros are empty."""
+        first, second, third = self.polynomials
+        return (first, (), ()), ((), second, ()), ((), (), third)
+
+    def at(self, time: float) -> Triple:
+        """Return the three moments (kg m2) at `time` (s)."""
+        (first, *_), (_, second, _), (*_, third) = self.matrix(float(time))
+        return first, second, third
+
+
+@dataclass(frozen=True)
+class ChangingInertia(Changing):
+    """An inertia matrix that is a polynomial of time.
+
+    The matrix is about the axes of the body. Its principal axes may rotate relative to the body.
+    The assumptions and the equations of motion are those of `ChangingMoments`.
+
+    Parameters
+    ----------
+    matrices : one to ten matrices, each of three rows of three numbers
+        The symmetric coefficients of the polynomial, in ascending order of the powers of time (s).
+        Their units are kg m2, kg m2/s, kg m2/s2, and so on.
+
+    Raises
+    ------
+    InputError
+        If a matrix is not symmetric or has a number that is not finite, or if the inertia is not
+        positive definite at time 0.
+
+    Examples
+    --------
+    >>> from pyharness import ChangingInertia, Scene, solve
+    >>> first = [[4.0, 1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 2.0]]
+    >>> rate = [[0.0, 0.5, 0.0], [0.5, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    >>> inertia = ChangingInertia([first, rate])
+    >>> inertia.at(2.0)
+    ((4.0, 2.0, 0.0), (2.0, 3.0, 0.0), (0.0, 0.0, 4.0))
+    >>> scene = Scene("boom", (0.0, 0.0, 1.0), inertia=inertia)
+    >>> solve(scene, 2.0).omega
+    array([[0. , 0. , 0.5]])
+    """
+
+    matrices: tuple[Matrix, ...]
+    place: ClassVar[str] = "inertia"
+
+    if TYPE_CHECKING:
+
+        def __init__(self, matrices: Iterable[Iterable[Numbers]]) -> None: ...
+
+    def __post_init__(self) -> None:
+        """Check the matrices, and convert their elements to floats.
+
+        Raise InputError for an invalid value.
+        """
+        # Imported only here, because the programs need no exact numbers.
+        from pyharness.model.inertia import checked_inertia, symmetric_matrix
+
+        where = "[body] inertia"
+        given = _items(where, self.matrices, _MOST + 1, _MATRICES)
+        if not 1 <= len(given) <= _MOST:
+            raise InputError(f"{where}: {_count(given, _MOST)} matrices; {_MATRICES}")
+        first = checked_inertia(f"{where} at time 0", given[0])
+        rest = (symmetric_matrix(f"{where}, power {n}", x) for n, x in enumerate(given[1:], 1))
+        object.__setattr__(self, "matrices", (first, *rest))
+        self._check_derivative()
+
+    @property
+    def elements(self) -> Sequence[Sequence[Polynomial]]:
+        """The polynomials of the elements of the inertia matrix: three rows of three."""
+        return [
+            [tuple(matrix[i][j] for matrix in self.matrices) for j in range(3)] for i in range(3)
+        ]
+
+    def at(self, time: float) -> Matrix:
+        """Return the inertia matrix (kg m2) at `time` (s)."""
+        first, second, third = ((x, y, z) for x, y, z in self.matrix(float(time)))
+        return first, second, third
+
+
+def _items(where: str, values: object, most: int, allowed: str) -> list[Any]:
+    # No more than `most` elements are read, so that an endless generator is refused.
+    return [x for x, _ in zip(number_list(where, values, allowed), range(most), strict=False)]
+
+
+def _count(given: Sequence[object], most: int) -> str:
+    return f"more than {most}" if len(given) > most else str(len(given))
+
+
+def _polynomial(where: str, values: object) -> Polynomial:
+    given = _items(where, values, _MOST + 1, _POLYNOMIALS)
+    if not 1 <= len(given) <= _MOST:
+        raise InputError(f"{where}: {_count(given, _MOST)} numbers; {_POLYNOMIALS}")
+    return tuple(finite(where, each) for each in given)

@@ -1,0 +1,115 @@
+"""First zeros of polynomials of time, and determinants of matrices of them, in exact arithmetic."""
+
+import math
+import sys
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from itertools import pairwise
+
+from pyharness.model.polynomials import Polynomial
+
+# A zero is located to this fraction of its distance from time 0.
+_CLOSE = Fraction(1, 1 << 60)
+_LARGEST = Fraction(sys.float_info.max)
+
+
+def _product(first: Sequence[Fraction], second: Sequence[Fraction]) -> list[Fraction]:
+    """Return the exact product of two polynomials."""
+    found = [Fraction(0)] * (len(first) + len(second))
+    for i, a in enumerate(first):
+        for j, b in enumerate(second):
+            found[i + j] += a * b
+    return found
+
+
+def determinant(elements: Sequence[Sequence[Polynomial]]) -> list[Fraction]:
+    """Return the determinant of a symmetric matrix of polynomials of one degree, exactly."""
+    (a, f, e), (_, b, d), (_, _, c) = ([[Fraction(x) for x in p] for p in row] for row in elements)
+    terms = ((1, (a, b, c)), (2, (d, e, f)), (-1, (a, d, d)), (-1, (b, e, e)), (-1, (c, f, f)))
+    products = [[sign * each for each in _product(_product(x, y), z)] for sign, (x, y, z) in terms]
+    return [sum(column, Fraction(0)) for column in zip(*products, strict=True)]
+
+
+def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
+    """Return the last time before 0, and the first after 0, at which a polynomial is 0.
+
+    The polynomial is above 0 at time 0. A time is infinite if there is no zero on its side.
+    """
+    exact = [Fraction(c) for c in polynomial]
+    backward = [-c if n % 2 else c for n, c in enumerate(exact)]
+    return -_first_zero(backward), _first_zero(exact)
+
+
+def _first_zero(polynomial: Sequence[Fraction]) -> float:
+    """Return the first time after 0 at which a polynomial is 0; infinity if there is none.
+
+    The polynomial is above 0 in an interval if all its coefficients in Bernstein's basis of the
+    interval are (Farouki 2012, Computer Aided Geometric Design 29). Any other interval is halved.
+    The arithmetic is exact, with integers that have a common factor.
+    """
+    if min(polynomial) >= 0:
+        return math.inf
+    divisor = math.lcm(*(c.denominator for c in polynomial))
+    whole = [int(c * divisor) for c in polynomial]
+    while not whole[-1]:
+        whole.pop()
+    exponent = _bound(whole)
+    # All zeros are between 0 and 2**exponent s; the time over this bound is the new unknown.
+    least = min(0, exponent * (len(whole) - 1))
+    row = _bernstein([c << (exponent * n - least) for n, c in enumerate(whole)])
+    unit = Fraction(2) ** exponent
+    pieces = [(Fraction(0), Fraction(1), row)]
+    while pieces:
+        begin, end, row = pieces.pop()
+        if begin * unit > _LARGEST:
+            return math.inf
+        if min(row) > 0:
+            continue
+        if row[0] <= 0 or end - begin <= _CLOSE * begin:
+            return float(begin * unit)
+        middle = (begin + end) / 2
+        early, late = _halves(row)
+        pieces += [(middle, end, late), (begin, middle, early)]
+    return math.inf
+
+
+def _bound(polynomial: Sequence[int]) -> int:
+    """Return the exponent of a power of two that no positive zero of a polynomial exceeds.
+
+    The bound is that of Kioustelidis (1986, Journal of Computational and Applied Mathematics 16),
+    rounded up.
+    """
+    degree, last = len(polynomial) - 1, polynomial[-1]
+    return 1 + max(
+        -((last.bit_length() - 1 - c.bit_length()) // (degree - n))
+        for n, c in enumerate(polynomial[:-1])
+        if c * last < 0
+    )
+
+
+def _bernstein(polynomial: Sequence[int]) -> list[int]:
+    """Return the coefficients in Bernstein's basis of the interval 0 to 1, times a common factor.
+
+    The argument has the coefficients of the powers of the unknown.
+    """
+    degree = len(polynomial) - 1
+    factor = math.lcm(*(math.comb(degree, j) for j in range(degree + 1)))
+    parts = [c * (factor // math.comb(degree, j)) for j, c in enumerate(polynomial)]
+    return [
+        sum(math.comb(k, j) * part for j, part in enumerate(parts[: k + 1]))
+        for k in range(degree + 1)
+    ]
+
+
+def _halves(row: list[int]) -> tuple[list[int], list[int]]:
+    """Return the Bernstein coefficients of the two halves of an interval (de Casteljau).
+
+    They have the common factor 2**degree, so that they are integers.
+    """
+    degree = len(row) - 1
+    early, late = [row[0] << degree], [row[-1] << degree]
+    for n in range(degree - 1, -1, -1):
+        row = [a + b for a, b in pairwise(row)]
+        early.append(row[0] << n)
+        late.append(row[-1] << n)
+    return early, late[::-1]

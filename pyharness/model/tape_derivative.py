@@ -1,0 +1,109 @@
+"""Derivatives of a tape with respect to its inputs, as another tape."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pyharness.model.symbols import MOST_OPERATIONS, Recorder
+from pyharness.model.tape import Functions, Table, Tape, evaluate
+
+# A derivative may have more operations than a recorded torque, because no kernel reads it.
+_MORE = 100
+
+
+def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
+    """Return a tape with the outputs of `tape`, followed by their partial derivatives.
+
+    The derivatives of the first output with respect to the inputs in `slots` come first, then those
+    of the second output, and so on. The chain rule is applied to the operations one by one (forward
+    differentiation), so that the derivatives are exact. The derivative of a table is the derivative
+    of the piece that holds at the time.
+    """
+    recorder = Recorder(_MORE * MOST_OPERATIONS)
+    inputs = [
+        _Dual(symbol, [float(slot == each) for each in slots])
+        for slot, symbol in enumerate(recorder.inputs())
+    ]
+    found = [_dual(each, len(slots)) for each in evaluate(tape, inputs, _DUALS)]
+    values, slopes = [each.value for each in found], [each.slopes for each in found]
+    return recorder.tape([*values, *(slope for row in slopes for slope in row)])
+
+
+class _Dual:
+    """A value, and its derivatives with respect to some inputs; all are symbols or floats."""
+
+    def __init__(self, value: Any, slopes: list[Any]) -> None:
+        self.value, self.slopes = value, slopes
+
+    def chained(self, value: Any, slope: Any) -> "_Dual":
+        """Return a function of this number, from its value and its derivative."""
+        return _Dual(value, [slope * each for each in self.slopes])
+
+    def __add__(self, other: Any) -> "_Dual":
+        second = _dual(other, len(self.slopes))
+        slopes = [x + y for x, y in zip(self.slopes, second.slopes, strict=True)]
+        return _Dual(self.value + second.value, slopes)
+
+    __radd__ = __add__
+
+    def __mul__(self, other: Any) -> "_Dual":
+        second = _dual(other, len(self.slopes))
+        slopes = [
+            x * second.value + self.value * y
+            for x, y in zip(self.slopes, second.slopes, strict=True)
+        ]
+        return _Dual(self.value * second.value, slopes)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> "_Dual":
+        second = _dual(other, len(self.slopes))
+        quotient = self.value / second.value
+        slopes = [
+            (x + -1.0 * quotient * y) / second.value
+            for x, y in zip(self.slopes, second.slopes, strict=True)
+        ]
+        return _Dual(quotient, slopes)
+
+    def __rtruediv__(self, other: float) -> "_Dual":
+        return _dual(other, len(self.slopes)) / self
+
+
+def _dual(value: Any, count: int) -> _Dual:
+    return value if isinstance(value, _Dual) else _Dual(value, [0.0] * count)
+
+
+def _sqrt(x: Any) -> Any:
+    if not isinstance(x, _Dual):
+        return math.sqrt(x)
+    root = np.sqrt(x.value)
+    return x.chained(root, 0.5 / root)
+
+
+def _exp(x: Any) -> Any:
+    if not isinstance(x, _Dual):
+        return math.exp(x)
+    value = np.exp(x.value)
+    return x.chained(value, value)
+
+
+def _sine(x: Any) -> Any:
+    return x.chained(np.sin(x.value), np.cos(x.value)) if isinstance(x, _Dual) else math.sin(x)
+
+
+def _cosine(x: Any) -> Any:
+    if not isinstance(x, _Dual):
+        return math.cos(x)
+    return x.chained(np.cos(x.value), -1.0 * np.sin(x.value))
+
+
+def _of_table(table: Table, time: _Dual) -> _Dual:
+    slopes = tuple((c1, 2.0 * c2, 3.0 * c3, 0.0) for _, c1, c2, c3 in table.pieces)
+    return time.chained(
+        time.value.of_table(table), time.value.of_table(Table(table.breaks, slopes))
+    )
+
+
+_DUALS: Functions[Any] = Functions(float, _sqrt, _exp, _sine, _cosine, _of_table)

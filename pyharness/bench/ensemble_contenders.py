@@ -55,6 +55,11 @@ class EnsembleLoad:
         return Scene(self.name, (0.0, 0.0, 0.0), MOMENTS)
 
     @property
+    def horizon(self) -> float:
+        """Return the end time (s)."""
+        return HORIZON
+
+    @property
     def acceleration(self) -> Array:
         """Return each body's torque divided by its moments of inertia, shape (n, 3), in rad/s2."""
         if self.torque is None:
@@ -131,13 +136,13 @@ def _own(method: str) -> EnsembleMaker:
     def prepare(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
         # Each call writes its results into the arrays of the previous call.
         tolerance = setting if method == "taylor" else None
-        step = HORIZON / setting if method == "rk4" else None
+        step = load.horizon / setting if method == "rk4" else None
         kept = None
 
         def run() -> Array:
             nonlocal kept
             kept = solve_many(
-                load.scene, HORIZON, omega0=load.omega0, torque_constant=load.torque,
+                load.scene, load.horizon, omega0=load.omega0, torque_constant=load.torque,
                 method=method, tolerance=tolerance, step=step, threads=threads, out=kept,
             )  # fmt: skip
             return kept.omega

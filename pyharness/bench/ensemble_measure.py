@@ -149,12 +149,13 @@ def measure_ensembles(
     contenders: Sequence[EnsembleContender],
     seed: str,
     progress: Progress = no_progress,
+    least: int = 64,
 ) -> Rates:
     """Measure the speed of all contenders (solvers) on all loads, at all target errors.
 
     A load is a set of bodies. On the last load, the contenders that run RK4 are also measured with
     the fixed number of steps `STEPS`. `seed`, from which the loads were drawn, is only recorded in
-    the result.
+    the result. A call solves at least `least` bodies, if the load has as many.
     """
     found = Rates(seed, loads[0].n)
     n_tasks, done = len(loads) * len(TARGETS) + 1, 0
@@ -167,13 +168,13 @@ def measure_ensembles(
             def say(text: str, done: int = done, place: str = task.place) -> None:
                 progress(done, n_tasks, f"{place}: {text}")
 
-            found.rows.extend(_rates(task, contenders, found, say))
+            found.rows.extend(_rates(task, contenders, found, say, least))
             done += 1
     return found
 
 
 def _rates(
-    task: _Task, contenders: Sequence[EnsembleContender], found: Rates, say: Say
+    task: _Task, contenders: Sequence[EnsembleContender], found: Rates, say: Say, least: int
 ) -> Iterator[Rate]:
     ready: list[tuple[Rate, Callable[[], Array]]] = []
     for each in filter(task.takes, contenders):
@@ -185,7 +186,7 @@ def _rates(
                 continue
             shown = None if each.setting == "none" else setting
             for threads in each.threads:
-                load, run = _enough(each.prepare, task.load, setting, threads)
+                load, run = _enough(each.prepare, task.load, setting, threads, least)
                 rate = Rate(load.name, task.target, each.name, threads, shown, load.n, 0.0,
                             task.error(run()))  # fmt: skip
                 ready.append((rate, run))
@@ -214,16 +215,16 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
 
 
 def _enough(
-    prepare: EnsembleMaker, load: EnsembleLoad, setting: float, threads: int
+    prepare: EnsembleMaker, load: EnsembleLoad, setting: float, threads: int, least: int
 ) -> tuple[EnsembleLoad, Callable[[], Array]]:
     """Return a load with the first bodies of `load`, and a function that solves these bodies.
 
     A load is a set of bodies. The number of bodies is chosen so that a call of the function takes
     long enough to be timed. If `load` has too few bodies, all of them are used. `prepare` makes the
-    function. `setting` is the tolerance or the number of steps, and `threads` the number of
-    threads.
+    function. `setting` is the tolerance or the number of steps, `threads` the number of threads,
+    and `least` the smallest number of bodies.
     """
-    n, before = min(load.n, 64), 0.0
+    n, before = min(load.n, least), 0.0
     while True:
         part = load.part(slice(0, n))
         run = prepare(part, setting, threads)

@@ -14,6 +14,9 @@ from pyharness.bench.ensemble_contenders import (
     EnsembleLoad,
     coefficients,
 )
+from pyharness.bench.heyoka_equations import heyoka_equations
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 
 _BLOCK = 4096  # bodies whose arrays fit into the cache
@@ -24,7 +27,7 @@ def ensemble_peers() -> list[EnsembleContender]:
     one = EnsembleContender
     blocks, alone = partial(compiled.numba_rk4, True), partial(compiled.numba_rk4, False)
     return [
-        one("heyoka-batch", "tolerance", _heyoka_batch, (1,), package="heyoka"),
+        one("heyoka-batch", "tolerance", heyoka_batch, (1,), package="heyoka"),
         one("heyoka-ensemble", "tolerance", _heyoka_ensemble, package="heyoka"),
         one("numba-blocks-rk4", "steps", blocks, package="numba"),
         one("numba-bodies-rk4", "steps", alone, package="numba"),
@@ -35,19 +38,24 @@ def ensemble_peers() -> list[EnsembleContender]:
     ]
 
 
-def _heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
+def heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
     """Return a function that integrates all bodies of a load with one heyoka batch integrator.
 
     A load is a set of bodies with their initial omegas and torques. For each batch of bodies in
     turn, the function sets the state and the torque of the integrator. It returns omega of the
-    bodies at the end time `HORIZON` (rad/s), shape (n, 3). `setting` is the tolerance, and
+    bodies at the end time of the load (rad/s), shape (n, 3). `setting` is the tolerance, and
     `threads` has no effect.
     """
     import heyoka
 
     size = heyoka.recommended_simd_size()
-    integrator = _integrator(load.torque is not None, setting, size)
-    starts, torques = _batches(load.omega0, size), _batches(load.acceleration, size)
+    of_state = isinstance(load.scene.torque, StateTorque)
+    scene = load.scene if of_state else None
+    integrator = _integrator(load.torque is not None, setting, size, scene)
+    first = load.omega0
+    if load.scene.attitude is not None:
+        first = np.hstack([first, np.tile(load.scene.attitude, (load.n, 1))])
+    starts, torques = _batches(first, size), _batches(load.acceleration, size)
     ends = np.empty_like(starts)
     state, parameters = integrator.state, integrator.pars
 
@@ -57,9 +65,9 @@ def _heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[
             state[:] = starts[k]
             if len(parameters):
                 parameters[:] = torques[k]
-            integrator.propagate_until(HORIZON)
+            integrator.propagate_until(load.horizon)
             ends[k] = state
-        return ends.transpose(0, 2, 1).reshape(-1, 3)[: load.n]
+        return ends.transpose(0, 2, 1).reshape(-1, first.shape[1])[: load.n, :3]
 
     return run
 
@@ -89,7 +97,12 @@ def _heyoka_ensemble(load: EnsembleLoad, setting: float, threads: int) -> Callab
 
 
 @cache
-def _integrator(with_torque: bool, tolerance: float, size: int) -> Any:
+def _integrator(with_torque: bool, tolerance: float, size: int, scene: Scene | None = None) -> Any:
+    """Return a batch integrator of `size` bodies, compiled for a tolerance.
+
+    The bodies are those of the benchmark, with a constant torque if `with_torque`. If `scene` is
+    not None, they are those of a scene whose torque depends on the state.
+    """
     import heyoka
 
     x, y, z = heyoka.make_vars("x", "y", "z")
@@ -97,21 +110,22 @@ def _integrator(with_torque: bool, tolerance: float, size: int) -> Any:
     rates = [a * y * z, b * x * z, c * x * y]
     if with_torque:
         rates = [rate + heyoka.par[axis] for axis, rate in enumerate(rates)]
-    start = np.ones((3, size))
-    return heyoka.taylor_adaptive_batch(
-        list(zip((x, y, z), rates, strict=True)), start, tol=tolerance, compact_mode=False
-    )
+    equations = list(zip((x, y, z), rates, strict=True))
+    if scene is not None:
+        equations = heyoka_equations(scene)
+    start = np.ones((len(equations), size))
+    return heyoka.taylor_adaptive_batch(equations, start, tol=tolerance, compact_mode=False)
 
 
 def _batches(rows: Array, size: int) -> Array:
-    """Return the array `rows`, with three numbers for each body, divided into batches of bodies.
+    """Return the array `rows`, with k numbers for each body, divided into batches of bodies.
 
-    A batch has `size` bodies, and the result has the shape (batches, 3, size). The last batch is
+    A batch has `size` bodies, and the result has the shape (batches, k, size). The last batch is
     padded with copies of the last row.
     """
     lacking = -len(rows) % size
     filled = np.concatenate([rows, np.repeat(rows[-1:], lacking, axis=0)])
-    return np.ascontiguousarray(filled.reshape(-1, size, 3).transpose(0, 2, 1))
+    return np.ascontiguousarray(filled.reshape(-1, size, rows.shape[1]).transpose(0, 2, 1))
 
 
 def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:

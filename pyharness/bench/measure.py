@@ -10,14 +10,14 @@ calls alike. The median over the rounds counts.
 import math
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numpy as np
 
 from pyharness.bench.contenders import Maker, SceneContender
 from pyharness.compare.candidates import End, Ready, not_finite
-from pyharness.compare.timing import ended_after, seconds, silenced
+from pyharness.compare.timing import Clock, ended_after, seconds, silenced
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
@@ -50,16 +50,19 @@ class Workload:
     """A task of the benchmark: a scene, and the time T up to which its motion is integrated."""
 
     # For a case the label is its number, with an `L` if T = 100 s (`3L`), or with any other T that
-    # is not 3 s. For a random scene it is the number of the scene.
+    # is not 3 s. For a random scene it is the number of the scene, and for a torque term its name.
     label: str
     scene: Scene
     horizon: float  # T, s
-    # Only for a random scene: its kinds, its solution, its error amplification, and the number of
-    # revolutions of the body.
+    # Only for a scene that is not a case: its kinds, its solution, its error amplification, and the
+    # number of revolutions of the body.
     kinds: tuple[str, ...] = ()
     truth: Reference | None = None
     growth: float = 0.0
     turns: float = 0.0
+    # Errors of omega are relative to this angular velocity (rad/s), or to the largest component of
+    # the true omega at T if that is larger.
+    scale: float = 0.0
 
     @property
     def place(self) -> str:
@@ -91,11 +94,13 @@ class Row:
     kind: str  # quantity that is varied: "tolerance", "steps" or "none"
     setting: float | None  # value of this quantity; None if the contender has no setting
     seconds: float | None  # median time (s) of a call; None if the call failed
-    # Error of omega at T, relative to the largest component of the true omega at T, or the error of
-    # the attitude (rad) if it is larger. None if the call failed.
+    # Error of omega at T, relative to the largest component of the true omega at T or to the scale
+    # of the workload, or the error of the attitude (rad) if it is larger. None if the call failed.
     error: float | None
     evaluations: int | None  # evaluations of the right-hand side in a call, if they are counted
     note: str = ""  # reason why the call failed
+    # Time (s) in which the call was prepared and, if needed, compiled.
+    preparing: float = field(default=0.0, compare=False)
 
 
 @dataclass(frozen=True)
@@ -159,12 +164,14 @@ def measure(
     loads: Sequence[Workload],
     contenders: Sequence[SceneContender],
     progress: Progress = no_progress,
+    clock: Clock | None = None,
 ) -> Finding:
     """Run every contender (solver) on every workload in `loads`; return the times and errors.
 
     A workload is a scene with an end time. `progress` is called with a message before each part of
-    the work.
+    the work. `clock` is the clock (s) of all calls, by default the wall clock.
     """
+    clock = clock or perf_counter
     found = Finding(list(loads), [], [], {}, {})
     makers: dict[tuple[int | str, str], Maker] = {}
     for number, load in enumerate(loads, 1):
@@ -175,10 +182,11 @@ def measure(
         tell("reference")
         truth = load.truth or reference(load.scene, [load.horizon], precise=True)
         size = float(np.abs(truth.omega).max(initial=0.0)) or 1.0
-        found.doubt[load.label] = max(truth.estimate / size, truth.angle_estimate)
+        doubt = max(truth.estimate / size, truth.angle_estimate)
+        found.doubt[load.label] = max(doubt, found.doubt.get(load.label, 0.0))
         entries: list[tuple[Ready, Row]] = []
-        if load.kinds:
-            makers.clear()  # no random scene occurs twice
+        if load.kinds and load.label != loads[number - 2].label:
+            makers.clear()  # no such scene occurs again
         for contender in contenders:
             if load.scene.attitude is not None and not contender.attitude:
                 found.refused.append(
@@ -188,33 +196,34 @@ def measure(
             tell(contender.name)
             key = (load.scene.case or load.label, contender.name)
             # The same compiled code is used for all end times of a scene.
-            begin = perf_counter()
+            begin = clock()
             try:
                 if key not in makers:
                     makers[key] = contender.prepare(load.scene)
             except InputError as error:
                 found.refused.append(Refusal(load, contender.name, None, str(error)))
                 continue
-            spent = perf_counter() - begin
-            first, more = _first_calls(load, contender, makers[key], truth, found.refused)
+            spent = clock() - begin
+            first, more = _first_calls(load, contender, makers[key], truth, found.refused, clock)
             found.preparation[key] = found.preparation.get(key, 0.0) + spent + more
             entries += first
         running = [ready.run for ready, row in entries if row.error is not None]
-        times = iter(seconds(running, _BATCH, _ROUNDS, tell))
+        clocks = [clock] * len(running)
+        times = iter(seconds(running, _BATCH, _ROUNDS, tell, clocks=clocks))
         for _, row in entries:
             median = None if row.error is None else next(times)
             found.rows.append(replace(row, seconds=median))
     return found
 
 
-def error_of(end: End, truth: Reference) -> float | None:
+def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
     """Return the error of a solver's result `end` against the reference solution `truth`.
 
-    It is the relative error of omega. If `truth` has an attitude, it is the relative error of omega
-    or the angular error of the attitude (rad), whichever is larger. Return None if the result is
-    not finite, or if a required attitude is missing.
+    It is the error of omega, as `relative_error` returns it for the same `scale`. If `truth` has an
+    attitude, it is the error of omega or the angular error of the attitude (rad), whichever is
+    larger. Return None if the result is not finite, or if a required attitude is missing.
     """
-    error = relative_error(end.omega, truth)
+    error = relative_error(end.omega, truth, scale)
     if error is None or truth.attitude is None:
         return error
     if end.attitude is None or not np.isfinite(end.attitude).all() or not end.attitude.any():
@@ -226,11 +235,12 @@ def error_of(end: End, truth: Reference) -> float | None:
     return max(error, float(angle_between(attitude[None], truth.attitude)[0]))
 
 
-def relative_error(omega: Array, truth: Reference) -> float | None:
+def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float | None:
     """Return the largest error of a computed omega, relative to the largest component of `truth`.
 
-    `omega` has the shape (3,), in rad/s. `truth` is the reference solution at the same time. Return
-    None if the error is not finite, or if the reference does not reach the time.
+    `omega` has the shape (3,), in rad/s. `truth` is the reference solution at the same time. The
+    error is relative to `scale` (rad/s) if that is larger. Return None if the error is not finite,
+    or if the reference does not reach the time.
     """
     if len(truth.omega) == 0:
         return None
@@ -239,7 +249,7 @@ def relative_error(omega: Array, truth: Reference) -> float | None:
     difference = omega - truth.omega[0]
     if truth.remainder is not None:
         difference -= truth.remainder[0]
-    size = float(np.abs(truth.omega[0]).max()) or 1.0
+    size = max(float(np.abs(truth.omega[0]).max()), scale) or 1.0
     error = float(np.abs(difference).max()) / size
     return error if math.isfinite(error) else None
 
@@ -268,15 +278,16 @@ def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[
 
 
 def _first_calls(
-    load: Workload, contender: SceneContender, make: Maker, truth: Reference, refused: list[Refusal]
-) -> tuple[list[tuple[Ready, Row]], float]:
+    load: Workload, contender: SceneContender, make: Maker, truth: Reference,
+    refused: list[Refusal], clock: Clock,
+) -> tuple[list[tuple[Ready, Row]], float]:  # fmt: skip
     """Prepare the calls of one contender for one workload, one for each setting, and try them.
 
     A contender is a solver. A workload is a scene with an end time, and a setting is a tolerance or
     a number of steps. Return the calls, each with its result, and the total time (s) of preparing
     them, without the time of the calls themselves. `make` prepares a call for an end time (s) and a
     setting. `truth` is the reference solution. Settings that cannot be run are appended to
-    `refused`.
+    `refused`. `clock` is the clock (s) of the calls.
     """
     entries: list[tuple[Ready, Row]] = []
     errors: list[float | None] = []
@@ -296,14 +307,14 @@ def _first_calls(
             refused.append(Refusal(load, contender.name, setting, reason))
             break
         try:
-            begin = perf_counter()
+            begin = clock()
             with silenced(), ended_after(_LONGEST_FIRST):
                 warnings.simplefilter("error", UserWarning)
                 ready = make(load.horizon, setting)
                 ready.run()
-                middle = perf_counter()
+                middle = clock()
                 result = ready.run()
-                first = perf_counter() - middle
+                first = clock() - middle
                 end = ready.read(result)
         except InputError as refusal:
             refused.append(Refusal(load, contender.name, named, str(refusal)))
@@ -312,17 +323,18 @@ def _first_calls(
             reason = f"{type(failure).__name__}: {' '.join(str(failure).split())}"
             refused.append(Refusal(load, contender.name, setting, reason))
             continue
-        preparing += max(0.0, middle - begin - first)
+        own = max(0.0, middle - begin - first)
+        preparing += own
         spent += first
         before, last = last, first
-        error = error_of(end, truth)
+        error = error_of(end, truth, load.scale)
         if error is None and end.has_result:
             end = not_finite()
         errors.append(error)
         counted = None if error is None else end.evaluations
         note = "" if end.ended == "complete" else end.ended
         name, kind = contender.name, contender.setting
-        entries.append((ready, Row(load, name, kind, named, None, error, counted, note)))
+        entries.append((ready, Row(load, name, kind, named, None, error, counted, note, own)))
         if kind == "steps" and _at_rounding(errors):
             break
     return entries, preparing

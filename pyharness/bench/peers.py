@@ -9,11 +9,13 @@ import numpy as np
 
 from pyharness.bench import compiled_peers as compiled
 from pyharness.bench.contenders import TOLERANCES, Maker, SceneContender, refuse_rounding
+from pyharness.bench.heyoka_equations import Formula, heyoka_equations
 from pyharness.bench.orekit_peer import orekit
 from pyharness.compare.candidates import End, Ready, not_finite
+from pyharness.dynamics.system import slopes_of
 from pyharness.methods.scipy_ivp import RightHandSide, state_of, with_attitude
 from pyharness.model.scene import Scene
-from pyharness.truth.reference import exact_coefficients
+from pyharness.model.state_torque import StateTorque
 
 _SOLVE_IVP = ("DOP853", "RK45", "LSODA", "Radau")
 
@@ -36,7 +38,7 @@ def peers() -> list[SceneContender]:
         return SceneContender(f"numba-{name}", "steps", prepare, order=order, package="numba")
 
     return [
-        adaptive("heyoka", "heyoka", _heyoka),
+        adaptive("heyoka", "heyoka", heyoka_maker),
         fixed("rk4", 4),
         fixed("dop8", 8),
         adaptive("numbalsoda-dop853", "numbalsoda", partial(compiled.numbalsoda, "dop853")),
@@ -52,20 +54,25 @@ def peers() -> list[SceneContender]:
     ]
 
 
-def _heyoka(scene: Scene) -> Maker:
+def heyoka_maker(scene: Scene, formula: Formula | None = None) -> Maker:
     """Return a function that prepares timed runs of the package heyoka on a scene.
 
     The function takes the end time (s) and the tolerance, and compiles one integrator for each
-    tolerance. Each timed run first resets the integrator's time and state.
+    tolerance. Each timed run first resets the integrator's time and state. `formula` is that of
+    `heyoka_equations`.
     """
     import heyoka
 
-    equations = _heyoka_equations(scene)
+    equations = heyoka_equations(scene, formula)
     integrators: dict[float, Any] = {}
     start = np.array(state_of(scene))
 
     def make(horizon: float, setting: float) -> Ready:
         if setting not in integrators:
+            # The time of the compilation is measured, so that no code of an earlier one is used.
+            heyoka.llvm_state.clear_memcache()
+            if hasattr(heyoka.llvm_state, "set_diskcache_enabled"):
+                heyoka.llvm_state.set_diskcache_enabled(False)
             integrators[setting] = heyoka.taylor_adaptive(
                 equations, start.tolist(), tol=setting, compact_mode=False
             )
@@ -86,24 +93,14 @@ def _heyoka(scene: Scene) -> Maker:
     return make
 
 
-def _heyoka_equations(scene: Scene) -> list[tuple[Any, Any]]:
-    import heyoka
-
-    unknowns = compiled.state_names(scene)
-    state = heyoka.make_vars(*unknowns)
-    names = {"sin": heyoka.sin, "cos": heyoka.cos, "t": heyoka.time}
-    names |= dict(zip(unknowns, state, strict=True))
-    coefficients = [float(each) for each in exact_coefficients(scene)]
-    rates = [eval(rate, names) for rate in compiled.rates(scene, "t", unknowns, coefficients)]
-    return [(x, heyoka.expression(rate)) for x, rate in zip(state, rates, strict=True)]
-
-
 def _right_hand_side(scene: Scene) -> RightHandSide:
     """Return the right-hand side of a scene's equations of motion, for SciPy's integrators.
 
     It computes with Python floats, not with arrays. The unknowns are omega, and also the attitude
     quaternion if the scene has an attitude.
     """
+    if isinstance(scene.torque, StateTorque):
+        return slopes_of(scene)
     slopes = scene.right_hand_side()
     return slopes if scene.attitude is None else with_attitude(slopes)
 

@@ -20,8 +20,8 @@ class Score:
     """
 
     method: str  # name of the contender
-    # For each error in `TARGETS`, the time (s) of the fastest setting that reaches this error; None
-    # if no setting reaches it.
+    # For each target error, the time (s) of the fastest setting that reaches it; None if no setting
+    # does.
     seconds: tuple[float | None, ...]
     best: float | None  # the smallest error of any setting
     # For each error, the baseline's time divided by this contender's time; it is above 1 if this
@@ -57,12 +57,12 @@ def yardstick(finding: Finding) -> str | None:
     return next((name for name in (*YARDSTICKS, *names) if name in names), None)
 
 
-def scores(finding: Finding, load: Workload) -> list[Score]:
+def scores(finding: Finding, load: Workload, targets: Sequence[float] = TARGETS) -> list[Score]:
     """Return the scores of all contenders (solvers) on the workload `load`.
 
     A workload is a scene with an end time. A score has the times in which a contender reaches the
-    target errors. The score of the baseline contender is the first; the others are in the order of
-    measurement.
+    errors `targets`. The score of the baseline contender is the first; the others are in the order
+    of measurement.
     """
     rows: dict[str, list[Row]] = {}
     for row in finding.rows:
@@ -70,10 +70,10 @@ def scores(finding: Finding, load: Workload) -> list[Score]:
             rows.setdefault(row.method, []).append(row)
     first = yardstick(finding)
     names = sorted(rows, key=lambda name: name != first)
-    by = [_time_to(rows.get(first or "", []), target) for target in TARGETS]
+    by = [_time_to(rows.get(first or "", []), target) for target in targets]
     found = []
     for name in names:
-        seconds = tuple(_time_to(rows[name], target) for target in TARGETS)
+        seconds = tuple(_time_to(rows[name], target) for target in targets)
         errors = [row.error for row in rows[name] if row.error is not None]
         ratios = tuple(map(_ratio, by, seconds))
         found.append(Score(name, seconds, min(errors, default=None), ratios))
@@ -104,7 +104,7 @@ def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float |
     nowhere = (None,) * len(TARGETS)
     return {
         name: list(
-            map(_geometric_mean, zip(*(table.get(name, nowhere) for table in tables), strict=True))
+            map(geometric_mean, zip(*(table.get(name, nowhere) for table in tables), strict=True))
         )
         for name in names
     }
@@ -138,7 +138,7 @@ def _spread(
     known = [each[place] for each in found if each is not None]
     ratios = [ratio for ratio in known if ratio is not None]
     low, middle, high = np.percentile(ratios, (25, 50, 75)).tolist() if ratios else [None] * 3
-    mean = _geometric_mean(ratios) if ratios else None
+    mean = geometric_mean(ratios) if ratios else None
     least, quartiles = min(ratios, default=None), (low, middle, high)
     return Spread(name, kind, TARGETS[place], len(found), len(ratios), mean, least, quartiles)
 
@@ -156,7 +156,8 @@ def _ratio(by: float | None, seconds: float | None) -> float | None:
     return by / seconds if by is not None and seconds else None
 
 
-def _geometric_mean(ratios: Sequence[float | None]) -> float | None:
+def geometric_mean(ratios: Sequence[float | None]) -> float | None:
+    """Return the geometric mean of several ratios, or None if one of them is None."""
     known = [ratio for ratio in ratios if ratio is not None]
     if len(known) < len(ratios):
         return None

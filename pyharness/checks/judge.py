@@ -14,7 +14,8 @@ from pyharness.model.attitude import angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
-from pyharness.theory.conditioning import LIVELY, Conditioning, conditioning
+from pyharness.theory.conditioning import LIVELY, Conditioning
+from pyharness.theory.state_conditioning import conditioning_at
 from pyharness.truth.reference import reference
 
 # Relative error beyond which the linearised flow no longer predicts the error.
@@ -198,7 +199,7 @@ def reference_truth(
     to the last time, which is computed if it is not given. Raise InputError if the solution does
     not reach all times.
     """
-    flow = flow or conditioning(scene, times[-1])
+    flow = flow or conditioning_at(scene, times)
     # The reference's steps are accurate to 1e-22. The precise series is requested where the flow
     # amplifies errors by more than 1e3.
     known = reference(scene, times, precise=flow.amplification > 1e3, effort=effort)

@@ -17,6 +17,7 @@ from pyharness.checks.golden import golden
 from pyharness.checks.methods import attitudes, methods, prepared
 from pyharness.checks.orders import orders
 from pyharness.checks.random_methods import random_attitudes, random_methods
+from pyharness.checks.random_torques import random_torques
 from pyharness.checks.schemes import schemes
 from pyharness.checks.selection import Selection
 from pyharness.checks.stops import stops
@@ -57,9 +58,12 @@ KINDS: dict[str, Callable[[Selection], Attempts]] = {
     # compared with `solve_ivp`, methods with a fixed step with the reference.
     "orders": orders,
     # Programs, methods and attitudes in scenes drawn from a seed, half of them of the difficult
-    # kinds in `NASTY`.
+    # kinds in `NASTY`; and methods under torques that depend on omega or attitude.
     "random": lambda chosen: chain(
-        random_programs(chosen), random_methods(chosen), random_attitudes(chosen)
+        random_programs(chosen),
+        random_methods(chosen),
+        random_attitudes(chosen),
+        random_torques(chosen),
     ),
     # Methods and programs against published results that were not computed here.
     "external": _external,

@@ -6,6 +6,7 @@ the reference, because no other method computes it.
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
@@ -20,6 +21,7 @@ from pyharness.methods.solve import finest
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
@@ -30,6 +32,8 @@ _IVP = "dop853"
 # one. The largest deficit that occurs is .006.
 _PAIRS = 4
 _ORDER_SLACK = 0.2
+# Steps of the first of the runs from which an order is measured in any scene, and of the last.
+_FEWEST, _MOST = 16, 4096
 
 
 def orders(chosen: Selection) -> Iterator[Attempt]:
@@ -74,6 +78,32 @@ def _of_method(scene: Scene, truth: Callable[[], Reference], name: Name) -> Chec
     return judged_order(
         name, order_of(scene, lambda each: run.rows(each).omega, due, truth(), pairs=_PAIRS)
     )
+
+
+def in_few_steps(scene: Scene, time: float) -> Scene:
+    """Return a scene with the few steps until `time` (s) from which an order is measured."""
+    return replace(scene, step_size=time / _FEWEST, steps=_FEWEST)
+
+
+def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
+    """Return the check of the order of a fixed-step method, in any scene of a user or of a draw.
+
+    `scene` has the few steps of `in_few_steps`, and ``truth()`` returns its reference solution.
+    `name` has the method as its subject or as its setting. The order is only described if the scene
+    is too fast or too sensitive for so few steps. The same applies if the torque has a table,
+    because steps of a fixed size do not end where it changes, so that the order is lower.
+    """
+    method = name.setting or name.subject
+    run, due = method_candidate(method, 1.0), METHODS[method].order
+    found = order_of(scene, lambda each: run.rows(each).omega, due, truth(), most_steps=_MOST)
+    if found.is_judged and not _has_tables(scene):
+        return judged_order(name, found)
+    return name.described(None, str(found))
+
+
+def _has_tables(scene: Scene) -> bool:
+    tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
+    return tape is not None and any(each.table for each in tape.operations)
 
 
 def judged_order(name: Name, found: Order) -> Check:

@@ -212,10 +212,10 @@ def _sampled(
     chosen: Selection, number: int, entrances: Entrances, truth: Truth, policy: Policy
 ) -> Iterator[Attempt]:
     for subject, tried in entrances.items():
-        yield Attempt(chosen.drawn(number, subject), partial(_sample, tried, truth, policy))
+        yield Attempt(chosen.drawn(number, subject), partial(sample, tried, truth, policy))
 
 
-def _sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: Name) -> Sample:
+def sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: Name) -> Sample:
     """Run a solver and return the check of its error, within the limit of the policy.
 
     `tried` makes the run, and `truth` is the true solution. `policy` sets the limit of the error,

@@ -1,6 +1,6 @@
 """Stress trials: checks of methods under extreme conditions, with bounds derived beforehand."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -13,6 +13,8 @@ TRIALS = (
     *("separatrix", "near-symmetry", "shapes", "scales", "torque", "length", "step-size"),
     *("regions", "invariance", "attitude", "matrices", "threads"),
 )
+# The trials that can be made of any scene (`pyharness.checks.scene_trials`).
+SCENE_TRIALS = ("length", "step-size", "invariance", "threads")
 LISTINGS = tuple(f(program) for program in PROGRAMS for f in (Listing.original, Listing.corrected))
 
 named = partial(Name, command="stress")
@@ -47,13 +49,17 @@ def trial(name: str) -> Trial:
     return found
 
 
-def stress(only: Sequence[str] = ()) -> Iterator[Check]:
+def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) -> Iterator[Check]:
     """Yield the checks of `pyharness stress` whose ids begin with an element of `only`.
 
+    `trials` are the trials to make, by name; by default they are all trials of `TRIALS`.
     An element is the leading part of an id, as in ``separatrix/taylor``. The first part of an id is
     a trial, which is a group of checks. If `only` is empty, yield all checks of all trials.
     """
-    suites = {name: lambda name=name: trial(name).attempts(only) for name in TRIALS}
+    suites = {
+        name: lambda name=name: (trials[name] if trials else trial(name)).attempts(only)
+        for name in trials or TRIALS
+    }
     return run_suites(suites, only, "stress")
 
 

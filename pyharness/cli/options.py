@@ -129,13 +129,15 @@ def chosen_scene(
     any_axes: bool = False,
     any_torque: bool = False,
     any_state: bool = False,
+    changing: bool = False,
 ) -> Scene:
     """Return the scene that --case or --scene requests, as changed by further options.
 
     The further options are --omega0, --step-size and --steps. Print a warning if no rigid body can
     have the scene's moments of inertia, or if its attitude was normalised. Raise InputError for a
     full inertia matrix unless `any_axes` is true, for a torque about the axes of space unless
-    `any_torque` is true, and for a torque that depends on the state unless `any_state` is true.
+    `any_torque` is true, for a torque that depends on the state unless `any_state` is true, and for
+    an inertia that changes with time unless `changing` is true.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -156,7 +158,7 @@ def chosen_scene(
         changes["steps"] = whole(options.steps, "--steps")
     if abs(scene.attitude_length - 1.0) > NEAR_ONE:
         warn(f"the attitude has {_norm(scene.attitude_length)}; it was normalised")
-    scene = checked_scene(replace(scene, **changes), any_axes, any_torque, any_state)
+    scene = checked_scene(replace(scene, **changes), any_axes, any_torque, any_state, changing)
     if scene.is_impossible:
         warn("no rigid body has these moments, one exceeds the sum of the others; run all the same")
     return scene

@@ -26,35 +26,39 @@ class Accuracy:
     omega: tuple[float, float, float]  # largest error of each component (rad/s)
     velocity: float | None  # largest error of any component of the translational velocity (m/s)
     # Largest drifts of the energy and of the squared angular momentum, relative to the initial
-    # values; None if a torque acts or the moments are unknown.
+    # values; None if a torque acts, the moments are unknown or the trajectory has no row.
     energy: float | None
     momentum: float | None
     error: Array  # shape (n,): largest error of any component of omega at each time (rad/s)
     turned: Array | None = None  # shape (n,): error of the attitude at each time (rad)
     # Largest drift of the angular momentum in space, relative to its initial norm; None if a torque
-    # acts, or if the moments or the attitude are unknown.
+    # acts, if the moments or the attitude are unknown, or if the trajectory has no row.
     momentum_in_space: float | None = None
 
     @property
     def angle(self) -> float | None:
-        """Return the largest error of the trajectory's attitude (rad); None without an attitude."""
-        return None if self.turned is None else float(self.turned.max(initial=0.0))
+        """Return the largest error of the trajectory's attitude (rad); None without an attitude.
+
+        The error is infinite if no row was compared.
+        """
+        return None if self.turned is None else _largest(self.turned)
 
 
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
     """Return the errors of a trajectory against the reference solution `truth`.
 
     The trajectory and `truth` must have rows at the same times. If one of them ends earlier, the
-    later rows of the other are not compared. Energy and angular momentum, which are constant
-    without torque, are compared with their initial values in `scene`.
+    later rows of the other are not compared. The errors are infinite if there is no row to compare.
+    Energy and angular momentum, which are constant without torque, are compared with their initial
+    values in `scene`.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
         errors = np.abs(trajectory.omega[:n] - truth.omega[:n])
-        first, second, third = (float(e) for e in errors.max(axis=0, initial=0.0))
+        first, second, third = (_largest(component) for component in errors.T)
         speed = None
         if trajectory.velocity is not None and truth.velocity is not None:
-            speed = float(np.abs(trajectory.velocity[:n] - truth.velocity[:n]).max(initial=0.0))
+            speed = _largest(np.abs(trajectory.velocity[:n] - truth.velocity[:n]))
         energy = momentum = None
         if scene.moments is not None and scene.torque.is_zero:
             inertia = np.array(scene.moments)
@@ -69,7 +73,14 @@ def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy
         return replace(found, turned=turned, momentum_in_space=_drift_in_space(scene, trajectory))
 
 
-def _drift(scene: Scene, trajectory: Trajectory, weights: Array) -> float:
+def _largest(errors: Array) -> float:
+    """Return the largest of some errors; infinity if there are none, so that nothing is known."""
+    return float(errors.max()) if errors.size else math.inf
+
+
+def _drift(scene: Scene, trajectory: Trajectory, weights: Array) -> float | None:
+    if not len(trajectory.omega):
+        return None
     start = float(weights @ np.square(scene.omega))
     if start == 0.0:
         return 0.0
@@ -77,7 +88,7 @@ def _drift(scene: Scene, trajectory: Trajectory, weights: Array) -> float:
 
 
 def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float | None:
-    if scene.moments is None or not scene.torque.is_zero:
+    if scene.moments is None or not scene.torque.is_zero or not len(trajectory.omega):
         return None
     before = np.array(scene.moments) * scene.omega
     (start,) = turned_to_space(np.array([scene.attitude]), before[None, :])

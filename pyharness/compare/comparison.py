@@ -12,17 +12,24 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from pyharness.compare.agreement import Accuracy, accuracy, differences, distance
 from pyharness.compare.candidates import method_candidate, program_candidate
 from pyharness.compare.orders import Order, measured_order
 from pyharness.compare.timing import seconds as timed
 from pyharness.methods.from_rows import attitude_from_rows
-from pyharness.methods.registry import SCIPY_METHODS, requested_tolerance
+from pyharness.methods.registry import (
+    METHODS,
+    SCIPY_METHODS,
+    requested_tolerance,
+)
 from pyharness.methods.sensitivity import is_sensitive, motion_growth
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable
+from pyharness.model.report import short
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.shown import short_repr
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
@@ -34,8 +41,11 @@ from pyharness.original.programs import (
     checked_word,
     work_of,
 )
+from pyharness.theory.conditioning import LIVELY
 from pyharness.truth.reference import Reference, reference
 
+# Largest relative error that rounding causes in any method, divided by the error amplification.
+_ROUNDING = 4e-15
 _TIMING_BATCHES = 3
 _TIMING_SECONDS = 3e-4
 
@@ -66,7 +76,7 @@ class ProgramFinding:
 
 @dataclass(frozen=True, eq=False)
 class MethodFinding:
-    """The results of one method of SciPy's `solve_ivp`.
+    """The results of one method.
 
     If the method failed, `failure` says why, and there is no trajectory and no accuracy.
     """
@@ -83,20 +93,20 @@ class MethodFinding:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """The results of `compare_programs` for one scene.
+    """The results of `compare_programs` or `compare_methods` for one scene.
 
     Attributes
     ----------
     scene : Scene
         The scene. If attitudes were requested, it has the initial attitude.
-    lipschitz : float
-        The Lipschitz constant of the Runge-Kutta program's stop test, 1/s.
+    lipschitz : float or None
+        The Lipschitz constant of the Runge-Kutta program's stop test, 1/s; None without programs.
     reference : Reference
         The reference solution and its error bound.
     programs : tuple of ProgramFinding
-        The results of the programs, one for each listing.
+        The results of the programs, one for each listing; empty if only methods are compared.
     methods : tuple of MethodFinding
-        The results of the methods of `solve_ivp`.
+        The results of the methods: those of `solve_ivp`, or those that were requested.
     growth : float or None
         The error amplification: the largest norm of the state-transition matrix of omega from any
         earlier time to the last time. None if it is unknown.
@@ -105,7 +115,7 @@ class Comparison:
     """
 
     scene: Scene
-    lipschitz: float
+    lipschitz: float | None
     reference: Reference
     programs: tuple[ProgramFinding, ...]
     methods: tuple[MethodFinding, ...]
@@ -125,7 +135,7 @@ class Comparison:
 
     @property
     def tolerance(self) -> float:
-        """Return the smallest relative tolerance with which a method of `solve_ivp` was run."""
+        """Return the smallest relative tolerance with which a method was run."""
         return min(each.tolerance for each in self.methods)
 
     @property
@@ -138,9 +148,11 @@ class Comparison:
         """Return a sentence for each unexpected result; the tuple is empty if there is none.
 
         A result is unexpected if Fortran and the Python port differ, or if the error of a corrected
-        program does not decrease with the order of the program as the step is halved.
+        program does not decrease with the order of the program as the step is halved. If only
+        methods are compared, a method's result is unexpected if its error exceeds the limit that
+        follows from its tolerance, or if it ends before the reference solution does.
         """
-        found = []
+        found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         for each in self.programs:
             if each.differences:
                 told = ", ".join(each.differences)
@@ -151,6 +163,28 @@ class Comparison:
                     f"{each.who}: does not converge to the reference as the step is halved: {told}"
                 )
         return tuple(found)
+
+    def _excess(self, one: MethodFinding) -> str:
+        """Return a sentence if the error of a method exceeds its limit, else an empty text."""
+        if one.trajectory is None or one.accuracy is None:
+            return ""
+        rows, due = len(one.trajectory.time), len(self.reference.time)
+        if rows < due:
+            return f"{one.method}: ends after {rows} of {due} times, {one.trajectory.ended}"
+        if METHODS[one.method].is_fixed_step or self.growth is None:
+            return ""
+        largest = float(np.abs(np.vstack([self.scene.omega, self.reference.omega])).max())
+        made = one.tolerance * (self.growth if self.growth > LIVELY else 1.0)
+        made += _ROUNDING * self.growth
+        errors = {"omega": (max(one.accuracy.omega), made * largest + self.reference.error)}
+        if one.accuracy.angle is not None:
+            errors["attitude"] = one.accuracy.angle, made + self.reference.angle_error
+        told = [
+            f"error of {name} {short(error)}, limit {short(limit)}"
+            for name, (error, limit) in errors.items()
+            if not error <= limit
+        ]
+        return f"{one.method}: {'; '.join(told)}" if told else ""
 
     @property
     def not_judged(self) -> tuple[str, ...]:
@@ -254,7 +288,7 @@ def compare_programs(
     import scipy.integrate  # noqa: F401  (not to be timed with the first method)
 
     methods = [
-        _method(scene, name, requested_tolerance(name, tolerance), effort, truth)
+        method_finding(scene, name, requested_tolerance(name, tolerance), effort, truth)
         for name in SCIPY_METHODS
     ]
     growth = motion_growth(scene, scene.times()[-1])
@@ -308,9 +342,15 @@ def listings_for(
     return result
 
 
-def _method(
+def method_finding(
     scene: Scene, name: str, tolerance: float, effort: float, truth: Reference
 ) -> MethodFinding:
+    """Return the results of the method `name` on a scene, with their errors against `truth`.
+
+    The times are the ends of the scene's steps. `tolerance` is relative to the largest component of
+    omega, and `effort` is the factor on the work limit. If the method raises InputError, the result
+    has its message.
+    """
     start = time.perf_counter()
     try:
         trajectory = method_candidate(name, tolerance, effort).rows(scene)

@@ -16,6 +16,7 @@ from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.original.programs import Program
 from pyharness.theory.conditioning import ROUNDING, conditioning
@@ -213,13 +214,13 @@ def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
 def _fastest(scene: Scene, omega: Array) -> float:
     """Return the fastest rate (rad/s) that a step has to resolve.
 
-    The rate is the larger of two: the largest angular frequency of the torque's sines and cosines,
-    and a bound on the rate at which Euler's equations change a perturbation of the solution `omega`
-    (rad/s).
+    The rate is the larger of two: the largest angular frequency of the sines and cosines of a
+    torque law, and a bound on the rate at which Euler's equations change a perturbation of the
+    solution `omega` (rad/s).
     """
     sizes = np.abs(np.vstack([scene.omega, omega]))
     others = np.roll(sizes, -1, axis=1) + np.roll(sizes, -2, axis=1)
-    waves = scene.law.sines + scene.law.cosines
+    waves = () if isinstance(scene.torque, StateTorque) else scene.law.sines + scene.law.cosines
     turning = float((np.abs(scene.euler_coefficients) * others).max())
     return max([turning, *(abs(frequency) for _, frequency in waves)])
 

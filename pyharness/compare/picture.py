@@ -1,13 +1,15 @@
 """The picture of a comparison: for each program, omega over time, and its errors below."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from pyharness.compare.agreement import Accuracy
 from pyharness.compare.comparison import Comparison
 from pyharness.methods.report import mark_end
 from pyharness.model.report import Picture, Table, numbers
 from pyharness.model.scene_report import heading
+from pyharness.model.trajectory import WITH_ALL_ROWS, Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,17 +31,40 @@ _MARKERS: dict[str, dict[str, Any]] = {
 }
 
 
-def comparison_picture(comparison: Comparison) -> Picture:
-    """Return the picture of a comparison of programs, and the table of numbers that it shows.
+class _Curve(NamedTuple):
+    name: str  # program or method, which has a column of panels
+    label: str  # version of the program; empty for a method
+    trajectory: Trajectory
+    accuracy: Accuracy
 
-    Each program has a column of panels. Three panels show the three components of omega (rad/s) as
-    functions of time, for the versions of the program and for the reference solution. A panel below
+
+def _curves(comparison: Comparison) -> list[_Curve]:
+    """Return the trajectories that a picture shows: of the programs, or else of the methods."""
+    if comparison.programs:
+        return [
+            _Curve(each.listing.program, each.listing.label, each.trajectory, each.accuracy)
+            for each in comparison.programs
+        ]
+    return [
+        _Curve(each.method, "", each.trajectory, each.accuracy)
+        for each in comparison.methods
+        if each.trajectory is not None and each.accuracy is not None
+    ]
+
+
+def comparison_picture(comparison: Comparison) -> Picture:
+    """Return the picture of a comparison, and the table of numbers that it shows.
+
+    Each program has a column of panels, or each method if there are no programs. Three panels show
+    the three components of omega (rad/s) as functions of time, for the versions of the program or
+    for the method, and for the reference solution. A panel below
     shows the error of omega (rad/s). If attitudes were requested, another panel shows the error of
     the attitude (rad).
     """
     from matplotlib.figure import Figure
 
-    names = list(dict.fromkeys(each.listing.program for each in comparison.programs))
+    curves = _curves(comparison)
+    names = list(dict.fromkeys(each.name for each in curves))
     figure = Figure(figsize=(4.2 * max(len(names), 1.4), 9.0), dpi=110, layout="constrained")
     truth = comparison.reference
     # The error of the attitude, if it was requested, is drawn below the error of omega.
@@ -51,22 +76,22 @@ def comparison_picture(comparison: Comparison) -> Picture:
         axes[-1, column].set_xlabel("time (s)")
         for row in range(3):
             _line(axes[row, column], truth.time, truth.omega[:, row], "reference")
-        for each in comparison.programs:
-            if each.listing.program != name:
+        for each in curves:
+            if each.name != name:
                 continue
-            run, label = each.trajectory, each.listing.label
+            run, label = each.trajectory, each.label
             for row in range(3):
                 _line(axes[row, column], run.time, run.omega[:, row], label)
             for row, error in enumerate((each.accuracy.error, each.accuracy.turned), 3):
                 if error is not None:
                     shown = np.isfinite(error) & (error > 0.0)
                     _line(axes[row, column], run.time[: len(error)][shown], error[shown], label)
-    ended = [each for each in comparison.programs if each.trajectory.ended != "complete"]
+    ended = [each for each in curves if each.trajectory.ended not in WITH_ALL_ROWS]
     for row in range(3):
         axes[row, 0].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
         _frame(axes[row, 0], truth.omega[:, row])
         for each in ended:
-            mark_end(axes[row, names.index(each.listing.program)], each.trajectory, row)
+            mark_end(axes[row, names.index(each.name)], each.trajectory, row)
     labels = ("error of any $\\omega$ (rad/s)", "error of attitude (rad)")
     for row, (bound, label) in enumerate(zip(bounds, labels, strict=False), 3):
         axes[row, 0].set_yscale("log")
@@ -77,7 +102,7 @@ def comparison_picture(comparison: Comparison) -> Picture:
         bottom, top = axes[row, 0].get_ylim()
         axes[row, 0].set_ylim(max(bottom, 1e-17), min(top, 1e4))
     axes[0, 0].legend(loc="best", handlelength=4)
-    note = "x: the program stopped or overflowed; at the edge: out of view" if ended else ""
+    note = "x: the integration stopped or overflowed; at the edge: out of view" if ended else ""
     title = (f"{heading(comparison.scene)[0]}; thin line: error of the reference", note)
     return Picture(figure, _numbers(comparison), title)
 
@@ -92,8 +117,8 @@ def _numbers(comparison: Comparison) -> Table:
         ["reference", "", t, *omega, *bounds]
         for t, omega in zip(truth.time.tolist(), truth.omega.tolist(), strict=True)
     ]
-    for each in comparison.programs:
-        run, name = each.trajectory, [each.listing.program, each.listing.label]
+    for each in _curves(comparison):
+        run, name = each.trajectory, [each.name, each.label]
         errors = each.accuracy.error[:, None]
         if each.accuracy.turned is not None:
             errors = np.column_stack([errors, each.accuracy.turned])
@@ -104,9 +129,9 @@ def _numbers(comparison: Comparison) -> Table:
 
 
 def _line(axes: "Axes", time: np.ndarray, values: np.ndarray, label: str) -> None:
-    style = _REFERENCE if label == "reference" else _STYLES[label]
-    marker = _MARKERS[label] if len(time) == 1 else {}
-    axes.plot(time, values, label=label, **style, **marker)
+    style = _REFERENCE if label == "reference" else _STYLES[label or "corrected"]
+    marker = _MARKERS[label or "corrected"] if len(time) == 1 else {}
+    axes.plot(time, values, label=label or "method", **style, **marker)
 
 
 def _frame(axes: "Axes", truth: np.ndarray) -> None:

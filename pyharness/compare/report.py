@@ -26,6 +26,16 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.original.programs import BINARY64
 
 _OMEGA = tuple(Column(name, short, unit="rad/s") for name in ("w1", "w2", "w3"))
+_PROGRAMS_LEGEND = (
+    "w1 to w3, V: largest error of the angular velocity (rad/s) and of the velocity (m/s). "
+    "energy, mom.sq: largest relative drift of the energy and of the squared angular momentum. "
+    "ulp: largest distance between Fortran and Python, in units in the last place. stop: "
+    "variable that ended the run, its Lipschitz quotient and the limit."
+)
+_METHODS_LEGEND = (
+    "w1 to w3: largest error of the angular velocity (rad/s). energy, mom.sq: largest relative "
+    "drift of the energy and of the squared angular momentum. ms: time of one call."
+)
 _OF_THE_TRUTH = ("source", "estimate", "error")
 _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 
@@ -33,9 +43,10 @@ _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 def comparison_report(comparison: Comparison) -> Report:
     """Return the report of a comparison of programs and methods with the reference solution.
 
-    The methods are those of SciPy's `solve_ivp`. The report also says whether Fortran and the
-    Python port of each program agree, and whether the corrected programs converge with their
-    orders.
+    If there are programs, the methods are those of SciPy's `solve_ivp`. The report also says
+    whether Fortran and the Python port of each program agree, and whether the corrected programs
+    converge with their orders. If only methods are compared, it says whether their errors are
+    within the limits that follow from their tolerances.
     """
     in_floats = comparison.word == BINARY64
     scene, truth = heading(comparison.scene), comparison.reference
@@ -43,13 +54,10 @@ def comparison_report(comparison: Comparison) -> Report:
         f"reference: {truth.source}, error of any w below {short(truth.error)} rad/s "
         f"(estimated {short(truth.estimate)} before rounding to binary64)"
     )
-    legend = (
-        "w1 to w3, V: largest error of the angular velocity (rad/s) and of the velocity (m/s). "
-        "energy, mom.sq: largest relative drift of the energy and of the squared angular momentum. "
-        "ulp: largest distance between Fortran and Python, in units in the last place. stop: "
-        "variable that ended the run, its Lipschitz quotient and the limit. us/step: time per step "
-        f"of {'Fortran, with the call' if in_floats else _in_word(comparison)}."
-    )
+    legend = _PROGRAMS_LEGEND if comparison.programs else _METHODS_LEGEND
+    if comparison.programs:
+        timed = "Fortran, with the call" if in_floats else _in_word(comparison)
+        legend += f" us/step: time per step of {timed}."
     motion = []
     if comparison.growth is not None and comparison.digits is not None:
         motion.append(
@@ -58,13 +66,14 @@ def comparison_report(comparison: Comparison) -> Report:
         )
     attitudes = _attitudes(comparison)
     if attitudes:
-        legend += (
-            " angle: largest error of the attitude (rad); a program's attitude is integrated from "
-            "row to row by a method of order 4. L in space: largest relative drift of the angular "
-            "momentum."
-        )
+        legend += " angle: largest error of the attitude (rad)"
+        if comparison.programs:
+            legend += "; a program's attitude is integrated from row to row by a method of order 4"
+        legend += ". L in space: largest relative drift of the angular momentum."
     failures = [f"failed: {x.method}: {x.failure}" for x in comparison.methods if x.failure]
-    told, programs, methods = verdict(comparison), _programs(comparison), _methods(comparison)
+    told = verdict(comparison)
+    tables = [[_programs(comparison)]] if comparison.programs else []
+    tables.append([_methods(comparison)])
 
     def draw() -> Picture:
         from pyharness.compare.picture import comparison_picture
@@ -76,14 +85,13 @@ def comparison_report(comparison: Comparison) -> Report:
         text=[
             [*scene, reference, *motion],
             [legend],
-            [programs],
-            [methods],
+            *tables,
             *attitudes,
             [*failures, *told],
         ],
         record=lambda: _record(comparison),
         data=_data(comparison),
-        page=[scene, [programs], [methods], *attitudes, told],
+        page=[scene, *tables, *attitudes, told],
         pictures={"omega": draw},
     )
 
@@ -109,6 +117,10 @@ def _in_word(comparison: Comparison) -> str:
 
 
 def _as_expected(comparison: Comparison) -> str:
+    if not comparison.programs:
+        if comparison.growth is None:
+            return "the error amplification is unknown: tolerances are not judged"
+        return "as expected: no error exceeds the limit that follows from the method's tolerance"
     same = sum(not each.differences for each in comparison.programs)
     if any(each.ulps is None for each in comparison.programs):
         return (
@@ -144,7 +156,8 @@ def _programs(comparison: Comparison) -> Table:
 
 def _methods(comparison: Comparison) -> Table:
     columns = (
-        *words("solve_ivp"), Column("tolerance", short), *_OMEGA, *_DRIFTS,
+        *words("solve_ivp" if comparison.programs else "method"),
+        Column("tolerance", short), *_OMEGA, *_DRIFTS,
         Column("evaluations"), Column("ms", digits(".1f", 1e3), unit="s"),
     )  # fmt: skip
     rows: list[list[Any]] = []
@@ -215,7 +228,7 @@ def _data(comparison: Comparison) -> Table:
     return numbers(names, [list(map(each.get, names.split())) for each in rows])
 
 
-def _end(run: Trajectory, limit: float) -> str:
+def _end(run: Trajectory, limit: float | None) -> str:
     if run.stop is None:
         return "overflow" if run.ended == "overflow" else "-"
     quotient = f"{run.stop.quotient:.0f}"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.ensembles.fields import CHOICES, NUMBERS, field_names
+from pyharness.ensembles.fields import CHOICES, CONSTANTS, field_names, number_field
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.scene_file import check_keys
 from pyharness.model.values import finite, integer
@@ -95,7 +95,7 @@ def _coordinates(axis: Axis) -> NDArray[Any]:
         found = np.geomspace(axis.values[0], axis.values[1], axis.count)
     else:
         found = _drawn(axis)
-    if NUMBERS[axis.field].whole:
+    if number_field(axis.field).whole:
         found = np.rint(found)
     found.setflags(write=False)
     return found
@@ -149,7 +149,7 @@ def axis_of(table: object, number: int) -> Axis:
     if "field" not in table:
         raise InputError(f"{where}: field is missing; allowed: {', '.join(field_names())}")
     field = table["field"]
-    if not isinstance(field, str) or field not in field_names():
+    if not isinstance(field, str) or not (field in field_names() or field.startswith(CONSTANTS)):
         raise unknown("field", field, field_names(), where)
     where = f"{where} ({field})"
     dimension = table.get("dimension", _SAMPLE if "draw" in table else field)
@@ -234,7 +234,7 @@ def _checked(where: str, axis: Axis) -> Axis:
     for other axes they are the ends of the range. The distribution `sphere` is not checked, because
     it has no parameters. `where` is the beginning of the error message.
     """
-    field = NUMBERS[axis.field]
+    field = number_field(axis.field)
     if axis.how == "sphere":
         return axis
     ends = axis.coordinates() if axis.how == "normal" else axis.values

@@ -6,11 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.ensembles.fields import CHOICES, NUMBERS
+from pyharness.ensembles.fields import ATTITUDE, CHOICES, CONSTANTS, number_field
+from pyharness.ensembles.state_torques import follows_body, with_numbers
 from pyharness.ensembles.sweep import Indices, Sweep, groups, value_columns
 from pyharness.methods.batch import OF_PROGRAMS, Batch
+from pyharness.model.attitude import IDENTITY
+from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 
 Columns = dict[str, Array]
@@ -41,7 +45,13 @@ def looped_fields(sweep: Sweep) -> list[str]:
     function `batches` makes a batch for each combination of the values of these quantities.
     """
     fields = [axis.field for axis in sweep.axes]
-    found = [name for name in fields if name in CHOICES or NUMBERS[name].looped]
+    found = [
+        name
+        for name in fields
+        if name in CHOICES
+        or number_field(name).looped
+        or (name.startswith("body.") and follows_body(sweep.scene))
+    ]
     of_arrays = () if sweep.solver.program is None else OF_PROGRAMS
     return [name for name in found if name not in of_arrays]
 
@@ -66,6 +76,21 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     if "step_size" in shared or "steps" in shared:
         step_size = float(shared.pop("step_size", scene.step_size))
         scene = replace(scene, step_size=step_size, steps=int(shared.pop("steps", scene.steps)))
+    bodies = {name: shared.pop(name) for name in list(shared) if name.startswith("body.")}
+    own = {**own, **{name: np.full(n, value) for name, value in bodies.items()}}
+    body, values = _body(scene, own, n)
+    constants = {
+        name.removeprefix(CONSTANTS): float(shared.pop(name))
+        for name in list(shared)
+        if name.startswith(CONSTANTS)
+    }
+    is_refused = False
+    if constants or bodies:
+        moments = values[0].tolist() if bodies and values is not None else None
+        try:
+            scene = with_numbers(scene, constants, moments)
+        except InputError:
+            is_refused = True
     solver = replace(sweep.solver, **shared)
     listing = None
     if solver.program is not None:
@@ -75,17 +100,45 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     else:
         sizes = own.get("step_size", np.full(n, scene.step_size))
         t_end = sizes * scene.steps if solver.t_end is None else np.full(n, solver.t_end)
-    body, values = _body(scene, own, n)
-    law = scene.law
+    if is_refused:
+        # No method solves a scene until a time that is no number.
+        t_end = np.full(n, np.nan)
+    if isinstance(scene.torque, StateTorque) and not scene.torque.needs_attitude:
+        scene = replace(scene, attitude=None)
     found = {
         "omega0": _omega(scene, own, values if body == "moments" else None, n),
-        "torque_constant": _three("torque.constant", law.constant, own, n),
-        "torque_rate": _three("torque.rate", law.rate, own, n),
+        "attitude0": _attitude(scene, own, n),
+        **_law_arrays(scene, own, n),
         **{name: own.get(name) for name in OF_PROGRAMS},
         body: values,
     }
     arrays = {name: array for name, array in found.items() if array is not None}
     return Batch(scene, solver, listing, t_end, arrays)
+
+
+def _law_arrays(scene: Scene, own: Columns, n: int) -> dict[str, Array | None]:
+    """Return the arrays of the terms of a torque law in n scenes; None for a term without an axis.
+
+    A torque that depends on the state has no such terms.
+    """
+    if isinstance(scene.torque, StateTorque):
+        return {}
+    return {
+        "torque_constant": _three("torque.constant", scene.law.constant, own, n),
+        "torque_rate": _three("torque.rate", scene.law.rate, own, n),
+    }
+
+
+def _attitude(scene: Scene, own: Columns, n: int) -> Array | None:
+    """Return the initial attitudes of n scenes, shape (n, 4), or None if no axis varies them.
+
+    The result is also None if the torque does not depend on the attitude.
+    """
+    if not scene.torque.needs_attitude or not any(name in own for name in ATTITUDE):
+        return None
+    base = scene.attitude or IDENTITY
+    columns = [own.get(name, np.full(n, base[i])) for i, name in enumerate(ATTITUDE)]
+    return np.stack(columns, axis=1)
 
 
 def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | None:

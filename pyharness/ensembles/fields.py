@@ -33,6 +33,12 @@ class Field:
     whole: bool = False
 
 
+# Beginning of the name of a field that is a constant of the expressions of a torque, as in
+# `torque.constants.k`. Its unit depends on the expressions.
+CONSTANTS = "torque.constants."
+ATTITUDE = tuple(f"attitude.{number}" for number in range(4))
+
+
 def _above_zero(value: float) -> bool:
     return value > 0.0
 
@@ -70,6 +76,7 @@ NUMBERS = {
     ),
     **_three("torque.constant", "N m", "constant torque"),
     **_three("torque.rate", "N m/s", "torque that grows with time"),
+    **{name: Field("1", "initial attitude, a quaternion, scalar first") for name in ATTITUDE},
     "t_end": Field("s", "time of the end"),
     "tolerance": Field("1", "tolerance", "above 0, to 1", _from_zero_to_one, looped=True),
     "step_size": Field("s", "step", "a number above 0", _above_zero, looped=True),
@@ -95,8 +102,23 @@ RIVALS = (
 
 
 def field_names() -> list[str]:
-    """Return the names of all quantities of a scene or solver that an axis of a sweep may vary."""
+    """Return the names of the quantities of a scene or solver that an axis of a sweep may vary.
+
+    The constants of the expressions of a torque are not among them, because every scene has its
+    own.
+    """
     return [*NUMBERS, *CHOICES]
+
+
+def number_field(name: str) -> Field:
+    """Return the field with the given name, whose values are numbers.
+
+    The name is a key of `NUMBERS`, or that of a constant of a torque, as in
+    ``torque.constants.k``. Raise KeyError for any other name.
+    """
+    if name.startswith(CONSTANTS):
+        return Field("", "constant of the torque's expressions", looped=True)
+    return NUMBERS[name]
 
 
 def units_of(field: str) -> str:

@@ -22,8 +22,8 @@ _ENOUGH = 0.2  # time (s) for a sample; if it took longer, it is usually large e
 # cost of its scenes.
 _PART = 0.01
 _LONGEST = 60.0  # s
-# Number of distinct values in a sample along a dimension for which all scenes of a batch have the
-# same value.
+# Least number of distinct values in a sample along a dimension for which all scenes of a batch have
+# the same value.
 _PLACES = 5
 _FILES = 20  # largest number of chunks that are solved, or written and read, for a measurement
 
@@ -150,14 +150,19 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
 
     A batch is a set of scenes that are solved in one call, and that must have the same index along
     some dimensions of the grid. `where` has the indices of the scenes: an array for each dimension,
-    as the result. Along those dimensions the indices are changed to at most five distinct values.
-    The batches of the sample then have many scenes, as in a real computation.
+    as the result. Along those dimensions the indices are changed to a few distinct values: five, or
+    more if the batches of a chunk have so few scenes. The batches of the sample then have about as
+    many scenes as in a real computation.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
-    found = []
-    for (name, count), places in zip(sweep.dimensions.items(), where, strict=True):
-        if name in shared and count > _PLACES:
-            part = np.rint(places * ((_PLACES - 1) / (count - 1))) / (_PLACES - 1)
+    found, scenes = [], math.prod(sweep.chunk_shape)
+    for (name, count), length, places in zip(
+        sweep.dimensions.items(), sweep.chunk_shape, where, strict=True
+    ):
+        # In a chunk, so many scenes have one index along this dimension.
+        distinct = max(_PLACES, len(places) * length // scenes)
+        if name in shared and count > distinct:
+            part = np.rint(places * ((distinct - 1) / (count - 1))) / (distinct - 1)
             places = np.rint(part * (count - 1)).astype(np.int64)
         found.append(places)
     return found

@@ -24,6 +24,7 @@ from pyharness.ensembles.fields import units_of
 from pyharness.ensembles.reductions import REDUCTIONS, empty
 from pyharness.ensembles.sweep import Sweep
 from pyharness.model.distribution import version
+from pyharness.model.scene_file import scene_text
 from pyharness.model.schema import SCHEMAS
 
 CHECKSUMS = "checksums"  # the group of the checksums in a store; no array may have this name
@@ -109,6 +110,7 @@ def _fill(sweep: Sweep, folder: Path) -> None:
         "title": sweep.name,
         "pyharness_version": version(),
         "sweep": sweep.text,
+        "scene": scene_text(sweep.scene),
         "sweep_sha256": sweep.fingerprint,
     }
     if fields:

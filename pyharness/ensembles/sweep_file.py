@@ -14,6 +14,7 @@ from pyharness.ensembles.batches import listing_of
 from pyharness.ensembles.fields import CHOICES, RIVALS
 from pyharness.ensembles.reduction_spec import reduction_spec_of
 from pyharness.ensembles.reductions import REDUCTIONS
+from pyharness.ensembles.state_torques import check_state_axis, check_state_solver
 from pyharness.ensembles.sweep import Sweep
 from pyharness.methods.batch import Solver
 from pyharness.methods.registry import REGISTRY, requested_tolerance
@@ -120,10 +121,12 @@ def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
         beside = path.parent / table["file"]
         named = f"scene file '{beside}'"
         content = read_file(beside, named)
-        return checked_scene(scene_of_file(content, beside.stem, named)), b"\0" + content
+        return checked_scene(
+            scene_of_file(content, beside.stem, named), any_state=True
+        ), b"\0" + content
     if not table:
         raise InputError("scene is missing; give [scene] with case, file, or a scene's own tables")
-    return checked_scene(scene_of(table, path.stem)), b""
+    return checked_scene(scene_of(table, path.stem), any_state=True), b""
 
 
 def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
@@ -194,6 +197,7 @@ def _check_axes(axes: tuple[Axis, ...], scene: Scene, solver: Solver) -> None:
         if one and two:
             raise InputError(f"{one[0]} and {two[0]} are both given; give one of them")
     for field in fields:
+        check_state_axis(scene, field)
         by_coefficients = scene.coefficients is not None
         if field.startswith("body.") and by_coefficients != ("coefficients" in field):
             has = "coefficients" if by_coefficients else "moments"
@@ -285,7 +289,15 @@ def _check_solvers(sweep: Sweep) -> None:
     raise InputError if a method does not allow the tolerance, or if an end time `t_end` is 0.
     """
     solver = sweep.solver
-    for program in _choices(sweep, "program", solver.program):
+    programs = list(_choices(sweep, "program", solver.program))
+    own = [] if programs else _choices(sweep, "method", solver.method)
+    against = [dict(each.parameters).get("against") for each in sweep.reductions]
+    check_state_solver(
+        sweep.scene,
+        [name for name in (*own, *filter(None, against)) if name in REGISTRY],
+        bool(programs),
+    )
+    for program in programs:
         if program not in PROGRAMS:
             raise unknown("program", program, PROGRAMS)
     for chosen in _chosen_together(sweep.axes):

@@ -138,25 +138,33 @@ def _nodes(scene: Scene, time: float) -> Array:
 
 
 def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
-    steps = np.diff(times)
     largest = float(np.abs(omega).max()) or 1.0
     flow = propagators(scene, times, omega)
-    sizes = np.abs(flow)
-    source = magnitudes(scene, times, omega)
+    return of_flow(flow, times, omega, magnitudes(scene, times, omega), largest)
+
+
+def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: float) -> Conditioning:
+    """Return the sensitivity of a final state to earlier errors, from state-transition matrices.
+
+    `flow` has the matrix from each of n `times` (s) to the last one, shape (n, m, m). `state` is
+    the solution, shape (n, m), and `source` the sum of the magnitudes of all terms of its
+    derivative (1/s), of the same shape. Errors are divided by `largest`.
+    """
+    steps, sizes = np.diff(times), np.abs(flow)
 
     def gathered(made: Array) -> Array:
         arriving = (sizes @ made[:, :, None])[:, :, 0]
         return np.asarray((0.5 * (arriving[1:] + arriving[:-1]) * np.abs(steps)[:, None]).sum(0))
 
-    # The initial omega and the result are rounded once each, however short the time is.
-    ends = sizes[0] @ np.abs(omega[0]) + np.abs(omega[-1])
+    # The initial state and the result are rounded once each, however short the time is.
+    ends = sizes[0] @ np.abs(state[0]) + np.abs(state[-1])
     span = abs(float(times[-1])) or 1.0
     unamplified = float((0.5 * (source[1:] + source[:-1]) * np.abs(steps)[:, None]).sum(0).max())
     return Conditioning(
         amplification=growth(flow),
         rounding=_ROUNDINGS * ROUNDING * float((gathered(source) + ends).max()) / largest,
         # Two divisions, because the product of the divisors may underflow.
-        storing=ROUNDING * float(gathered(np.abs(omega)).max()) / span / largest,
+        storing=ROUNDING * float(gathered(np.abs(state)).max()) / span / largest,
         unamplified=_ROUNDINGS * ROUNDING * (unamplified / largest + 2.0),
         largest=largest,
     )

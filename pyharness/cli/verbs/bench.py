@@ -3,6 +3,7 @@
 import argparse
 import shlex
 from collections.abc import Sequence
+from time import process_time
 from typing import TypeVar
 
 from pyharness.bench import report as reports
@@ -21,6 +22,7 @@ _Named = TypeVar("_Named", bound=Contender)
 # Longest horizon, s; beyond it the reference solution, in decimal arithmetic, takes too long.
 _LONGEST = 1e3
 _BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
+_TERM_BODIES = 1000
 OPTIONS = {
     "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: Cases 2 to 7, "
     "with --attitude also Case 1).",
@@ -30,8 +32,10 @@ OPTIONS = {
     "of the cases of the thesis.",
     "--ensemble": "Measure calls that solve many bodies at once: bodies per second, time per body "
     "against the number of bodies, and memory.",
-    "--bodies N": f"Number of bodies that --ensemble solves, 1 to {_MOST_BODIES} "
-    f"(default {_BODIES}).",
+    "--terms": "Measure torques that depend on omega, time and attitude, ready terms as well as "
+    "recorded functions, for one body and for many.",
+    "--bodies N": "Number of bodies in a call that solves many, with --ensemble or --terms, 1 to "
+    f"{_MOST_BODIES} (default {_BODIES} and {_TERM_BODIES}).",
     "--seed S": "Text that seeds the random scenes or bodies, so that a run can be repeated "
     "(default: the present year and week, as in 2026-W47).",
     "--attitude": "Compute and measure the attitude (orientation) of the body together with its "
@@ -56,8 +60,10 @@ def run(options: argparse.Namespace) -> int:
     """
     if options.ensemble:
         return _ensemble(options)
+    if options.terms:
+        return _terms(options)
     if options.bodies is not None:
-        raise InputError("--bodies has no meaning without --ensemble")
+        raise InputError("--bodies has no meaning without --ensemble or --terms")
     if options.plan or options.growth:
         meaningless = ["case", "horizon", "random", "seed", "attitude", "methods", "peers"]
         meaningless += ["plot", "growth"] if options.plan else []
@@ -131,7 +137,7 @@ def _count(options: argparse.Namespace) -> int:
     """
     if options.random is None:
         if options.seed is not None:
-            raise InputError("--seed has no meaning without --random or --ensemble")
+            raise InputError("--seed has no meaning without --random, --ensemble or --terms")
         return 0
     shared.refuse(options, "--random", ["case", "horizon", "plot"])
     count = shared.whole(options.random, "--random")
@@ -172,6 +178,7 @@ def chosen(
 def _again(options: argparse.Namespace) -> str:
     """Return the `pyharness bench` command that repeats this measurement and prints Markdown."""
     command = "pyharness bench" + (" --ensemble" if options.ensemble else "")
+    command += " --terms" if options.terms else ""
     for name in ("case", "horizon", "random", "bodies", "seed", "methods", "peers"):
         value = getattr(options, name)
         command += f" --{name} {shlex.quote(value)}" if value is not None else ""
@@ -203,12 +210,9 @@ def _ensemble(options: argparse.Namespace) -> int:
     from pyharness.bench.ensemble_peers import ensemble_peers
 
     shared.refuse(
-        options, "--ensemble", ["case", "horizon", "random", "attitude", "plan", "growth"]
+        options, "--ensemble", ["case", "horizon", "random", "attitude", "plan", "growth", "terms"]
     )
-    n = _BODIES if options.bodies is None else shared.whole(options.bodies, "--bodies")
-    if not 1 <= n <= _MOST_BODIES:
-        raise InputError(f"--bodies: {n}; allowed: 1 to {_MOST_BODIES}")
-    options.bodies, options.seed = str(n), shared.chosen_seed(options) or weekly_seed()
+    n = _choose_bodies(options, _BODIES)
     those = ensemble_peers()
     methods = named(own_ensembles(), options.methods, "method", "--methods")
     others = named(those, options.peers, "peer", "--peers")
@@ -224,6 +228,53 @@ def _ensemble(options: argparse.Namespace) -> int:
     packages = sorted({each.package for each in those} - {"", "numpy"})
     shared.show(ensembles.ensemble_report(found, packages, _again(options)), options)
     return 0
+
+
+def _terms(options: argparse.Namespace) -> int:
+    from pyharness.bench import term_contenders, term_loads, term_report
+    from pyharness.bench.ensemble_measure import measure_ensembles
+
+    meaningless = ["case", "horizon", "random", "attitude", "methods", "plan", "growth", "plot"]
+    shared.refuse(options, "--terms", meaningless)
+    n = _choose_bodies(options, _TERM_BODIES)
+    scenes = term_loads.term_scenes()
+    those = term_contenders.term_peers(scenes)
+    others = named(those, options.peers, "peer", "--peers")
+    contenders, missing = _present(term_contenders.term_methods(), others, bool(options.peers))
+    shared.check_outputs(options)
+    shared.progress(0, 1, "references")
+    loads = term_loads.term_loads(scenes)
+    # The first solver imports modules, whose time is none of a preparation.
+    term_contenders.term_methods()[0].prepare(scenes[0].scene)(1.0, 1e-9).run()
+    # All solvers run on one core, whose processor time other work of the machine hardly changes.
+    single = measure(loads, contenders, shared.progress, process_time)
+    packages = {each.package for each in contenders}
+    many = measure_ensembles(
+        term_loads.term_bodies(scenes, options.seed, n),
+        [each for each in term_contenders.body_contenders() if each.package in packages],
+        options.seed,
+        shared.progress,
+        least=n,
+    )
+    shared.end_progress()
+    single.refused.extend(
+        Refusal(load, each.name, None, _absent()) for each in missing for load in loads
+    )
+    found = term_report.Terms(single, many)
+    shared.show(term_report.term_report(found, ["heyoka"], _again(options)), options)
+    return 0
+
+
+def _choose_bodies(options: argparse.Namespace, default: int) -> int:
+    """Return the number of bodies that --bodies requests, or the default.
+
+    The number and the seed in `options` are set, if the user left them out.
+    """
+    n = default if options.bodies is None else shared.whole(options.bodies, "--bodies")
+    if not 1 <= n <= _MOST_BODIES:
+        raise InputError(f"--bodies: {n}; allowed: 1 to {_MOST_BODIES}")
+    options.bodies, options.seed = str(n), shared.chosen_seed(options) or weekly_seed()
+    return n
 
 
 def named(contenders: Sequence[_Named], text: str | None, what: str, where: str) -> list[_Named]:

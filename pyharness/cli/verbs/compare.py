@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from pyharness.cli import options as shared
 from pyharness.compare.comparison import compare_programs, listings_for
+from pyharness.compare.method_comparison import compare_methods
 from pyharness.compare.report import comparison_report
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError, unknown
@@ -16,10 +17,12 @@ OPTIONS = {
     **shared.SCENE,
     **shared.LISTING,
     "--program P": f"Compare this program alone: {', '.join(PROGRAMS)} (default: all three).",
+    "--method M,...": "Compare these methods (docs/reference/methods.md) instead of the programs; "
+    "the torque of the scene may then depend on omega or attitude.",
     "--word W": "Run the programs in this floating-point arithmetic: "
     f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
-    "--tolerance E": "Relative tolerance of each method of SciPy's solve_ivp, at most 1 (default: "
-    "the method's own).",
+    "--tolerance E": "Relative tolerance of each method, at most 1 (default: the method's own). "
+    "With programs, the methods are those of SciPy's solve_ivp.",
     "--attitude": "Compare the attitude (orientation) of the body too, with its error as an angle "
     "in rad.",
     "--ablate": "Run every subset of each program's defects, and list the subsets by their error, "
@@ -38,8 +41,11 @@ def run(options: argparse.Namespace) -> int:
     or if a corrected program does not converge with its order. With --strict, also return exit
     status 1 if amplified rounding errors are too large for the tolerance of the methods in the
     comparison. Otherwise return 0. With --ablate, run every subset of the programs' defects
-    instead.
+    instead. With --method, compare methods instead; return exit status 1 if the error of a method
+    exceeds the limit that follows from its tolerance.
     """
+    if options.method is not None:
+        return _methods(options)
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)
     shared.check_known("word", options.word, WORD_NAMES)
@@ -71,6 +77,25 @@ def run(options: argparse.Namespace) -> int:
         effort=effort,
         attitude=options.attitude,
         word=options.word or BINARY64,
+    )
+    shared.show(comparison_report(found), options)
+    return 1 if found.unexpected or (options.strict and found.is_sensitive) else 0
+
+
+def _methods(options: argparse.Namespace) -> int:
+    meaningless = (
+        "program", "listing", "fix", "keep", "reading", "conjecture", "lipschitz", "no_stop",
+        "word", "ablate",
+    )  # fmt: skip
+    shared.refuse(options, "--method", meaningless)
+    scene = shared.chosen_scene(options, any_state=True)
+    shared.check_outputs(options)
+    found = compare_methods(
+        scene,
+        shared.names(options.method),
+        tolerance=shared.chosen_tolerance(options),
+        effort=shared.chosen_effort(options),
+        attitude=options.attitude,
     )
     shared.show(comparison_report(found), options)
     return 1 if found.unexpected or (options.strict and found.is_sensitive) else 0

@@ -1,9 +1,10 @@
 """The verb `stress`: test the numerical stability of every method against derived bounds."""
 
 import argparse
+import shlex
 
 from pyharness.checks.check import Check, requested_suites
-from pyharness.checks.stress import TRIALS, stress, trial, worst
+from pyharness.checks.stress import SCENE_TRIALS, TRIALS, Trial, stress, trial, worst
 from pyharness.checks.stress_report import stress_report
 from pyharness.cli import options as shared
 from pyharness.model.errors import InputError, unknown
@@ -13,6 +14,8 @@ _FOLDER = "worst"
 OPTIONS = {
     "--only ID,...": f"Run only these trials: {', '.join(TRIALS)}; or only the checks whose ids "
     "begin with this text, as in shapes/auto.",
+    "--scene FILE": "Make checks on the scene in this TOML file instead, whose torque may depend "
+    f"on omega or attitude; the trials are then {', '.join(SCENE_TRIALS)}.",
     "--save DIR": "Save the scene with the worst result of each method in each trial as a scene "
     "file (TOML) in this folder (default: failures only, in the folder worst).",
     **shared.outputs(FORMATS, plot="the one trial that --only names"),
@@ -26,7 +29,8 @@ def run(options: argparse.Namespace) -> int:
     Return exit status 1 if a check fails, for example because an error exceeds its derived bound.
     Otherwise return 0.
     """
-    only = shared.chosen_names(options.only, "trial", tuple(TRIALS))
+    trials = None if options.scene is None else _of_scene(options)
+    only = shared.chosen_names(options.only, "trial", tuple(trials or TRIALS))
     if options.plot is not None and len(_chosen(only)) != 1:
         raise InputError("--plot draws one trial; choose it with --only, as in --only separatrix")
     shared.check_outputs(options)
@@ -36,25 +40,44 @@ def run(options: argparse.Namespace) -> int:
         check_folder(options.save, (), "--save")
 
     checks: list[Check] = []
-    names = requested_suites(TRIALS, only)
-    for check in stress(only):
+    names = requested_suites(trials or TRIALS, only)
+    for check in stress(only) if trials is None else stress(only, trials):
         shared.progress(names.index(check.suite), len(names), check.id)
         checks.append(check)
     shared.end_progress()
     if not checks:
-        raise unknown("check", ",".join(only), TRIALS, "--only")
+        raise unknown("check", ",".join(only), trials or TRIALS, "--only")
     failed = [check for check in checks if not check.passed]
     if options.save is not None:
         _save(options.save, checks)
     # The scene of a check that is requested by its id is not saved, because an earlier run that
     # failed has saved it.
-    elif not any("/" in each for each in only):
+    elif trials is None and not any("/" in each for each in only):
         try:
             _save(_FOLDER, failed)
         except InputError as error:
             shared.warn(f"the inputs of what failed are not saved: {error}")
-    shared.show(stress_report([trial(name) for name in _chosen(only)], checks), options)
+    shown = list(trials.values()) if trials else [trial(name) for name in _chosen(only)]
+    shared.show(stress_report(shown, checks), options)
     return 1 if failed else 0
+
+
+def _of_scene(options: argparse.Namespace) -> dict[str, Trial]:
+    """Return the trials of the scene in the file that --scene names."""
+    from pyharness.checks.scene_trials import scene_trials
+    from pyharness.dynamics.scene_reader import read_scene
+    from pyharness.model.scene import checked_scene
+
+    shared.refuse(options, "--scene", ("plot", "save"))
+    for each in shared.names(options.only):
+        name = each.partition("/")[0]
+        if name in TRIALS and name not in SCENE_TRIALS:
+            raise InputError(
+                f"--only {name}: the trial has scenes of its own; allowed with --scene: "
+                f"{', '.join(SCENE_TRIALS)}"
+            )
+    scene = checked_scene(read_scene(options.scene), any_state=True)
+    return scene_trials(scene, f" --scene {shlex.quote(options.scene)}")
 
 
 def _chosen(only: list[str]) -> list[str]:

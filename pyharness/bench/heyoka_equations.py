@@ -1,0 +1,86 @@
+"""The equations of motion of a scene as expressions of the package heyoka."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from pyharness.bench import compiled_peers as compiled
+from pyharness.dynamics.system import system_of
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.tape import Functions, Table, evaluate
+from pyharness.truth.reference import exact_coefficients
+
+# A torque about the body axes (N m), as a function of time, omega, attitude, sine and cosine.
+Formula = Callable[..., Sequence[Any]]
+
+
+def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple[Any, Any]]:
+    """Return pairs of an unknown and its derivative, for the integrators of heyoka.
+
+    The unknowns are omega and, if the scene has an attitude, the quaternion. A torque that depends
+    on the state is evaluated from its tape in the arithmetic of heyoka. If `formula` is not None,
+    the torque is computed by this function instead, independently of the tape. Raise InputError for
+    an opaque torque or a table, which heyoka can't evaluate.
+    """
+    import heyoka
+
+    unknowns = compiled.state_names(scene)
+    state = heyoka.make_vars(*unknowns)
+    if formula is not None:
+        found = _by_formula(scene, formula, state)
+    elif isinstance(scene.torque, StateTorque):
+        found = _by_tape(scene, state)
+    else:
+        names = {"sin": heyoka.sin, "cos": heyoka.cos, "t": heyoka.time}
+        names |= dict(zip(unknowns, state, strict=True))
+        rates = compiled.rates(scene, "t", unknowns, _coefficients(scene))
+        found = [eval(rate, names) for rate in rates]
+    return [(x, heyoka.expression(rate)) for x, rate in zip(state, found, strict=True)]
+
+
+def _coefficients(scene: Scene) -> list[float]:
+    return [float(each) for each in exact_coefficients(scene)]
+
+
+def _by_formula(scene: Scene, formula: Formula, state: Sequence[Any]) -> list[Any]:
+    import heyoka
+
+    x, y, z, *q = state
+    torque = formula(heyoka.time, (x, y, z), q, heyoka.sin, heyoka.cos)
+    found: list[Any] = [
+        coefficient * product + component / moment
+        for coefficient, product, component, moment in zip(
+            _coefficients(scene), (y * z, z * x, x * y), torque, scene.moments or (1.0,) * 3,
+            strict=True,
+        )
+    ]  # fmt: skip
+    if q:
+        a, b, c, d = q
+        found += [
+            -0.5 * (b * x + c * y + d * z),
+            0.5 * (a * x + c * z - d * y),
+            0.5 * (a * y + d * x - b * z),
+            0.5 * (a * z + b * y - c * x),
+        ]
+    return found
+
+
+def _by_tape(scene: Scene, state: Sequence[Any]) -> list[Any]:
+    import heyoka
+
+    assert isinstance(scene.torque, StateTorque)
+    if scene.torque.tape is None:
+        raise InputError(
+            "heyoka can't evaluate an opaque torque; allowed: a torque that can be recorded"
+        )
+
+    def table(_: Table, time: Any) -> Any:
+        raise InputError("heyoka can't evaluate a table; allowed: a torque without tables")
+
+    functions: Functions[Any] = Functions(
+        heyoka.expression, heyoka.sqrt, heyoka.exp, heyoka.sin, heyoka.cos, table
+    )
+    # The inputs without attitude are not read.
+    inputs = [heyoka.time, *state, *[None] * (7 - len(state))]
+    return evaluate(system_of(scene, scene.attitude is not None), inputs, functions)

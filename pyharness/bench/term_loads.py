@@ -1,0 +1,250 @@
+"""The problems of `bench --terms`: torques that depend on the state, of one and of many bodies."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pyharness.bench.ensemble_contenders import EnsembleLoad
+from pyharness.bench.heyoka_equations import Formula
+from pyharness.bench.measure import Workload
+from pyharness.dynamics import field_terms, terms
+from pyharness.methods.solve import solve
+from pyharness.model.scene import Scene
+from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.trajectory import Array
+from pyharness.model.values import Triple
+from pyharness.truth.reference import reference
+
+HORIZONS = (10.0, 100.0)  # end times of a single body, s
+READY, EXPRESSION = "ready term", "expression"
+_MOMENTS: Triple = (1.0, 2.0, 2.5)  # kg m2
+_OMEGA: Triple = (0.3, 0.2, 0.9)  # rad/s
+_SPREAD = 0.2  # largest difference of a component of a body's initial omega from _OMEGA, rad/s
+_ATTITUDE = (0.6, 0.0, 0.8, 0.0)
+
+# Numbers of the ready terms, which occur in the terms and again in the formulas.
+_D = (0.05, 0.1, 0.15)
+_CUBIC = 0.1
+_TARGET = (0.1, 0.2, 0.5)
+_STIFFNESS, _GAIN = 0.5, 0.2
+_MOMENTUM, _MOTOR = (0.1, 0.3, 0.2), (0.0, 0.002, 0.0)
+_ORBIT = 0.3
+_DIPOLE, _FIELD = (0.1, 0.2, 0.3), (0.6, 0.3, 0.2)
+_SWING, _FREQUENCY = (0.2, 0.0, 0.1), 0.7
+_COILS = 0.1
+_PUSH = (0.05, 0.02, 0.1)
+
+
+@dataclass(frozen=True)
+class TermScene:
+    """A scene with a torque that depends on the state.
+
+    `kind` is `READY` or `EXPRESSION`. `formula` computes the torque of a ready term independently
+    of the term; it is None for an expression.
+    """
+
+    kind: str
+    scene: Scene
+    formula: Formula | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class TermBodies(EnsembleLoad):
+    """Many bodies with a torque that depends on the state, each with its own initial omega."""
+
+    body: Scene  # the body, its torque, and the initial attitude of all
+
+    @property
+    def scene(self) -> Scene:
+        """Return the scene that all bodies share."""
+        return self.body
+
+    @property
+    def horizon(self) -> float:
+        """Return the end time (s)."""
+        return HORIZONS[0]
+
+    def ends(self) -> Array:
+        """Return reference values of omega for all bodies at the end time, in rad/s, shape (n, 3).
+
+        Our function `solve` computes the values with the tolerance 1e-15.
+        """
+        attitude = self.body.attitude is not None
+        return np.array([
+            solve(
+                replace(self.body, omega=start), [self.horizon], tolerance=1e-15, attitude=attitude
+            ).omega[0]
+            for start in self.omega0.tolist()
+        ])  # fmt: skip
+
+
+def term_scenes() -> list[TermScene]:
+    """Return the scenes of the benchmark: nine ready terms, then the expressions.
+
+    A scene has an attitude if its torque depends on it.
+    """
+    turning = TorqueLaw(_FIELD, sines=[(_SWING, _FREQUENCY)], frame="space")
+    ready: dict[str, tuple[Any, Formula]] = {
+        "damping": (terms.damping(_D), _damping),
+        "cubic drag": (terms.drag([0.0, _CUBIC]), _drag),
+        "rate control": (terms.rate_control(_GAIN, _TARGET), _rate_control),
+        "attitude control": (terms.attitude_control(_STIFFNESS, _GAIN), _attitude_control),
+        "wheels": (terms.wheels(_MOMENTUM, _MOTOR), _wheels),
+        "gravity gradient": (field_terms.gravity_gradient(_MOMENTS, _ORBIT), _gravity_gradient),
+        "magnetic dipole": (field_terms.magnetic_dipole(_DIPOLE, turning), _magnetic_dipole),
+        "magnetic damping": (field_terms.magnetic_damping(_COILS, _FIELD), _magnetic_damping),
+        "in_space": (field_terms.in_space(_PUSH), _in_space),
+    }
+    found = [
+        TermScene(READY, _scene(name, torque), formula) for name, (torque, formula) in ready.items()
+    ]
+    return found + [
+        TermScene(EXPRESSION, _scene(name, torque)) for name, torque in EXPRESSIONS.items()
+    ]
+
+
+def _scene(name: str, torque: Any) -> Scene:
+    scene = Scene(name, _OMEGA, _MOMENTS, torque=torque)
+    return replace(scene, attitude=_ATTITUDE) if scene.torque.needs_attitude else scene
+
+
+def term_loads(scenes: Sequence[TermScene]) -> list[Workload]:
+    """Return the benchmark problems of single bodies: each scene to each end time."""
+    return [
+        Workload(
+            each.scene.name, each.scene, time, (each.kind,), reference(each.scene, [time]),
+            scale=max(map(abs, each.scene.omega)),
+        )
+        for each in scenes
+        for time in HORIZONS
+    ]  # fmt: skip
+
+
+def term_bodies(scenes: Sequence[TermScene], seed: str, n: int) -> list[TermBodies]:
+    """Return the benchmark problems of `n` bodies; the text `seed` determines their omegas."""
+    source = np.random.default_rng([ord(letter) for letter in f"terms/{seed}"])
+    omega0 = np.array(_OMEGA) + source.uniform(-_SPREAD, _SPREAD, (n, 3))
+    return [TermBodies(each.scene.name, omega0, None, each.scene) for each in scenes]
+
+
+def _quadratic_drag(t: Any, w: Any) -> Any:
+    return -0.1 * w * np.sqrt(w @ w + 0.01)
+
+
+def _saturated_control(t: Any, w: Any) -> Any:
+    return -0.3 * (w - np.array(_TARGET)) / np.sqrt(1.0 + w @ w)
+
+
+def _friction(t: Any, w: Any) -> Any:
+    return -0.1 * np.tanh(3.0 * w)
+
+
+def _gust(t: Any, w: Any) -> Any:
+    return [0.3 * np.exp(-0.1 * (t - 4.0) ** 2), -0.05 * w[1], 0.1 * np.exp(-w[2] * w[2])]
+
+
+def _rotor(t: Any, w: Any) -> Any:
+    return 0.4 * np.cross([0.1, 0.3, 0.9], w) + [0.1 * np.sin(1.7 * t + 0.4 * w[0]), 0.0, 0.0]
+
+
+def _swing(t: Any, w: Any) -> Any:
+    return np.array([0.2, -0.1, 0.15]) * np.cos(2.0 * w[0] + w[1]) - 0.05 * w
+
+
+def _fading(t: Any, w: Any) -> Any:
+    return np.cross(w, [0.5, 0.1, 0.2]) / (1.0 + 0.1 * t * t) - 0.02 * w / (1.0 + w @ w)
+
+
+def _spring(t: Any, w: Any, q: Any) -> Any:
+    return -0.4 * q[0] * q[1:] - 0.1 * w
+
+
+def _wind(t: Any, w: Any, q: Any) -> Any:
+    scalar, vector = q[0], q[1:]
+    stream = np.array([1.0, 0.2, 0.0])
+    flow = stream + 2.0 * np.cross(vector, np.cross(vector, stream) - scalar * stream)
+    return 0.1 * flow[0] * np.cross([0.3, 0.0, 0.1], flow) - 0.05 * w
+
+
+def _beacon(t: Any, w: Any, q: Any) -> Any:
+    north = 2.0 * (q[1] * q[3] - q[0] * q[2])
+    return [0.1 * np.sin(0.5 * t) * north, -0.1 * w[1], 0.1 * north * north - 0.1 * w[2]]
+
+
+EXPRESSIONS: dict[str, Callable[..., Any]] = {
+    "quadratic drag": _quadratic_drag,
+    "saturated control": _saturated_control,
+    "smooth friction": _friction,
+    "gust": _gust,
+    "rotor": _rotor,
+    "swing": _swing,
+    "fading wheel": _fading,
+    "spring": _spring,
+    "wind": _wind,
+    "beacon": _beacon,
+}
+
+# The formulas of docs/how-to/torques.md, written out. Their arguments are the time, omega, the
+# attitude, sine and cosine.
+
+
+def _cross(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def _about_body(vector: Sequence[Any], q: Sequence[Any]) -> list[Any]:
+    """Return R^T times a vector, with the rotation R from body to space as a matrix."""
+    a, b, c, d = q
+    rows = [
+        [1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)],
+        [2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)],
+        [2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)],
+    ]
+    return [
+        rows[0][i] * vector[0] + rows[1][i] * vector[1] + rows[2][i] * vector[2] for i in range(3)
+    ]
+
+
+def _damping(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
+    return [-d * each for d, each in zip(_D, w, strict=True)]
+
+
+def _drag(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
+    square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+    return [-_CUBIC * square * each for each in w]
+
+
+def _rate_control(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
+    return [-_GAIN * (each - target) for each, target in zip(w, _TARGET, strict=True)]
+
+
+def _attitude_control(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
+    return [-2.0 * _STIFFNESS * q[0] * q[i + 1] - _GAIN * w[i] for i in range(3)]
+
+
+def _wheels(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
+    h = [start + motor * t for start, motor in zip(_MOMENTUM, _MOTOR, strict=True)]
+    return [-turn - motor for turn, motor in zip(_cross(w, h), _MOTOR, strict=True)]
+
+
+def _gravity_gradient(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
+    r = _about_body([cos(_ORBIT * t), sin(_ORBIT * t), 0.0], q)
+    weighted = [moment * each for moment, each in zip(_MOMENTS, r, strict=True)]
+    return [3.0 * _ORBIT**2 * each for each in _cross(r, weighted)]
+
+
+def _magnetic_dipole(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
+    wave = sin(_FREQUENCY * t)
+    field = [base + swing * wave for base, swing in zip(_FIELD, _SWING, strict=True)]
+    return _cross(_DIPOLE, _about_body(field, q))
+
+
+def _magnetic_damping(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
+    b = _about_body(_FIELD, q)
+    return [_COILS * each for each in _cross(_cross(w, b), b)]
+
+
+def _in_space(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
+    return _about_body(_PUSH, q)

@@ -1,0 +1,283 @@
+"""The report of `bench --terms`: run times and ratios for torques that depend on the state."""
+
+import statistics
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from pyharness.bench.ensemble_measure import TARGETS as BODY_TARGETS
+from pyharness.bench.ensemble_measure import Rate, Rates
+from pyharness.bench.measure import Finding, Row, Workload
+from pyharness.bench.page import grouped, measured_report
+from pyharness.bench.report import microseconds, not_measured, ratio
+from pyharness.bench.scores import geometric_mean, scores
+from pyharness.bench.term_contenders import (
+    DOP853,
+    DOP853_TOLERANCE,
+    HEYOKA,
+    MANY_HEYOKA,
+    MANY_OURS,
+    OURS,
+)
+from pyharness.bench.term_loads import EXPRESSION, HORIZONS, READY
+from pyharness.model.report import Column, Report, Table, digits, numbers
+
+TARGETS = (1e-6, 1e-8, 1e-10, 1e-12)
+_TITLES = {READY: "Ready terms", EXPRESSION: "Traced expressions"}
+_WORTH = (
+    "One process, one core and one run: processor times, medians of interleaved batches. Times "
+    "drift with the machine and with what else it does: compare the ratios, not the times."
+)
+_SHORT = "{:.0e}"
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The results of one run of `bench --terms`, for single bodies and for many bodies."""
+
+    single: Finding
+    many: Rates
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The ratios of heyoka's to our run time over all scenes of a kind, at one target error."""
+
+    kind: str  # `READY` or `EXPRESSION`
+    bodies: int  # number of bodies in a call
+    target: float | None  # error to be reached; None for all target errors together
+    scenes: int  # number of ratios: scenes and end times in which both solvers reach the error
+    mean: float | None  # geometric mean of the ratios
+    smallest: float | None
+
+
+def term_report(found: Terms, packages: Iterable[str], command: str) -> Report:
+    """Return the report of `bench --terms`: tables of single bodies, of many, and mean ratios.
+
+    A ratio is the run time of heyoka divided by that of our solver at the same error. `packages`
+    are the packages whose versions are listed. `command` is the command that produces the report
+    again.
+    """
+    return measured_report(
+        "# Torques that depend on the state",
+        _WORTH,
+        _parts(found),
+        _notes(found),
+        lambda: _record(found),
+        _data(found),
+        {},
+        packages,
+        command,
+    )
+
+
+def summaries(found: Terms) -> list[Summary]:
+    """Return the mean and the smallest ratio of run times, for each kind of scene and each error.
+
+    Return an empty list if heyoka was not measured.
+    """
+    result = []
+    for kind in _TITLES:
+        loads = [load for load in found.single.workloads if kind in load.kinds]
+        rows = [_ratios(found.single, load) for load in loads]
+        result += _summary(kind, 1, TARGETS, rows)
+        names = dict.fromkeys(load.label for load in loads)
+        many = [[_body_ratio(found.many, name, target) for target in BODY_TARGETS]
+                for name in names]  # fmt: skip
+        result += _summary(kind, found.many.bodies, BODY_TARGETS, many)
+    return result
+
+
+def _summary(
+    kind: str, bodies: int, targets: Sequence[float], rows: Sequence[Sequence[float | None]]
+) -> list[Summary]:
+    result = []
+    for target in (*targets, None):
+        place = slice(None) if target is None else slice(k := targets.index(target), k + 1)
+        known = [each for row in rows for each in row[place] if each is not None]
+        if known:
+            mean, least = geometric_mean(known), min(known)
+            result.append(Summary(kind, bodies, target, len(known), mean, least))
+    return result
+
+
+def _ratios(finding: Finding, load: Workload) -> list[float | None]:
+    """Return heyoka's run time over ours at each target error; None where one is not known."""
+    times = {each.method: each.seconds for each in scores(finding, load, TARGETS)}
+    nowhere = (None,) * len(TARGETS)
+    pairs = zip(times.get(HEYOKA, nowhere), times.get(OURS, nowhere), strict=True)
+    return [by / own if by and own else None for by, own in pairs]
+
+
+def _body_row(rates: Rates, name: str, target: float, method: str) -> Rate | None:
+    same = (r for r in rates.rows if (r.load, r.target, r.method) == (name, target, method))
+    return next(same, None)
+
+
+def _body_ratio(rates: Rates, name: str, target: float) -> float | None:
+    """Return our bodies per second over those of heyoka's batch integrator, or None."""
+    own, other = (_body_row(rates, name, target, each) for each in (MANY_OURS, MANY_HEYOKA))
+    return own.rate / other.rate if own and other else None
+
+
+def _rows(finding: Finding, load: Workload, method: str) -> list[Row]:
+    return [row for row in finding.rows if row.workload == load and row.method == method]
+
+
+def _over_dop853(finding: Finding, load: Workload) -> float | None:
+    """Return the run time of DOP853 over ours at the same tolerance, or None."""
+    by, own = (
+        next((row.seconds for row in _rows(finding, load, name)
+              if row.setting == DOP853_TOLERANCE), None)
+        for name in (DOP853, OURS)
+    )  # fmt: skip
+    return by / own if by and own else None
+
+
+def _preparing(finding: Finding, load: Workload, method: str) -> float | None:
+    """Return the time (s) to prepare a solver for the shortest end time of a scene, or None.
+
+    heyoka compiles an integrator for each tolerance, and the time is the median of all. Ours is the
+    time of the first preparation, after which parts are kept.
+    """
+    first = next(each for each in finding.workloads if each.label == load.label)
+    times = [row.preparing for row in _rows(finding, first, method)]
+    return (times[0] if method == OURS else statistics.median(times)) if times else None
+
+
+def _has(found: Terms, method: str) -> bool:
+    rows: list[Row | Rate] = [*found.single.rows, *found.many.rows]
+    return any(row.method == method for row in rows)
+
+
+def _parts(found: Terms) -> list[tuple[str, Table]]:
+    parts = []
+    for kind, title in _TITLES.items():
+        if loads := [load for load in found.single.workloads if kind in load.kinds]:
+            parts.append((f"{title}: one body", _single_table(found, loads)))
+            names = dict.fromkeys(load.label for load in loads)
+            if any(row.load in names for row in found.many.rows):
+                told = f"{title}: {found.many.bodies} bodies, T = {HORIZONS[0]:g} s"
+                parts.append((told, _many_table(found, list(names))))
+    if rows := [list(asdict(each).values()) for each in summaries(found)]:
+        columns = [
+            Column("heyoka's time / ours", left=True), Column("bodies"), Column("error", _target),
+            Column("ratios"), Column("geometric mean", ratio), Column("smallest", ratio),
+        ]  # fmt: skip
+        parts.append(("Geometric mean and smallest ratio", Table(columns, rows)))
+    return parts
+
+
+def _single_table(found: Terms, loads: Sequence[Workload]) -> Table:
+    with_heyoka, with_dop853 = _has(found, HEYOKA), _has(found, DOP853)
+    columns = [Column("us per solve to", left=True), Column("T", digits("g"))]
+    for target in TARGETS:
+        columns.append(Column(_target(target), microseconds, unit="s"))
+        columns += [Column("ratio", ratio)] * with_heyoka
+    columns.append(Column("prepare", _milliseconds, unit="s"))
+    columns += [Column("compile", _milliseconds, unit="s")] * with_heyoka
+    columns += [Column("DOP853", ratio)] * with_dop853
+    rows = []
+    for load in loads:
+        times = {each.method: each.seconds for each in scores(found.single, load, TARGETS)}
+        row: list[Any] = [load.label, load.horizon]
+        own = times.get(OURS, (None,) * len(TARGETS))
+        for seconds, by in zip(own, _ratios(found.single, load), strict=True):
+            row += [seconds, by] if with_heyoka else [seconds]
+        row.append(_preparing(found.single, load, OURS))
+        row += [_preparing(found.single, load, HEYOKA)] * with_heyoka
+        row += [_over_dop853(found.single, load)] * with_dop853
+        rows.append(row)
+    return Table(columns, rows)
+
+
+def _many_table(found: Terms, names: Sequence[str]) -> Table:
+    with_heyoka = _has(found, MANY_HEYOKA)
+    columns = [Column("us a body to", left=True)]
+    for target in BODY_TARGETS:
+        columns.append(Column(_target(target), microseconds, unit="s"))
+        columns += [Column("ratio", ratio)] * with_heyoka
+    rows = []
+    for name in names:
+        row: list[Any] = [name]
+        for target in BODY_TARGETS:
+            own = _body_row(found.many, name, target, MANY_OURS)
+            row.append(1.0 / own.rate if own else None)
+            row += [_body_ratio(found.many, name, target)] * with_heyoka
+        rows.append(row)
+    return Table(columns, rows)
+
+
+def _target(target: float | None) -> str:
+    return "all" if target is None else _SHORT.format(target).replace("e-0", "e-")
+
+
+def _milliseconds(seconds: float | None) -> str:
+    return "-" if seconds is None else f"{1e3 * seconds:.2g}" if seconds < 0.1 else (
+        f"{1e3 * seconds:.0f}"
+    )  # fmt: skip
+
+
+def _notes(found: Terms) -> list[str]:
+    lines = [
+        "us per solve: time of a prepared solver's call at its fastest tolerance whose error at T "
+        "is at most the target error; '-': no tolerance has one. The error is that of omega over "
+        "the largest |omega| at 0 and T, or the angle between the attitudes (rad) if it is larger. "
+        "prepare: time of the first prepare(), ms.",
+    ]
+    if _has(found, HEYOKA):
+        lines.append(
+            "ratio: heyoka's time / ours at the same error, above 1: ours is faster. heyoka's "
+            "integrator is kept, and its time and state are set anew for each call. compile: "
+            "median time in which heyoka compiles one integrator, ms, not in the ratio."
+        )
+    if _has(found, DOP853):
+        lines.append(
+            f"DOP853: time of SciPy's solve_ivp over ours, both with the tolerance "
+            f"{_target(DOP853_TOLERANCE)}."
+        )
+    if found.many.rows:
+        lines.append(
+            f"{found.many.bodies} bodies: each way has its coarsest tolerance with which the "
+            "error of omega of the first 200 bodies is at most the one named, against solve at "
+            f"1e-15, on one core. Initial omegas at random, seed {found.many.seed}."
+        )
+    refused = grouped((name, why, place) for place, name, why in found.many.refused)
+    return lines + not_measured(found.single) + refused
+
+
+def _data(found: Terms) -> Table:
+    rows = [
+        [row.workload.kinds[0], row.workload.label, row.workload.horizon, 1, row.method,
+         row.setting, row.seconds, row.error, row.preparing, row.note]
+        for row in found.single.rows
+    ]  # fmt: skip
+    kinds = {load.label: load.kinds[0] for load in found.single.workloads}
+    rows += [
+        [kinds[each.load], each.load, HORIZONS[0], each.bodies, each.method, each.setting,
+         each.seconds, each.error, None, ""]
+        for each in found.many.rows
+    ]  # fmt: skip
+    return numbers("kind torque horizon bodies method setting seconds error preparing note", rows)
+
+
+def _record(found: Terms) -> dict[str, Any]:
+    table = _data(found)
+    names = [each.head for each in table.columns]
+    return {
+        "rows": [dict(zip(names, row, strict=True)) | {"note": row[-1] or None}
+                 for row in table.rows],
+        "refused": [
+            {"torque": each.workload.label, "horizon": each.workload.horizon, "bodies": 1,
+             "method": each.method, "setting": each.setting, "reason": each.reason}
+            for each in found.single.refused
+        ] + [
+            {"torque": place or None, "horizon": HORIZONS[0], "bodies": found.many.bodies,
+             "method": name, "setting": None, "reason": why}
+            for place, name, why in found.many.refused
+        ],
+        "means": [asdict(each) for each in summaries(found)],
+        "reference_error": found.single.doubt,
+        "seed": found.many.seed,
+        "bodies": found.many.bodies,
+    }  # fmt: skip

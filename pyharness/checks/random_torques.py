@@ -1,0 +1,155 @@
+"""Checks of methods in random scenes whose torque depends on omega or attitude.
+
+The torque is the sum of recorded functions, or of ready terms. The true solution is the reference,
+whose series of the recorded torque (`pyharness.truth.tape_series`) shares no code with the methods.
+Omega and attitude are compared, from every entry point that takes such a scene.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache, partial
+from random import Random
+
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.judge import (
+    Answer,
+    MethodRun,
+    Policy,
+    Truth,
+    by_rows,
+    lively,
+    reference_truth,
+    tolerance_of,
+)
+from pyharness.checks.methods import run_of_call
+from pyharness.checks.orders import in_few_steps, order_if_seen
+from pyharness.checks.random_methods import ROUNDING, sample
+from pyharness.checks.selection import Selection
+from pyharness.methods.many import solve_many
+from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, PREPARED_FOR_STATE, SCIPY_METHODS
+from pyharness.model.errors import InputError
+from pyharness.model.extension import ENDS
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import WITH_ALL_ROWS
+from pyharness.scenes.random_scenes import COARSEST
+from pyharness.scenes.state_scenes import draw, draw_ready
+from pyharness.truth.reference import reference
+
+# One of 20 draws of a run has such a scene, and in one of 80 the methods in Python are tried too.
+_EVERY, _EVERY_SLOW = 20, 80
+_EFFORT = 0.2  # factor on the work limit of the reference
+_EARLIER = 0.4  # fraction of the last time, to judge intermediate output too
+# Methods in Python or in decimal arithmetic. The finest tolerances take them too long.
+_FINE = 1e-9
+# Gauss collocation of low order takes too many steps.
+_SLOW = ("reference", *SCIPY_METHODS)
+_STAGES = (2, 8)
+_RADIANS = 4.0
+
+
+def random_torques(chosen: Selection) -> Iterator[Attempt]:
+    """Yield deferred checks of omega and attitude under random torques that depend on the state.
+
+    The scenes are drawn from the seed of `chosen`, the selection of checks. A scene is left out if
+    its true solution grows without bound or takes too long to compute, or if rounding errors leave
+    no correct digit of it. A deferred check is computed only if it is requested.
+    """
+    for number in range(0, chosen.draws, _EVERY):
+        if not chosen.may_ask(f"random/{number}"):
+            continue
+        source = Random(f"torque {chosen.seed}/{number}")
+        # Both kinds of torque occur in the draws in which all methods are tried.
+        kind = (number // _EVERY + number // _EVERY_SLOW) % 2
+        scene, time = (draw, draw_ready)[kind](source)
+        is_slow = number % _EVERY_SLOW == 0 and not chosen.thin
+        entrances = {
+            name: x
+            for name, x in _entrances(scene, time, source, is_slow).items()
+            if chosen.may_ask(f"random/{number}/{name}")
+        }
+        if is_slow:
+            yield from _orders(chosen, number, scene, abs(time))
+        try:
+            truth = reference_truth(scene, (_EARLIER * time, time), _EFFORT) if entrances else None
+        except InputError:
+            # The motion is too fast or too long for any true solution, or it diverges.
+            continue
+        if truth and ROUNDING * truth.flow.amplification < 1.0:
+            for subject, tried in entrances.items():
+                yield Attempt(chosen.drawn(number, subject), partial(_samples, tried, truth))
+
+
+def _orders(chosen: Selection, number: int, scene: Scene, time: float) -> Iterator[Attempt]:
+    """Yield deferred checks of the order of each method with a fixed step, in a few radians."""
+    coarse = in_few_steps(scene, min(time, _RADIANS / max(map(abs, scene.omega))))
+    known = cache(partial(reference, coarse, coarse.times()))
+    for method in FIXED_STEP:
+        name = replace(chosen.drawn(number, "torque-order"), setting=method)
+        yield Attempt(name, partial(order_if_seen, coarse, known))
+
+
+def _entrances(
+    scene: Scene, time: float, source: Random, is_slow: bool
+) -> dict[str, Callable[[], MethodRun]]:
+    """Return a deferred run for each entry point, by its name, as in ``torque-solve-taylor``.
+
+    `source` draws the tolerances, from 1e-3 to the finest of a method, and the stages of Gauss
+    collocation.
+    """
+    times, digits = (_EARLIER * time, time), source.random()
+    slow = (*_SLOW, f"gauss-{source.randint(*_STAGES)}") if is_slow else ()
+
+    def tolerance(name: str) -> float:
+        finest = max(METHODS[name].finest, 0.0 if name in PREPARED_FOR_STATE else _FINE)
+        return float(COARSEST * (finest / COARSEST) ** digits)
+
+    found: dict[str, Callable[[], MethodRun]] = {}
+    for name in (*PREPARED_FOR_STATE, *slow):
+        found[f"torque-solve-{name}"] = partial(by_rows, name, tolerance(name), scene, times)
+    for name in PREPARED_FOR_STATE:
+        run = partial(run_of_call, name, tolerance(name), scene, time)
+        found[f"torque-prepare-{name}"] = run
+    found["torque-solve-many"] = partial(_by_many, tolerance("auto"), scene, time)
+    return found
+
+
+def _by_many(tolerance: float, scene: Scene, time: float) -> MethodRun:
+    def ask() -> Answer:
+        found = solve_many([scene, scene], time, tolerance=tolerance)
+        attitude = None if found.attitude is None else found.attitude[1:]
+        ended = ENDS[found.status[1]]
+        return Answer(found.omega[1:], attitude, ended, is_whole=ended in WITH_ALL_ROWS)
+
+    return MethodRun("auto", tolerance, scene, ask)
+
+
+def _may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
+    """Return whether a method may refuse the scene of its run `tried` with the message `why`.
+
+    Methods in Python may refuse a scene that takes too much work, and SciPy's methods a tolerance
+    that they can't meet.
+    """
+    if tried.method in SCIPY_METHODS and "can't meet it" in why:
+        return True
+    return tried.method in (*SCIPY_METHODS, *GAUSS) and "allow more work" in why
+
+
+def _limit(truth: Truth, tried: MethodRun) -> float:
+    growth = truth.flow.amplification
+    own = truth.relative_error if truth.attitude is None else truth.angle_error
+    return tolerance_of(tried) * lively(growth) + ROUNDING * growth + own
+
+
+POLICY = Policy(_limit, _may_refuse)
+"""Policy whose limit is the tolerance plus `ROUNDING` times the error amplification.
+
+The tolerance is multiplied by the error amplification only if this exceeds `LIVELY`. The limit also
+contains the error of the true solution.
+"""
+
+
+def _samples(tried: Callable[[], MethodRun], truth: Truth, name: Name) -> Iterator[Check]:
+    run = cache(tried)
+    yield sample(run, replace(truth, attitude=None), POLICY, name.of("omega"))
+    if truth.attitude is not None:
+        yield sample(run, truth, POLICY, name.of("angle"))

@@ -1,0 +1,254 @@
+"""Stress trials of one scene that the user specifies, with any torque that can be recorded.
+
+The other trials have scenes of their own. The trials here make checks that apply to every scene:
+its error against the reference, and transformations that must not change the motion.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+
+from pyharness.checks.check import REFUSED, Attempt, Check, Name
+from pyharness.checks.judge import (
+    MethodRun,
+    Truth,
+    by_rows,
+    judge,
+    reference_truth,
+)
+from pyharness.checks.orders import in_few_steps, order_if_seen
+from pyharness.checks.random_torques import POLICY
+from pyharness.checks.stress import Trial, named
+from pyharness.checks.tolerances import MIDDLING
+from pyharness.checks.trials.threads import THREADS, Job, different
+from pyharness.methods.problem import closed_form
+from pyharness.methods.recorded import system
+from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS
+from pyharness.methods.solve import solve
+from pyharness.model.attitude import IDENTITY, angle_between, product, quaternion_of_axes
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.trajectory import Array
+from pyharness.scenes.rotated import axes_of, restarted_at, rotated
+from pyharness.theory.conditioning import Conditioning
+from pyharness.theory.state_conditioning import conditioning_at
+from pyharness.truth.reference import reference
+
+_METHODS = ("auto", "taylor", "gauss-4", "gauss-8", *SCIPY_METHODS)
+# Methods that are also tried at their finest tolerance. It takes the methods in Python too long.
+_FINE = ("auto", "taylor", "closed-form")
+_PARTS = (0.125, 0.25, 0.5, 1.0)  # of the last time
+_CUT = 0.37  # fraction of the last time at which a motion is divided
+_REPEATS = 4
+
+# Omega (rad/s, shape (3,)) and the attitude (shape (4,)), or None without one.
+State = tuple[Array, Array | None]
+
+
+def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
+    """Return the trials of a scene, by name.
+
+    The last time is that of the scene's last step. `options` is the option of `stress` with the
+    scene file, for the commands that repeat a check. Raise InputError if the torque is opaque, or
+    if it needs an attitude that the scene does not have.
+    """
+    if isinstance(scene.torque, StateTorque):
+        system(scene)  # raises InputError for an opaque torque
+        if scene.torque.needs_attitude and scene.attitude is None:
+            raise InputError(
+                "the torque depends on the attitude, and the scene has none; give [initial] "
+                "attitude"
+            )
+    else:
+        # Gauss collocation computes no attitude under a torque law.
+        scene = replace(scene, attitude=None)
+    made: dict[str, tuple[str, str, Callable[[Scene, Name], Iterator[Attempt]]]] = {
+        "length": (
+            "errors after an eighth, a quarter, half and all of the scene's time",
+            "The tolerance, plus 2e-15 K where K is the error amplification. The tolerance is "
+            "multiplied by K if K exceeds 1000.",
+            _length,
+        ),
+        "step-size": (
+            "order of the methods with a fixed step",
+            "The measured order may be .2 smaller than the theoretical one. The order is not "
+            "judged if the torque has a table.",
+            _step_size,
+        ),
+        "invariance": (
+            "motions forward and back, in two pieces, and with permuted axes",
+            "The tolerance and rounding errors of each solution, amplified by the rest of the "
+            "motion.",
+            _invariance,
+        ),
+        "threads": (
+            "the same calls from eight threads",
+            "No bit may differ, since calls share no state.",
+            _threads,
+        ),
+    }
+    own = named("", scene=scene, options=options)
+    return {
+        name: Trial(name, title, bound, partial(_made, attempts, scene, replace(own, suite=name)))
+        for name, (title, bound, attempts) in made.items()
+    }
+
+
+def _made(
+    attempts: Callable[[Scene, Name], Iterator[Attempt]],
+    scene: Scene,
+    name: Name,
+    only: Sequence[str],
+) -> Iterator[Attempt]:
+    """Yield the deferred checks of a trial; those that are not requested are not computed."""
+    return attempts(scene, name)
+
+
+def _last(scene: Scene) -> float:
+    return scene.step_size * scene.steps
+
+
+def _tried(scene: Scene) -> Iterator[tuple[str, float]]:
+    """Yield each method that is tried on a scene, with its tolerances."""
+    for method in (*_METHODS, *(["closed-form"] if closed_form(scene) else [])):
+        yield method, max(MIDDLING, METHODS[method].finest)
+        if method in _FINE:
+            yield method, METHODS[method].finest
+
+
+def _length(scene: Scene, name: Name) -> Iterator[Attempt]:
+    for part in _PARTS:
+        times = (part * _last(scene),)
+        truth = cache(partial(_truth, scene, times))
+        for method, tolerance in _tried(scene):
+            own = replace(
+                name, subject=method, circumstance=f"{part:g}", setting=f"{tolerance:.0e}"
+            )
+            run = partial(by_rows, method, tolerance, scene, times)
+            yield Attempt(own, partial(_errors, run, truth))
+
+
+def _truth(scene: Scene, times: Sequence[float]) -> Truth:
+    return reference_truth(scene, times, 1.0)
+
+
+def _errors(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Name) -> list[Check]:
+    run, exact = tried(), truth()
+    found = [judge(name.of("omega"), run, replace(exact, attitude=None), POLICY)]
+    if exact.attitude is not None:
+        found.append(judge(name.of("angle"), run, exact, POLICY))
+    return found
+
+
+def _step_size(scene: Scene, name: Name) -> Iterator[Attempt]:
+    coarse = in_few_steps(scene, _last(scene))
+    truth = cache(partial(reference, coarse, coarse.times()))
+    for method in FIXED_STEP:
+        yield Attempt(replace(name, subject=method), partial(order_if_seen, coarse, truth))
+
+
+def _invariance(scene: Scene, name: Name) -> Iterator[Attempt]:
+    ways = {"axes": _permuted, "back": _back, "split": _split}
+    for method, tolerance in _tried(scene):
+        for way, make in ways.items():
+            own = replace(name, subject=method, circumstance=way, setting=f"{tolerance:.0e}")
+            yield Attempt(own, partial(_compared, scene, tolerance, make))
+
+
+# A function of a scene and of a method with its tolerance. It returns two states that must agree,
+# and a bound of their relative difference.
+Way = Callable[[Scene, str, float], tuple[State, State, float]]
+
+
+def _compared(scene: Scene, tolerance: float, make: Way, name: Name) -> Check:
+    try:
+        first, second, limit = make(scene, name.subject, tolerance)
+    except InputError as refusal:
+        is_slow = name.subject in (*SCIPY_METHODS, *GAUSS)
+        return name.judged(is_slow, f"{REFUSED}{refusal}")
+    scale = max(float(np.abs(x).max()) for x in (first[0], second[0], scene.omega)) or 1.0
+    apart = float(np.abs(first[0] - second[0]).max()) / scale
+    if first[1] is not None and second[1] is not None:
+        apart = max(apart, float(angle_between(first[1][None, :], second[1][None, :]).max()))
+    return name.bounded(apart, limit)
+
+
+def _end(scene: Scene, time: float, method: str, tolerance: float) -> State:
+    found = solve(scene, time, method, tolerance, attitude=scene.attitude is not None)
+    if not found.has_all_rows:
+        raise InputError(f"{method}: {found.ended} before t = {time:g} s")
+    return found.omega[0], None if found.attitude is None else found.attitude[0]
+
+
+def _from(scene: Scene, state: State, time: float) -> Scene:
+    omega, attitude = state
+    if attitude is None:
+        return restarted_at(scene, omega, time)
+    w, x, y, z = (float(each) for each in attitude)
+    return restarted_at(scene, omega, time, (w, x, y, z))
+
+
+def _flow(scene: Scene, time: float) -> Conditioning:
+    return conditioning_at(scene, [time])
+
+
+def _permuted(scene: Scene, method: str, tolerance: float) -> tuple[State, State, float]:
+    def turn(v: Triple) -> Triple:
+        return v[1], v[2], v[0]
+
+    time, axes = _last(scene), axes_of(turn)
+    w, x, y, z = quaternion_of_axes(axes)
+    other = rotated(scene, turn, body=True)
+    if scene.coefficients is not None:
+        other = replace(other, coefficients=turn(scene.coefficients))
+    if scene.attitude is not None:
+        other = replace(other, attitude=product(scene.attitude or IDENTITY, (w, x, y, z)))
+    omega, attitude = _end(other, time, method, tolerance)
+    if attitude is not None:
+        a, b, c, d = (float(each) for each in attitude)
+        attitude = np.array(product((a, b, c, d), (w, -x, -y, -z)))
+    limit = 2.0 * _flow(scene, time).limit(tolerance)
+    return _end(scene, time, method, tolerance), (axes @ omega, attitude), limit
+
+
+def _back(scene: Scene, method: str, tolerance: float) -> tuple[State, State, float]:
+    time = _last(scene)
+    there = _end(scene, time, method, tolerance)
+    start = _from(scene, there, time)
+    again = _end(start, -time, method, tolerance)
+    back = _flow(start, -time)
+    # The error of the forward run is an initial error of the backward run.
+    limit = _flow(scene, time).limit(tolerance) * back.amplification + back.limit(tolerance)
+    attitude = None if scene.attitude is None else np.array(scene.attitude)
+    return (np.array(scene.omega), attitude), again, limit
+
+
+def _split(scene: Scene, method: str, tolerance: float) -> tuple[State, State, float]:
+    time = _last(scene)
+    cut = _CUT * time
+    middle = _from(scene, _end(scene, cut, method, tolerance), cut)
+    rest = _flow(middle, time - cut)
+    limit = _flow(scene, time).limit(tolerance) + rest.limit(tolerance)
+    limit += _flow(scene, cut).limit(tolerance) * rest.amplification
+    whole = _end(scene, time, method, tolerance)
+    return whole, _end(middle, time - cut, method, tolerance), limit
+
+
+def _threads(scene: Scene, name: Name) -> Iterator[Attempt]:
+    for method in dict.fromkeys(method for method, _ in _tried(scene)):
+        job = Job(method, scene, partial(_bits, scene, method))
+        yield Attempt(replace(name, subject=method), partial(_same, job))
+
+
+def _bits(scene: Scene, method: str) -> bytes:
+    tolerance = max(MIDDLING, METHODS[method].finest)
+    omega, attitude = _end(scene, _last(scene), method, tolerance)
+    return omega.tobytes() + (b"" if attitude is None else attitude.tobytes())
+
+
+def _same(job: Job, name: Name) -> Check:
+    wrong = different([job], repeats=_REPEATS)
+    return name.bounded(len(wrong), 0.0, f"{_REPEATS} calls in {THREADS} threads")

@@ -1,0 +1,90 @@
+"""Comparisons of methods on one scene with each other and with the reference, without programs."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from pyharness.compare.comparison import Comparison, method_finding
+from pyharness.methods.registry import (
+    METHODS,
+    SCIPY_METHODS,
+    check_attitude,
+    check_torque,
+    requested_tolerance,
+)
+from pyharness.methods.sensitivity import motion_growth
+from pyharness.model.attitude import IDENTITY
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.scene import Scene, checked_scene
+from pyharness.truth.reference import reference
+
+
+def compare_methods(
+    scene: Scene,
+    methods: Sequence[str] = ("auto", *SCIPY_METHODS),
+    *,
+    tolerance: float | None = None,
+    effort: float = 1.0,
+    attitude: bool = False,
+) -> Comparison:
+    """Compare methods on one scene with each other and with the reference solution.
+
+    Parameters
+    ----------
+    scene : Scene
+        The body, the initial condition, the torque and the times: the ends of the scene's steps.
+        The torque may depend on omega or attitude if it can be recorded.
+    methods : sequence of str
+        Names in `pyharness.methods.registry.METHODS`; by default `auto` and SciPy's methods.
+    tolerance : float, optional
+        The tolerance of each method, relative to the largest component of omega; the default is the
+        one that `solve` uses for the method. A method with a fixed step takes none.
+    effort : float
+        Factor on the work limit of each method and of the reference.
+    attitude : bool
+        Whether attitudes are compared too, as they are if the torque depends on the attitude.
+
+    Returns
+    -------
+    Comparison
+        The results of the methods, without programs. Its property `unexpected` is empty if every
+        method meets its tolerance.
+
+    Raises
+    ------
+    NotBuiltError
+        If the extension is not built.
+    InputError
+        If a method is unknown or can't solve the scene, if a tolerance is out of range, or if the
+        reference would exceed its work limit.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, compare_methods
+    >>> compare_methods(case_scene(2), ["auto", "dop853"]).unexpected
+    ()
+    """
+    checked_scene(scene, any_state=True)
+    attitude = attitude or scene.torque.needs_attitude
+    tolerances = {name: _tolerance_of_method(name, tolerance) for name in methods}
+    if not tolerances:
+        raise InputError(f"methods: the list is empty; allowed: {', '.join(METHODS)}")
+    for name in tolerances:
+        check_torque(scene, name, attitude)
+        if attitude:
+            check_attitude(name, scene)
+    scene = replace(scene, attitude=(scene.attitude or IDENTITY) if attitude else None)
+    truth = reference(scene, scene.times(), effort=effort)
+    import scipy.integrate  # noqa: F401  (not to be timed with the first method)
+
+    found = tuple(method_finding(scene, *each, effort, truth) for each in tolerances.items())
+    return Comparison(scene, None, truth, (), found, motion_growth(scene, scene.times()[-1]))
+
+
+def _tolerance_of_method(name: str, tolerance: float | None) -> float:
+    if name not in METHODS:
+        raise unknown("method", name, METHODS)
+    chosen = METHODS[name]
+    found = requested_tolerance(name, None if chosen.is_fixed_step else tolerance)
+    if not chosen.finest <= found <= 1.0:
+        raise InputError(f"tolerance is {found:g}; allowed for {name}: {chosen.finest:.2g} to 1")
+    return found

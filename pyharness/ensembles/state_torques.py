@@ -1,0 +1,104 @@
+"""Torques of a sweep that depend on the state: their constants, and terms with the body's inertia.
+
+A scene whose torque depends on the state is read again from its text, with other numbers.
+"""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pyharness.dynamics.scene_reader import scene_of
+from pyharness.ensembles.fields import ATTITUDE, CONSTANTS
+from pyharness.methods.registry import check_torque
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.scene import STATE_TORQUE, Scene
+from pyharness.model.scene_file import scene_text
+from pyharness.model.state_torque import StateTorque
+
+
+def check_state_axis(scene: Scene, field: str) -> None:
+    """Raise InputError if the scene of a sweep has no torque with the field of an axis.
+
+    A torque that depends on the state has neither the constant nor the linear term of a torque law.
+    Only expressions have constants with names, and only a torque that depends on the attitude needs
+    its initial value.
+    """
+    torque = scene.torque
+    if field in ATTITUDE and not torque.needs_attitude:
+        raise InputError(
+            f"axis {field}: the torque does not depend on the attitude; leave the axis out"
+        )
+    if isinstance(torque, StateTorque):
+        names = [name for name, _ in torque.constants]
+        if field.startswith(("torque.constant.", "torque.rate.")):
+            own = [f"{CONSTANTS}{name}" for name in names]
+            raise InputError(
+                f"axis {field}: the torque depends on the state and is no TorqueLaw; allowed: "
+                + (", ".join(own) or "other fields")
+            )
+        if field.startswith(CONSTANTS) and field.removeprefix(CONSTANTS) not in names:
+            name = field.removeprefix(CONSTANTS)
+            raise unknown("constant", name, names or ["none"], f"axis {field}")
+    elif field.startswith(CONSTANTS):
+        raise InputError(
+            f"axis {field}: the torque is a TorqueLaw, which has no constants with names; allowed: "
+            "torque.constant.1 to .3, torque.rate.1 to .3"
+        )
+
+
+def check_state_solver(scene: Scene, methods: Sequence[str], has_program: bool) -> None:
+    """Raise InputError if a solver of a sweep can't solve its scene because of the torque.
+
+    `methods` are the names of all methods that the sweep uses. The programs of the thesis, which
+    the sweep uses if `has_program` is true, take no torque that depends on the state.
+    """
+    if not isinstance(scene.torque, StateTorque):
+        return
+    if has_program:
+        raise InputError(STATE_TORQUE)
+    if scene.torque.needs_attitude and scene.attitude is None:
+        raise InputError(
+            "the torque depends on the attitude, and the scene has none; give [initial] attitude"
+        )
+    for method in methods:
+        check_torque(scene, method, attitude=True)
+
+
+def follows_body(scene: Scene) -> bool:
+    """Return whether the torque of a scene has a ready term with the inertia of the scene's body.
+
+    If the sweep varies the body, the inertia of the term is that of the varied body.
+    """
+    return isinstance(scene.torque, StateTorque) and any(
+        _is_of_body(dict(term), scene) for term in _terms(scene.torque)
+    )
+
+
+def with_numbers(
+    scene: Scene, constants: Mapping[str, float], moments: Sequence[float] | None
+) -> Scene:
+    """Return a scene of a sweep whose torque has other constants or another body's inertia.
+
+    `constants` maps names of the constants in the expressions of the torque to new values, and
+    `moments` (kg m2) are those of the new body, or None. Raise InputError if a value is not
+    allowed, for example because a constant is divided by 0.
+    """
+    data: dict[str, Any] = tomllib.loads(scene_text(scene))
+    if constants:
+        data["torque"]["constants"].update(constants)
+    if moments is not None:
+        assert isinstance(scene.torque, StateTorque)
+        data["body"] = {"moments": list(moments)}
+        for table, term in zip(data["torque"]["terms"], _terms(scene.torque), strict=True):
+            if _is_of_body(dict(term), scene):
+                # The reader then takes the inertia of the table [body].
+                del table["inertia"]
+    return scene_of(data, scene.name)
+
+
+def _terms(torque: StateTorque) -> list[tuple[tuple[str, Any], ...]]:
+    return [each for each in torque.terms if isinstance(each, tuple)]
+
+
+def _is_of_body(term: Mapping[str, Any], scene: Scene) -> bool:
+    return bool(term["kind"] == "gravity_gradient" and term["inertia"] == scene.moments)

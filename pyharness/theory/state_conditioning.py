@@ -1,0 +1,168 @@
+"""Error amplification under a torque that depends on omega and attitude.
+
+Such a torque transmits errors between omega and attitude. The state-transition matrix therefore is
+that of both, if the scene has an attitude. Its derivative follows from the derivatives of the tape
+on which the equations of motion are recorded. Errors of omega are divided by the largest |omega|,
+and those of the attitude are angles (rad), so that all are pure numbers.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pyharness.dynamics.array_tape import inputs_of, outputs_at, table_values
+from pyharness.methods.linearised import transitions
+from pyharness.methods.recorded import system
+from pyharness.methods.solve import solve
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.tape import ATTITUDE, OMEGA, Functions, Tape, evaluate
+from pyharness.model.tape_derivative import with_derivatives
+from pyharness.model.trajectory import Array
+from pyharness.theory.conditioning import Conditioning, conditioning, of_flow
+
+_NODES_PER_RADIAN = 12.0
+_FEWEST_NODES = 100
+_MOST_NODES = 40_000
+# A component of the quaternion is half an angle (rad).
+_OF_ANGLE = 0.5
+
+
+def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
+    """Return the sensitivity of a scene's solution at `times` (s) to earlier errors.
+
+    Under a torque law it is the sensitivity of omega at the last time (`conditioning`). Under a
+    torque that depends on the state, it is the larger sensitivity at any of the times, because
+    damping may reduce errors towards the last one. Raise InputError if the torque is opaque, if the
+    solution grows without bound, or if it would be needed at too many times.
+    """
+    if not isinstance(scene.torque, StateTorque):
+        return conditioning(scene, times[-1])
+    each = [_of_state(scene, time) for time in times]
+    return Conditioning(
+        amplification=max(x.amplification for x in each),
+        rounding=max(x.rounding for x in each),
+        storing=max(x.storing for x in each),
+        unamplified=max(x.unamplified for x in each),
+        largest=max(x.largest for x in each),
+    )
+
+
+def _of_state(scene: Scene, time: float) -> Conditioning:
+    tape = system(scene)
+    slots = OMEGA if scene.attitude is None else (*OMEGA, *ATTITUDE)
+    slopes = with_derivatives(tape, slots)
+    count = _FEWEST_NODES
+    while True:
+        times = np.linspace(0.0, time, count + 1)
+        state = _path(scene, times)
+        largest = float(np.abs(state[:, :3]).max()) or 1.0
+        units = np.array([largest] * 3 + [_OF_ANGLE] * (len(slots) - 3))
+        middle = 0.5 * (state[1:] + state[:-1])
+        matrices = (
+            _jacobians(slopes, 0.5 * (times[1:] + times[:-1]), middle) * units / units[:, None]
+        )
+        wanted = float(np.abs(matrices).sum(axis=2).max()) * abs(time) * _NODES_PER_RADIAN
+        # `wanted` is NaN where the torque is singular.
+        if not wanted <= _MOST_NODES:
+            raise InputError(
+                "conditioning: the motion is too fast for so long a time; use a shorter time"
+            )
+        if count >= wanted:
+            break
+        count = math.ceil(wanted)
+    with np.errstate(all="ignore"):
+        flow = transitions(times, matrices)
+        found = of_flow(flow, times, state / units, _sources(tape, times, state) / units, 1.0)
+    if not (math.isfinite(found.amplification) and math.isfinite(found.rounding)):
+        raise InputError("conditioning: the error amplification overflows; use a shorter time")
+    return replace(found, largest=largest)
+
+
+def _path(scene: Scene, times: Array) -> Array:
+    """Return omega, and the attitude if the scene has one, at `times`, which begin at 0."""
+    if times[-1] == 0.0:
+        return np.tile([*scene.omega, *(scene.attitude or ())], (len(times), 1))
+    attitude = scene.attitude is not None
+    path = solve(scene, times[1:].tolist(), "taylor", 1e-13, attitude=attitude)
+    if not path.has_all_rows:
+        raise InputError(
+            f"conditioning: the solution grows without bound before t = {times[-1]:g} s"
+        )
+    rows = path.omega if path.attitude is None else np.hstack([path.omega, path.attitude])
+    return np.vstack([[*scene.omega, *(scene.attitude or ())], rows])
+
+
+def _jacobians(slopes: Tape, times: Array, state: Array) -> Array:
+    """Return the Jacobian matrices (1/s) of the equations of motion, shape (n, m, m)."""
+    n, m = state.shape
+    return outputs_at(slopes, times, state)[:, m:].reshape(n, m, m)
+
+
+def _sources(tape: Tape, times: Array, state: Array) -> Array:
+    """Return bounds of the rounding errors of the equations of motion, over the unit roundoff.
+
+    The unit roundoff is that of binary64. The result (1/s) has the shape of `state`. Each operation
+    of the tape adds a rounding error of its own result to the errors of its operands (running error
+    analysis). For a sum the magnitudes of all terms are added.
+    """
+    given = [_Bounded(each, np.zeros(len(times))) for each in inputs_of(times, state)]
+    with np.errstate(all="ignore"):
+        found = evaluate(tape, given, _BOUNDS)
+    # An output that is a constant is a number.
+    errors = [_bounded(each).error for each in found]
+    return np.stack([np.broadcast_to(each, len(times)) for each in errors], axis=1)
+
+
+class _Bounded:
+    """Values, and bounds of their rounding errors over the unit roundoff; both are arrays."""
+
+    def __init__(self, value: Any, error: Any) -> None:
+        self.value, self.error = value, error
+
+    def chained(self, value: Any, slope: Any) -> "_Bounded":
+        """Return a function of this value, from its value and its derivative."""
+        return _Bounded(value, np.abs(slope) * self.error + np.abs(value))
+
+    def __add__(self, other: Any) -> "_Bounded":
+        second = _bounded(other)
+        size = np.abs(self.value) + np.abs(second.value)
+        return _Bounded(self.value + second.value, self.error + second.error + size)
+
+    __radd__ = __add__
+
+    def __mul__(self, other: Any) -> "_Bounded":
+        second = _bounded(other)
+        value = self.value * second.value
+        error = np.abs(self.value) * second.error + np.abs(second.value) * self.error
+        return _Bounded(value, error + np.abs(value))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> "_Bounded":
+        second = _bounded(other)
+        value = self.value / second.value
+        error = (self.error + np.abs(value) * second.error) / np.abs(second.value)
+        return _Bounded(value, error + np.abs(value))
+
+    def __rtruediv__(self, other: float) -> "_Bounded":
+        return _bounded(other) / self
+
+
+def _bounded(value: Any) -> _Bounded:
+    return value if isinstance(value, _Bounded) else _Bounded(value, 0.0)
+
+
+_BOUNDS: Functions[Any] = Functions(
+    float,
+    lambda x: x.chained(np.sqrt(x.value), 0.5 / np.sqrt(x.value)),
+    lambda x: x.chained(np.exp(x.value), np.exp(x.value)),
+    # The reduction of a large angle has an error of its own.
+    lambda x: x.chained(np.sin(x.value), 1.0),
+    lambda x: x.chained(np.cos(x.value), 1.0),
+    lambda table, time: time.chained(table_values(table, time.value), 0.0),
+)

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pyharness.compare.comparison import Comparison, compare_programs
+    from pyharness.compare.method_comparison import compare_methods
     from pyharness.dynamics.scene_reader import read_scene
     from pyharness.methods.many import Ensemble, solve_many
     from pyharness.methods.prepared import prepare
     from pyharness.methods.prepared_attitude import AttitudeSolver
     from pyharness.methods.solve import solve
     from pyharness.methods.solver import Solver
+    from pyharness.model.changing import ChangingInertia, ChangingMoments
     from pyharness.model.errors import InputError, NotBuiltError
     from pyharness.model.impossible import ImpossibleBodyWarning
     from pyharness.model.listing import Listing, subset
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AttitudeSolver",
+    "ChangingInertia",
+    "ChangingMoments",
     "Comparison",
     "Ensemble",
     "ImpossibleBodyWarning",
@@ -48,6 +52,7 @@ __all__ = [
     "TorqueLaw",
     "Trajectory",
     "case_scene",
+    "compare_methods",
     "compare_programs",
     "opaque",
     "prepare",
@@ -64,7 +69,9 @@ __all__ = [
 # program loads only the modules that it needs.
 _SUBMODULES = {
     "compare.comparison": ("Comparison", "compare_programs"),
+    "compare.method_comparison": ("compare_methods",),
     "dynamics.scene_reader": ("read_scene",),
+    "model.changing": ("ChangingInertia", "ChangingMoments"),
     "model.errors": ("InputError", "NotBuiltError"),
     "model.impossible": ("ImpossibleBodyWarning",),
     "model.listing": ("Listing", "subset"),

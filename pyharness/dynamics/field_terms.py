@@ -5,14 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.dynamics.term_input import inertia_of, law_of_vector
+from pyharness.dynamics.term_input import inertia_of, is_diagonal, law_of_vector, ready_term
+from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
 from pyharness.model.law_symbols import law_derivative, law_value, to_body
-from pyharness.model.state_torque import StateTorque, replayed
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import Number, Numbers, finite, three
 
 
-def gravity_gradient(inertia: Numbers | Iterable[Numbers], rate: Number) -> StateTorque:
+def gravity_gradient(
+    inertia: Numbers | Iterable[Numbers] | ChangingMoments | ChangingInertia, rate: Number
+) -> StateTorque:
     """Return the torque of the gravity gradient, 3 n^2 r x I r, in a circular orbit.
 
     The unit vector r points from the centre of attraction to the body. At the time t it is
@@ -23,7 +26,7 @@ def gravity_gradient(inertia: Numbers | Iterable[Numbers], rate: Number) -> Stat
 
     Parameters
     ----------
-    inertia : three numbers, or three rows of three numbers
+    inertia : three numbers, three rows of three numbers, ChangingMoments, or ChangingInertia
         The moments or the inertia matrix (kg m2) of the body, about the axes of the scene.
     rate : float
         The rate n of the orbit (rad/s).
@@ -49,10 +52,16 @@ def gravity_gradient(inertia: Numbers | Iterable[Numbers], rate: Number) -> Stat
     >>> [round(x, 6) for x in torque.at(0.0, (0.0, 0.0, 0.0), (0.1, 0.5, 0.5, 0.7))]
     [3.456, 9.216, -2.0736]
     """
-    (a, f, e), (_, b, d), (_, _, c) = inertia_of("[torque] gravity gradient inertia", inertia)
+    changing = inertia if isinstance(inertia, Changing) else None
+    given: Any = inertia
+    if changing is None:
+        constant = inertia_of("[torque] gravity gradient inertia", inertia)
+        given = np.diag(constant).tolist() if is_diagonal(constant) else constant
     n = finite("[torque] gravity gradient rate", rate)
 
     def torque(time: Any, omega: Any, attitude: Any) -> Any:
+        matrix = constant if changing is None else changing.matrix(time)
+        (a, f, e), (_, b, d), (_, _, c) = matrix
         angle = n * time
         x, y, z = to_body((np.cos(angle), np.sin(angle), 0.0), attitude)
         # Only differences of moments occur, so that nearly equal moments cancel exactly.
@@ -65,7 +74,7 @@ def gravity_gradient(inertia: Numbers | Iterable[Numbers], rate: Number) -> Stat
             )
         ]
 
-    return replayed(torque)
+    return ready_term("gravity_gradient", torque, inertia=given, rate=n)
 
 
 def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
@@ -105,8 +114,11 @@ def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
     """
     dipole = np.array(three("[torque] magnetic dipole moment", moment))
     law = law_of_vector("[torque] magnetic dipole field", field, "space")
-    return replayed(
-        lambda time, omega, attitude: np.cross(dipole, to_body(law_value(law, time), attitude))
+    return ready_term(
+        "magnetic_dipole",
+        lambda time, omega, attitude: np.cross(dipole, to_body(law_value(law, time), attitude)),
+        moment=dipole,
+        field=law,
     )
 
 
@@ -156,7 +168,7 @@ def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
         rate = to_body(law_value(change, time), attitude) - np.cross(omega, b)
         return np.cross(-factor * rate, b)
 
-    return replayed(torque)
+    return ready_term("magnetic_damping", torque, gain=factor, field=law)
 
 
 def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
@@ -192,4 +204,8 @@ def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     (-1.0, 0.0, 0.0)
     """
     law = law_of_vector("[torque] in space", torque, "space")
-    return replayed(lambda time, omega, attitude: to_body(law_value(law, time), attitude))
+    return ready_term(
+        "in_space",
+        lambda time, omega, attitude: to_body(law_value(law, time), attitude),
+        torque=law,
+    )

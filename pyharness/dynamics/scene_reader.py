@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pyharness.model.attitude import of_angles
+from pyharness.model.changing import ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.expressions import parsed
 from pyharness.model.scene import Scene
@@ -91,7 +92,7 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
             raise InputError(f"{table} is {kind_of(tables[table])}; it must be a table [{table}]")
         if table != "torque":
             check_keys(tables[table], keys, f"[{table}]")
-    body, initial, run = tables["body"], tables["initial"], tables["run"]
+    body, initial, run = _body(tables["body"]), tables["initial"], tables["run"]
     if "omega" not in initial:
         raise InputError("[initial] omega is missing; give three numbers in rad/s")
     return Scene(
@@ -102,6 +103,23 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
         **body,
         **run,
     )
+
+
+def _body(table: dict[str, Any]) -> dict[str, Any]:
+    """Return the table [body] of a scene file, with an inertia that changes with time as a value.
+
+    Lists in place of the three moments are polynomials, and so are matrices in place of the rows.
+    """
+    moments, inertia = table.get("moments"), table.get("inertia")
+    if isinstance(moments, list) and _has_lists(moments):
+        return {**table, "moments": ChangingMoments(moments)}
+    if isinstance(inertia, list) and any(map(_has_lists, inertia)):
+        return {**table, "inertia": ChangingInertia(inertia)}
+    return table
+
+
+def _has_lists(value: Any) -> bool:
+    return isinstance(value, list) and any(isinstance(each, list) for each in value)
 
 
 def _attitude(initial: dict[str, Any]) -> Any:
@@ -123,10 +141,10 @@ def _torque(table: dict[str, Any], body: dict[str, Any]) -> TorqueLaw | StateTor
     if "terms" not in table:
         return first
     # Few scenes have ready terms.
-    from pyharness.dynamics.term_file import read_terms, sum_of
+    from pyharness.dynamics.term_file import read_terms
 
     terms = read_terms(table["terms"], body)
-    return sum_of(first, terms) if terms else first
+    return sum(terms[1:], terms[0]) + first if terms else first
 
 
 def _expressions(table: dict[str, Any]) -> StateTorque | TorqueLaw:

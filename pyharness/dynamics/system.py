@@ -1,13 +1,19 @@
-"""The equations of motion of a scene with a recorded torque, as one tape."""
+"""The equations of motion of a scene with a recorded torque, as one tape.
+
+An inertia that changes with time becomes part of a recorded torque.
+"""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from pyharness.model.attitude import IDENTITY
+from pyharness.model.changing import Changing, ChangingMoments
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import StateTorque, torque_of
+from pyharness.model.state_torque import StateTorque, of_law, replayed, torque_of
 from pyharness.model.symbols import Recorder
 from pyharness.model.tape import Tape
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import Triple
 
 
@@ -38,6 +44,79 @@ def system_of(scene: Scene, attitude: bool) -> Tape:
             0.5 * (a * z + b * y - c * x),
         ]
     return recorder.tape(rates)
+
+
+def is_recorded(scene: Scene) -> bool:
+    """Return whether the equations of motion of a scene are solved as a tape.
+
+    This is the case for a torque that depends on the state, and for an inertia that changes.
+    """
+    return isinstance(scene.torque, StateTorque) or scene.changing is not None
+
+
+def with_constant_body(scene: Scene) -> Scene:
+    """Return a scene with the same solution whose inertia does not change with time.
+
+    It is the scene itself if its inertia is constant. Otherwise it is a scene with the coefficients
+    A = B = C = 0, whose torque is the derivative of omega:
+    I omega' = N - I' omega - omega x (I omega), with the inertia I and the torque N.
+    """
+    changing, torque = scene.changing, scene.torque
+    if changing is None:
+        return scene
+    if isinstance(torque, TorqueLaw):
+        torque = of_law(torque)
+    tape = torque.tape
+    if tape is not None:
+        found = replayed(
+            lambda time, omega, q: _rates(changing, time, omega, torque_of(tape, time, omega, q))
+        )
+    else:
+        found = replace(
+            torque,
+            function=lambda time, omega, q=IDENTITY: _rates(
+                changing, time, omega, torque.at(time, omega, q)
+            ),
+        )
+    return replace(scene, changing=None, coefficients=(0.0, 0.0, 0.0), torque=found)
+
+
+def _rates(changing: Changing, time: Any, omega: Any, torque: Any) -> list[Any]:
+    """Return the derivative of omega for an inertia that changes; all others may be symbols."""
+    matrix, rate, (x, y, z) = changing.matrix(time), changing.matrix_rate(time), omega
+    if isinstance(changing, ChangingMoments):
+        a, b, c = (matrix[k][k] for k in range(3))
+        # The differences of nearly equal moments have no rounding errors of products.
+        products = (b - c) * (y * z), (c - a) * (z * x), (a - b) * (x * y)
+        return [
+            (torque[k] - rate[k][k] * omega[k] + products[k]) / moment
+            for k, moment in enumerate((a, b, c))
+        ]
+    u, v, w = (_dot(row, omega) for row in matrix)
+    products = z * v - y * w, x * w - z * u, y * u - x * v
+    return _solved(matrix, [torque[k] - _dot(rate[k], omega) + products[k] for k in range(3)])
+
+
+def _dot(first: Any, second: Any) -> Any:
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
+
+
+def _solved(matrix: list[list[Any]], right: list[Any]) -> list[Any]:
+    """Return the solution of a linear system with a symmetric positive definite matrix.
+
+    The matrix is factorised as L D L^T (Golub and Van Loan 2013, Matrix Computations, section 4.1).
+    """
+    (a, f, e), (_, b, d), (_, _, c) = matrix
+    l21, l31 = f / a, e / a
+    second, below = b - l21 * f, d - l31 * f
+    l32 = below / second
+    third = c - l31 * e - l32 * below
+    u = right[0]
+    v = right[1] - l21 * u
+    w = right[2] - l31 * u - l32 * v
+    z = w / third
+    y = v / second - l32 * z
+    return [u / a - l21 * y - l31 * z, y, z]
 
 
 def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.dynamics.term_input import ready_term
 from pyharness.model.errors import InputError, unknown
-from pyharness.model.state_torque import StateTorque, replayed
+from pyharness.model.state_torque import Function, StateTorque
 from pyharness.model.symbols import SYMBOLS
 from pyharness.model.tape import Table
 from pyharness.model.values import Numbers, Triple, converted, finite, number_list, three
@@ -78,7 +79,8 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
         raise _other_number(where, "rows", len(given), len(found))
     rows = [three(f"{where}, row {n}", row) for n, row in enumerate(given, 1)]
     make = _PIECES[interpolation]
-    return _torque([make(found, list(axis)) for axis in zip(*rows, strict=True)])
+    torque = _torque([make(found, list(axis)) for axis in zip(*rows, strict=True)])
+    return ready_term("table", torque, times=found, values=rows, interpolation=interpolation)
 
 
 def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbers]) -> StateTorque:
@@ -153,7 +155,15 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
             values.pop()
         times += [begin, ends[n]]
         values += [each, (0.0, 0.0, 0.0)]
-    return _torque([_held(times, list(axis)) for axis in zip(*values, strict=True)])
+    found = _torque([_held(times, list(axis)) for axis in zip(*values, strict=True)])
+    different = any(each != torques[0] for each in torques)
+    return ready_term(
+        "pulses",
+        found,
+        starts=begins,
+        durations=lengths,
+        torque=torques if different else torques[0],
+    )
 
 
 def _torques_of_pulses(torque: object, count: int) -> list[Triple]:
@@ -240,8 +250,8 @@ _PIECES: dict[str, Callable[[list[float], list[float]], Table]] = {
 }
 
 
-def _torque(axes: Sequence[Table]) -> StateTorque:
-    """Return the torque whose components are tables of the time."""
+def _torque(axes: Sequence[Table]) -> Function:
+    """Return the function whose components are tables of the time."""
     reduced = [_reduced(each) for each in axes]
 
     def torque(time: Any, omega: Any, attitude: Any) -> list[Any]:
@@ -251,7 +261,7 @@ def _torque(axes: Sequence[Table]) -> StateTorque:
             for each in reduced
         ]
 
-    return replayed(torque)
+    return torque
 
 
 def _reduced(each: Table) -> Table:

@@ -1,7 +1,6 @@
 """Ready terms in scene files: the tables [[torque.terms]]."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from inspect import Parameter, signature
 from typing import Any
 
@@ -14,15 +13,14 @@ from pyharness.dynamics.field_terms import (
 from pyharness.dynamics.table_terms import pulses, table
 from pyharness.dynamics.term_input import inertia_of
 from pyharness.dynamics.terms import attitude_control, damping, drag, rate_control, wheels
+from pyharness.model.changing import Changing
 from pyharness.model.errors import InputError, kind_of, unknown
-from pyharness.model.scene_file import check_keys, law_of_table
+from pyharness.model.scene_file import MOST_TERMS, check_keys, law_of_table
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import boolean
 
 Function = Callable[..., StateTorque]
-# A term as data, pairs of keys and values, of which the first is its kind; and its torque.
-Term = tuple[tuple[tuple[str, Any], ...], StateTorque]
 
 KINDS: dict[str, Function] = {
     each.__name__: each
@@ -35,10 +33,9 @@ KINDS: dict[str, Function] = {
 # The arguments that may depend on time, and the axes of their components.
 _FRAMES = {"motor": "body", "field": "space", "torque": "space"}
 _LAW = ("constant", "rate", "sines", "cosines")
-_MOST = 50
 
 
-def read_terms(tables: object, body: dict[str, Any]) -> list[Term]:
+def read_terms(tables: object, body: dict[str, Any]) -> list[StateTorque]:
     """Return the ready terms of a torque from the tables [[torque.terms]] of a scene file.
 
     `body` is the table [body] of the file. Raise InputError if a table is invalid; the message
@@ -48,28 +45,12 @@ def read_terms(tables: object, body: dict[str, Any]) -> list[Term]:
         raise InputError(
             f"[torque] terms is {kind_of(tables)}; it must be a list of tables [[torque.terms]]"
         )
-    if len(tables) > _MOST:
-        raise InputError(f"[[torque.terms]]: {len(tables)} terms; allowed: at most {_MOST}")
+    if len(tables) > MOST_TERMS:
+        raise InputError(f"[[torque.terms]]: {len(tables)} terms; allowed: at most {MOST_TERMS}")
     return [_term(table, f"[[torque.terms]] {n}", body) for n, table in enumerate(tables, 1)]
 
 
-def sum_of(first: TorqueLaw | StateTorque, terms: list[Term]) -> StateTorque:
-    """Return the sum of the torque `first` and ready terms, which has all summands as data.
-
-    The torque `first` is a law, or was made of expressions. The list `terms` must not be empty.
-    """
-    total = sum((torque for _, torque in terms[1:]), terms[0][1])
-    data: tuple[Any, ...] = tuple(each for each, _ in terms)
-    if isinstance(first, StateTorque):
-        return replace(
-            total + first, expression=first.expression, constants=first.constants, terms=data
-        )
-    if first.is_zero:
-        return replace(total, terms=data)
-    return replace(total + first, terms=(first, *data))
-
-
-def _term(table: object, where: str, body: dict[str, Any]) -> Term:
+def _term(table: object, where: str, body: dict[str, Any]) -> StateTorque:
     if not isinstance(table, dict):
         raise InputError(f"{where} is {kind_of(table)}; it must be a table [[torque.terms]]")
     if "kind" not in table:
@@ -92,18 +73,17 @@ def _term(table: object, where: str, body: dict[str, Any]) -> Term:
         for key, value in given.items()
     }
     try:
-        torque = KINDS[kind](**arguments)
+        return KINDS[kind](**arguments)
     except InputError as error:
         raise _placed(error, where) from None
-    pairs = sorted(arguments.items(), key=lambda pair: list(parameters).index(pair[0]))
-    return (("kind", kind), *((key, _data(value)) for key, value in pairs)), torque
 
 
 def _inertia(body: dict[str, Any], where: str) -> Any:
     """Return the moments or the inertia matrix in the table [body] of a scene file."""
     for key in ("moments", "inertia"):
         if key in body:
-            inertia_of(f"[body] {key}", body[key])
+            if not isinstance(body[key], Changing):
+                inertia_of(f"[body] {key}", body[key])
             return body[key]
     raise InputError(
         f"{where}, gravity_gradient: inertia is missing, and [body] has no moments and no inertia; "
@@ -141,10 +121,3 @@ def _placed(error: InputError, where: str) -> InputError:
     """Return an error of a term's function or of a torque law, with the place of the term."""
     message = str(error).removeprefix("[torque]").lstrip(": ")
     return InputError(f"{where}, {message}")
-
-
-def _data(value: Any) -> Any:
-    """Return a checked argument of a term as floats in tuples; texts, truth values, laws stay."""
-    if isinstance(value, list):
-        return tuple(map(_data, value))
-    return value if isinstance(value, (bool, str, TorqueLaw)) else float(value)

@@ -1,12 +1,46 @@
-"""Functions that check the arguments of the torque terms."""
+"""Functions that check the arguments of the torque terms, and the form of terms in scene files."""
+
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.inertia import checked_inertia
+from pyharness.model.state_torque import Function, StateTorque, replayed
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.model.values import converted, finite, number_list, three
+
+
+def ready_term(kind: str, function: Function, **arguments: Any) -> StateTorque:
+    """Return the torque that a function of (t, omega, attitude) records, as a ready term.
+
+    Scene files describe it by its kind and its checked arguments. An argument is a vector or a
+    matrix (an array), a list of arguments, a TorqueLaw, a number, a text or a truth value.
+    """
+    pairs = ((key, _file_value(value)) for key, value in arguments.items())
+    return replace(replayed(function), terms=((("kind", kind), *pairs),))
+
+
+def _file_value(value: Any) -> Any:
+    """Return a checked argument of a term in the shortest form that a scene file has for it."""
+    if isinstance(value, np.ndarray):
+        if value.shape == (3, 3) and is_diagonal(value):
+            value = np.diag(value)
+            if (value == value[0]).all():
+                return float(value[0])
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        return tuple(map(_file_value, value))
+    if isinstance(value, TorqueLaw) and value == TorqueLaw(value.constant, frame=value.frame):
+        return value.constant
+    return value
+
+
+def is_diagonal(matrix: Array) -> bool:
+    """Return whether all elements outside the diagonal of a matrix, shape (3, 3), are 0."""
+    return np.array_equal(matrix, np.diag(np.diag(matrix)))
 
 
 def matrix_of(where: str, value: object) -> Array:
@@ -37,7 +71,7 @@ def inertia_of(where: str, value: object) -> Array:
     if isinstance(converted(value), float):
         raise InputError(f"{where}: {kind_of(value)}; allowed: three moments, or three rows, kg m2")
     matrix = matrix_of(where, value)
-    if np.array_equal(matrix, np.diag(np.diag(matrix))):
+    if is_diagonal(matrix):
         if not (np.diag(matrix) > 0.0).all():
             raise InputError(f"{where}: a moment is not above 0; allowed: numbers above 0, kg m2")
         return matrix

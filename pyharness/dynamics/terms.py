@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.dynamics.term_input import law_of_vector, matrix_of
+from pyharness.dynamics.term_input import law_of_vector, matrix_of, ready_term
 from pyharness.model.attitude import IDENTITY, product, unit_quaternion
 from pyharness.model.errors import InputError
 from pyharness.model.law_symbols import law_integral, law_value
-from pyharness.model.state_torque import StateTorque, replayed
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import Number, Numbers, number_list, three
 
@@ -53,7 +53,7 @@ def damping(matrix: MatrixLike) -> StateTorque:
     (-0.5, -0.5, -0.5)
     """
     found = matrix_of("[torque] damping matrix", matrix)
-    return replayed(lambda time, omega, attitude: -(found @ omega))
+    return ready_term("damping", lambda time, omega, attitude: -(found @ omega), matrix=found)
 
 
 def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTorque:
@@ -112,7 +112,7 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
             total = total - matrix @ power
         return total
 
-    return replayed(torque)
+    return ready_term("drag", torque, coefficients=matrices, per_axis=bool(per_axis))
 
 
 def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTorque:
@@ -150,7 +150,12 @@ def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTo
     """
     matrix = matrix_of("[torque] rate control gain", gain)
     wanted = np.array(three("[torque] rate control target", target))
-    return replayed(lambda time, omega, attitude: -(matrix @ (omega - wanted)))
+    return ready_term(
+        "rate_control",
+        lambda time, omega, attitude: -(matrix @ (omega - wanted)),
+        gain=matrix,
+        target=wanted,
+    )
 
 
 def attitude_control(
@@ -198,14 +203,15 @@ def attitude_control(
     where = "[torque] attitude control"
     spring = matrix_of(f"{where} stiffness", stiffness)
     brake = matrix_of(f"{where} gain", gain)
-    (a, b, c, d), _ = unit_quaternion(f"{where} target", target)
+    unit, _ = unit_quaternion(f"{where} target", target)
+    a, b, c, d = unit
 
     def torque(time: Any, omega: Any, attitude: Any) -> Any:
         scalar, *vector = product((a, -b, -c, -d), tuple(attitude))
         half_sine = np.array([scalar * each for each in vector], dtype=object)
         return -2.0 * (spring @ half_sine) - brake @ omega
 
-    return replayed(torque)
+    return ready_term("attitude_control", torque, stiffness=spring, gain=brake, target=unit)
 
 
 def wheels(momentum: Numbers, motor: TorqueLaw | Numbers | None = None) -> StateTorque:
@@ -257,4 +263,5 @@ def wheels(momentum: Numbers, motor: TorqueLaw | Numbers | None = None) -> State
         stored = start + law_integral(law, time)
         return np.cross(stored, omega) - law_value(law, time)
 
-    return replayed(torque)
+    motors = {} if motor is None else {"motor": law}
+    return ready_term("wheels", torque, momentum=start, **motors)

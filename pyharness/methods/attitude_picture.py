@@ -71,6 +71,11 @@ def check_animation(path: str, scene: Scene) -> None:
     """
     if _form(path) not in ANIMATIONS:
         raise InputError(f"--animate '{path}': unknown format; allowed: .gif, .html")
+    if scene.changing is not None:
+        raise InputError(
+            "--animate: the scene's inertia changes with time, and a brick has constant moments; "
+            "give constant moments"
+        )
     if scene.moments is None:
         raise InputError(
             "--animate: the scene has no moments, which determine the brick that is drawn; "

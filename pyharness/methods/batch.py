@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 from pyharness.methods.ensemble import Ensemble
 from pyharness.methods.many import solve_many
 from pyharness.methods.many_space import scene_of_row
-from pyharness.methods.registry import METHODS, REGISTRY, requested_tolerance
+from pyharness.methods.registry import METHODS, PREPARED_FOR_STATE, REGISTRY, requested_tolerance
 from pyharness.methods.solve import solve
 from pyharness.methods.solver import PREPARED
-from pyharness.model.attitude import IDENTITY
+from pyharness.model.attitude import IDENTITY, product
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.original.many import ProgramEnsemble, run_many
 
@@ -171,17 +172,25 @@ class Batch:
         """Return the attitudes at `samples` times of each scene, shape (n, samples, 4).
 
         The times are the ends of `samples` equal parts of the time from 0 to `t_end`. Attitudes are
-        quaternions from body to space, scalar first. The attitude at time 0 is (1, 0, 0, 0). The
-        batch must be solved by a modern method of this package, because the programs of the thesis
-        compute no attitude.
+        quaternions, scalar first, from the body to the axes of the body at time 0. The attitude at
+        time 0 is therefore (1, 0, 0, 0). The batch must be solved by a modern method of this
+        package, because the programs of the thesis compute no attitude.
         """
+        is_free = not self.scene.torque.needs_attitude
+        more = {"attitude0": IDENTITY} if is_free else {}
         ends = []
         for i in range(samples):
             part = (i + 1) / samples
-            found = self._solve_own(self.t_end * part, attitude0=IDENTITY)
+            found = self._solve_own(self.t_end * part, **more)
             assert found.attitude is not None
-            ends.append(found.attitude)
+            ends.append(found.attitude if is_free else self._from_start(found.attitude))
         return np.stack(ends, axis=1)
+
+    def _from_start(self, attitude: Array) -> Array:
+        start = np.array(self.arrays.get("attitude0", [self.scene.attitude or IDENTITY]))
+        w, x, y, z = (start / np.linalg.norm(start, axis=1, keepdims=True)).T
+        a, b, c, d = attitude.T
+        return np.stack(product((w, -x, -y, -z), (a, b, c, d)), axis=1)
 
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
         """Return omega (rad/s) of each scene at the time `part` * `t_end`, shape (n, 3).
@@ -216,13 +225,16 @@ class Batch:
         return self._run_each(at)
 
     def scene_of(self, i: int) -> Scene:
-        """Return scene `i` of the batch (from 0), without attitude.
+        """Return scene `i` of the batch (from 0), without attitude unless the torque needs it.
 
         Row `i` of each array replaces a quantity of the common scene. Raise InputError if the
         numbers of scene `i` are not allowed.
         """
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
-        return scene_of_row(replace(self.scene, attitude=None), own, i)
+        scene = self.scene
+        if not scene.torque.needs_attitude:
+            scene = replace(scene, attitude=None)
+        return scene_of_row(scene, own, i)
 
     @cached_property
     def _ends(self) -> Ensemble:
@@ -246,17 +258,20 @@ class Batch:
         """Return the states of all scenes at `t_end` (s, shape (n,)), computed by `method`.
 
         A method in `PREPARED`, the methods with a compiled kernel for many scenes, solves all
-        scenes in one call of `solve_many`. Any other method solves the scenes one by one.
+        scenes in one call of `solve_many`. Any other method solves the scenes one by one. Under a
+        torque that depends on the state, only methods in `PREPARED_FOR_STATE` have such a kernel.
         `tolerance` is the largest allowed error, relative to the largest |omega|, and the keyword
         arguments `more` are passed to `solve_many`, such as `attitude0`.
         """
-        if method not in PREPARED:
+        by_state = isinstance(self.scene.torque, StateTorque)
+        if method not in (PREPARED_FOR_STATE if by_state else PREPARED):
             return self._solve_each(method, tolerance, t_end)
         tolerance = max(tolerance, REGISTRY[method].finest)
         arrays: dict[str, Any] = {
             name: array for name, array in self.arrays.items() if name not in OF_PROGRAMS
         }
-        return solve_many(self.scene, t_end, method=method, tolerance=tolerance, **arrays, **more)
+        arrays |= more
+        return solve_many(self.scene, t_end, method=method, tolerance=tolerance, **arrays)
 
     def _solve_each(self, method: str, tolerance: float, t_end: Array) -> Ensemble:
         n = len(self.omega0)
@@ -264,7 +279,10 @@ class Batch:
         for i in range(n):
             try:
                 finest = METHODS[method].finest
-                found = solve(self.scene_of(i), float(t_end[i]), method, max(tolerance, finest))
+                found = solve(
+                    self.scene_of(i), float(t_end[i]), method, max(tolerance, finest),
+                    attitude=self.scene.torque.needs_attitude,
+                )  # fmt: skip
             except InputError:  # refuses this scene alone
                 continue
             status[i] = ENDS.index(found.ended)

@@ -18,12 +18,21 @@ def propagators(scene: Scene, times: Array, omega: Array) -> Array:
     time. `omega` (rad/s, shape (n, 3)) is the solution of the scene at `times` (s, shape (n,)). The
     times must be so close that omega changes little from each time to the next.
     """
-    middle = 0.5 * (omega[1:] + omega[:-1])
+    return transitions(times, jacobians(scene, 0.5 * (omega[1:] + omega[:-1])))
+
+
+def transitions(times: Array, slopes: Array) -> Array:
+    """Return the state-transition matrix from each time to the last, shape (n, m, m).
+
+    `slopes`, shape (n - 1, m, m), are the Jacobian matrices (1/s) of the right-hand side between
+    each of the n `times` (s) and the next, in the middle of the interval.
+    """
     # The Jacobian hardly changes from one time to the next. Therefore the exponential of the
     # Jacobian times the interval is the state-transition matrix over this interval.
-    pieces = exponentials(np.diff(times)[:, None, None] * jacobians(scene, middle))
-    found = np.empty((len(times), 3, 3))
-    found[-1] = np.eye(3)
+    pieces = exponentials(np.diff(times)[:, None, None] * slopes)
+    size = slopes.shape[-1]
+    found = np.empty((len(times), size, size))
+    found[-1] = np.eye(size)
     for k in range(len(pieces) - 1, -1, -1):
         found[k] = np.clip(found[k + 1] @ pieces[k], -_HUGE, _HUGE)
     return found
@@ -32,8 +41,8 @@ def propagators(scene: Scene, times: Array, omega: Array) -> Array:
 def growth(propagators: Array) -> float:
     """Return the error amplification, which is the largest row-sum norm of n matrices, at least 1.
 
-    `propagators` contains the matrices, shape (n, 3, 3): the state-transition matrices of omega
-    from n times to the last one.
+    `propagators` contains the matrices, shape (n, m, m): the state-transition matrices of omega, or
+    of omega and attitude, from n times to the last one.
     """
     return float(max(1.0, np.abs(propagators).sum(axis=2).max()))
 
@@ -41,12 +50,13 @@ def growth(propagators: Array) -> float:
 def exponentials(small: Array) -> Array:
     """Return the exponentials of matrices of norm below 1, by the Taylor polynomial of degree 8.
 
-    `small` contains the matrices, shape (n, 3, 3), and the result has the same shape. The norm of
+    `small` contains the matrices, shape (n, m, m), and the result has the same shape. The norm of
     the truncation error of an exponential is below 3.1e-6.
     """
-    total = np.broadcast_to(np.eye(3), small.shape)
+    one = np.eye(small.shape[-1])
+    total = np.broadcast_to(one, small.shape)
     for k in range(8, 0, -1):
-        total = np.eye(3) + small @ total / k
+        total = one + small @ total / k
     return total
 
 

@@ -150,6 +150,8 @@ def solve_many(
         "method": method, "tolerance": tolerance, "effort": effort, "threads": threads,
     }  # fmt: skip
     if isinstance(scene, Scene):
+        if kind and scene.changing is not None:  # the arrays give other bodies
+            scene = replace(scene, changing=None, moments=(1.0, 1.0, 1.0))
         if is_solved_alone(scene, torques):
             _, asked = _chosen(method, tolerance)
             return solve_one_by_one(
@@ -198,7 +200,7 @@ def solve_many(
 
 
 def _is_special(scene: Scene) -> bool:
-    checked_scene(scene, any_axes=True, any_torque=True, any_state=True)
+    checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
     return scene.inertia is not None or is_solved_alone(scene, {})
 
 

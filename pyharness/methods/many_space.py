@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from pyharness.methods.ensemble import Ensemble, place_for
 from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import check_torque
+from pyharness.methods.registry import check_prepared, check_torque
 from pyharness.model.arrays import count_bodies, row_of, rows_of, waves_of
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS
 from pyharness.model.pieces import for_each_piece
-from pyharness.model.scene import Scene, Triple
+from pyharness.model.scene import STATE_TORQUE, Scene, Triple
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 
@@ -32,7 +32,8 @@ NO_ATTITUDE = "the torque needs the initial attitude; give attitude0, or scenes 
 def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
     """Return whether each body must be solved alone, because no kernel takes several of its kind.
 
-    This is the case if the torque depends on the state, or is about the axes of space. `arrays`
+    This is the case if the torque depends on the state or is about the axes of space, or if the
+    inertia changes with time. `arrays`
     contains the torque arrays of `solve_many` by name, and None for an array that was not given.
     The components in the arrays are about the axes, of the body or of space, that the `frame` of
     the scene's torque names. Raise InputError if an array is given beside a torque that depends on
@@ -46,7 +47,8 @@ def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
                 "the two"
             )
         return True
-    return scene.torque.in_space or (scene.law.frame == "space" and bool(named))
+    is_in_space = scene.torque.in_space or (scene.torque.frame == "space" and bool(named))
+    return is_in_space or scene.changing is not None
 
 
 def solve_one_by_one(
@@ -62,6 +64,7 @@ def solve_one_by_one(
     under a torque about the axes of space are given by coefficients.
     """
     check_torque(scene, method, attitude=True)
+    check_prepared(scene, method)
     by_coefficients = arrays["coefficients"] is not None or scene.coefficients is not None
     if by_coefficients and not isinstance(scene.torque, StateTorque):
         raise InputError(
@@ -163,7 +166,12 @@ def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
             torque[name] = [(wave[:3], float(wave[3])) for wave in torque[name]]
     if own.keys() & _BODIES:
         own = {**dict.fromkeys(_BODIES), **own}
-    if "omega0" in own:
-        own["omega"] = own.pop("omega0")
-    law = replace(scene.law, **torque) if torque else scene.torque
+    for name in ("omega", "attitude"):
+        if f"{name}0" in own:
+            own[name] = own.pop(f"{name}0")
+    law = scene.torque
+    if torque:
+        if isinstance(law, StateTorque):
+            raise InputError(STATE_TORQUE)
+        law = replace(law, **torque)
     return replace(scene, torque=law, **own)

@@ -85,13 +85,14 @@ def plan(
     if not finest <= tolerance <= 1.0:
         place = " for quick" if method == "quick" else ""
         raise InputError(f"tolerance is {tolerance:g}; allowed{place}: {finest:g} to 1")
-    form = closed_form(checked_scene(scene, any_torque=True, any_state=True))
+    form = closed_form(checked_scene(scene, any_torque=True, any_state=True, changing=True))
     # The plan includes the attitude if the torque needs it.
     check_torque(scene, method, attitude=True)
     fallback = None
     if method == "auto":
         few_digits = (
             isinstance(scene.torque, TorqueLaw)
+            and scene.changing is None
             and not scene.torque.in_space
             and tolerance >= (_WAVES_DIGITS if scene.torque.varies else FEW_DIGITS)
         )
@@ -114,19 +115,7 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
     else:
         why = "requested" if closed_form(scene) else _why_no_form(scene)
         yield Decision("integration", True, why)
-    for name, value, product in zip(
-        ("A w2 w3", "B w1 w3", "C w1 w2"),
-        scene.euler_coefficients,
-        ("I2 = I3", "I3 = I1", "I1 = I2"),
-        strict=True,
-    ):
-        if value != 0.0:
-            yield Decision(name, True, f"coefficient {value:g}")
-        elif closed:
-            yield Decision(name, False, product)
-        else:
-            # The kernels sum three products side by side in one register.
-            yield Decision(name, True, f"{product}: zero; costs no time beside the others")
+    yield from _of_body(scene, closed)
     yield from _of_torque(scene.torque)
     for part, wanted in (("velocity", chosen.velocity), ("attitude", scene.attitude is not None)):
         if part == "attitude" and scene.torque.needs_attitude:
@@ -144,6 +133,23 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
     yield Decision("SciPy", False, "our own kernels solve it")
 
 
+def _of_body(scene: Scene, closed: bool) -> Iterator[Decision]:
+    names = ("A w2 w3", "B w1 w3", "C w1 w2")
+    if scene.changing is not None:
+        for name in names:
+            yield Decision(name, True, "its inertia changes with time")
+        return
+    equal = ("I2 = I3", "I3 = I1", "I1 = I2")
+    for name, value, product in zip(names, scene.euler_coefficients, equal, strict=True):
+        if value != 0.0:
+            yield Decision(name, True, f"coefficient {value:g}")
+        elif closed:
+            yield Decision(name, False, product)
+        else:
+            # The kernels sum three products side by side in one register.
+            yield Decision(name, True, f"{product}: zero; costs no time beside the others")
+
+
 def _of_torque(torque: TorqueLaw | StateTorque) -> Iterator[Decision]:
     if isinstance(torque, StateTorque):
         count = "opaque" if torque.tape is None else f"{len(torque.tape.operations)} operations"
@@ -158,6 +164,8 @@ def _of_torque(torque: TorqueLaw | StateTorque) -> Iterator[Decision]:
 
 
 def _why_no_form(scene: Scene) -> str:
+    if scene.changing is not None:
+        return "its inertia changes with time"
     if isinstance(scene.torque, StateTorque):
         return "its torque depends on the state"
     if scene.torque.is_zero:

@@ -149,7 +149,8 @@ def closed_form(scene: Scene) -> str | None:
     The kinds are ``sphere`` (A = B = C = 0), ``symmetric`` (a body with two equal moments) and
     ``elliptic`` (elliptic functions, for three unequal moments).
     """
-    if not isinstance(scene.torque, TorqueLaw) or scene.torque.in_space:
+    law = scene.torque
+    if not isinstance(law, TorqueLaw) or law.in_space or scene.changing is not None:
         return None
     a, b, c = scene.euler_coefficients
     # The closed form of the attitude needs the angular momentum, which is unknown for a body given

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from pyharness.dynamics.system import is_recorded
 from pyharness.methods.problem import rows_trajectory
 from pyharness.methods.scipy_ivp import FINEST, scipy_method
 from pyharness.model.effort import Integrator
@@ -48,7 +49,8 @@ class Method:
     any_scale: bool = False  # rescales the scene itself, or forms no products in binary64
     attitude: bool = False  # propagates the attitude together with omega
     space_torque: bool = False  # takes a torque about the axes of space, together with attitude
-    state_torque: bool = False  # takes a torque that depends on omega or attitude
+    # Takes a torque that depends on omega or attitude, and propagates the attitude under it.
+    state_torque: bool = False
     scipy: str = ""  # SciPy's name of the method; empty for our own methods
 
     @property
@@ -114,13 +116,17 @@ def _gauss(stages: int) -> Method:
         _GAUSS_DEFAULT[stages - 1],
         _from("gauss", "gauss", stages),
         order=2 * stages,
+        state_torque=True,
     )
 
 
 def _fixed_step(name: str, title: str, source: str, order: int, evaluations: int) -> Method:
     title, source = f"{title} in the scene's steps", f"fortran/modern/fixed_step.f90; {source}"
     solve = _from("fixed_step", "fixed_step", name)
-    return Method(name, title, source, 1.0, 1.0, solve, order=order, evaluations=evaluations)
+    return Method(
+        name, title, source, 1.0, 1.0, solve, order=order, evaluations=evaluations,
+        state_torque=True,
+    )  # fmt: skip
 
 
 REGISTRY = {
@@ -193,6 +199,8 @@ REGISTRY = {
 METHODS = {name: method for name, method in REGISTRY.items() if method.gives_rows}
 FIXED_STEP = tuple(name for name, method in REGISTRY.items() if method.is_fixed_step)
 GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
+# The methods with a prepared solver for a torque that depends on the state.
+PREPARED_FOR_STATE = ("auto", "taylor")
 # SciPy's name of each of its methods, by the name in this registry.
 SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}
 
@@ -207,19 +215,39 @@ def requested_tolerance(method: str, tolerance: Number | None) -> float:
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
 
 
-def check_attitude(method: str) -> None:
-    """Raise InputError if the method with this name can't propagate the attitude."""
-    if not REGISTRY[method].attitude:
+def check_attitude(method: str, scene: Scene | None = None) -> None:
+    """Raise InputError if the method with this name can't propagate the attitude.
+
+    Some methods propagate it only if the torque of `scene` depends on the state.
+    """
+    chosen = REGISTRY[method]
+    by_state = scene is not None and isinstance(scene.torque, StateTorque)
+    if not (chosen.attitude or (by_state and chosen.state_torque)):
         able = ", ".join(each.name for each in REGISTRY.values() if each.attitude)
         raise InputError(f"method {method} does not compute attitudes; allowed: {able}")
+
+
+def check_prepared(scene: Scene, method: str) -> None:
+    """Raise InputError if no solver can be prepared for a scene and the method with this name.
+
+    Under a torque that depends on the state, and for an inertia that changes with time, only Taylor
+    series have a prepared solver.
+    """
+    if is_recorded(scene) and method not in PREPARED_FOR_STATE:
+        what = "an inertia that changes" if scene.changing else "a torque that depends on the state"
+        raise InputError(
+            f"method {method} has no prepared solver for {what}; "
+            f"allowed: {', '.join(PREPARED_FOR_STATE)}, or the function solve"
+        )
 
 
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
     """Raise InputError if the method with this name can't solve a scene because of its torque.
 
-    Not every method takes a torque about the axes of space, or one that depends on omega or
-    attitude. The error is also raised if the torque depends on the attitude and `attitude` is
-    false, which means that the attitude is not computed.
+    Not every method takes a torque about the axes of space, one that depends on omega or attitude,
+    or any torque together with an inertia that changes with time. The error is also raised if the
+    torque depends on the attitude and `attitude` is false, which means that the attitude is not
+    computed.
     """
     torque, chosen = scene.torque, REGISTRY[method]
     kind = "a torque about the axes of space" if torque.in_space else "a torque that depends on "
@@ -230,7 +258,10 @@ def check_torque(scene: Scene, method: str, attitude: bool) -> None:
             kind, able = "an opaque torque", list(SCIPY_METHODS)
         elif not chosen.state_torque:
             able = [each.name for each in REGISTRY.values() if each.state_torque]
-    elif torque.in_space and not chosen.space_torque:
+    elif scene.changing is not None and not chosen.state_torque:
+        kind = "an inertia that changes with time"
+        able = [each.name for each in REGISTRY.values() if each.state_torque]
+    elif torque.in_space and not chosen.space_torque and scene.changing is None:
         able = [each.name for each in REGISTRY.values() if each.space_torque]
     if able:
         raise InputError(

@@ -26,8 +26,10 @@ _FIRST = {"DOP853": 4.0, "RK45": 8.0, "Radau": 4.0, "LSODA": 25.0}
 # Smallest and largest ratio of a local tolerance to the next.
 _RATIO, _LARGEST_RATIO = 8.0, 1e3
 # Safety factor on the error of the second of two integrations. The error is estimated from their
-# difference, in proportion to the local tolerances, but by no less than a fraction of it.
-_SAFETY, _LEAST_FRACTION = 4.0, 0.25
+# difference, in proportion to the local tolerances, but by no less than a fraction of it. The
+# errors of LSODA, which also changes its order, are not in proportion to the local tolerances.
+_SAFETY = 4.0
+_LEAST_FRACTION = {"DOP853": 0.25, "RK45": 0.25, "Radau": 0.25, "LSODA": 1.0}
 # The longest step is the time span over this number, which grows with each integration, so that two
 # of them can't pass a short pulse or sample a wave in the same way.
 _FEWEST_STEPS, _MORE_STEPS = 32, 7
@@ -119,7 +121,7 @@ def _refined(run: "_StateRun", times: Sequence[float], tolerance: float, scale: 
         after = run.rows(times, finer, scale)
         difference = _difference(before, after)
         ratio = local / finer
-        error = difference * min(1.0, max(_LEAST_FRACTION, _SAFETY / ratio))
+        error = difference * min(1.0, max(_LEAST_FRACTION[run.name], _SAFETY / ratio))
         same_end = before.is_complete == after.is_complete
         if error <= tolerance and same_end and len(before.state) == len(after.state):
             return after

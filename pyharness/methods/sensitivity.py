@@ -6,9 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness.methods.problem import closed_form, known, normalized
+from pyharness.methods.recorded import recorded_series
+from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene, Triple
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import ROUNDING
 from pyharness.scenes.rescaled import rescaling_factor, scaled
 
@@ -52,9 +55,10 @@ def torque_noise(
     for the rounding of the terms in each of `steps` steps. The denominator is `scale`, the largest
     |omega| (rad/s). If `scale` is None, the denominator is the larger of the initial |omega|, from
     `omega0` (rad/s), and the omega that the whole torque causes. If the terms do not nearly cancel,
-    the result is 0.
+    the result is 0. It is also 0 if the torque depends on the state, because the terms of such a
+    torque are unknown.
     """
-    if not (scene.law.sines or scene.law.cosines):
+    if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0
     if scale is None:
         scale = -max(map(abs, omega0))
@@ -97,6 +101,8 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
     if the scene has one, else by a Taylor series with few digits. The result is None if neither can
     determine it.
     """
+    if isinstance(scene.torque, StateTorque):
+        return _recorded_growth(scene, t_end)
     if closed_form(scene):
         _, growth = closed_form_estimate(scene, scene.omega, t_end)
         if growth is not None:
@@ -108,3 +114,10 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
         *normalized(near_one), near_one.omega, [t_end / factor], _COARSE, effort=work
     )
     return known(work[3]) if n_rows else None
+
+
+def _recorded_growth(scene: Scene, t_end: float) -> float | None:
+    try:
+        return recorded_series(scene, [t_end], _COARSE, _LITTLE_WORK).growth
+    except InputError:
+        return None

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.dynamics.system import with_constant_body
 from pyharness.methods.plan import plan
 from pyharness.methods.registry import (
     METHODS,
@@ -27,11 +28,18 @@ from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, unknown
 from pyharness.model.principal import in_scene_axes, principal
 from pyharness.model.scene import Scene, checked_scene, most_steps
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, Numbers, number, number_list
 from pyharness.model.waves import with_merged_waves
-from pyharness.scenes.rescaled import is_ordinary, rescaling_factor, scaled, unscaled
+from pyharness.scenes.rescaled import (
+    has_ordinary_rows,
+    is_ordinary,
+    rescaling_factor,
+    scaled,
+    unscaled,
+)
 
 _ROWS = ("time", "recorded_time", "omega")
 _WORST_FIRST = ("overflow", "sensitive", "complete")
@@ -82,8 +90,9 @@ def solve(
     ------
     InputError
         If the method is unknown, or can't take the scene or propagate its attitude; if a torque
-        that needs the attitude comes without it; if the times are not in order; if the method
-        can't meet the tolerance, or needs more work for it than `effort` allows.
+        that needs the attitude comes without it; if the times are not in order; if a moment that
+        changes with time reaches 0 before a time; if the method can't meet the tolerance, or needs
+        more work for it than `effort` allows.
     NotBuiltError
         If the method needs the extension, and it is not built.
 
@@ -94,7 +103,7 @@ def solve(
     array([[3.5, 3.5, 3.5],
            [6. , 6. , 6. ]])
     """
-    checked_scene(scene, any_axes=True, any_torque=True, any_state=True)
+    checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
     if not isinstance(method, str) or method not in METHODS:
         raise unknown("method", method, METHODS)
     chosen = METHODS[method]
@@ -110,18 +119,23 @@ def solve(
         )
     check_torque(scene, method, attitude)
     if attitude:
-        check_attitude(method)
+        check_attitude(method, scene)
     # An attitude that was not requested is not computed.
     start = (scene.attitude or IDENTITY) if attitude else None
     if start is not scene.attitude:
         scene = replace(scene, attitude=start)
-    is_full = scene.inertia is not None
+    given, is_full = scene, scene.inertia is not None
     scene, axes = principal(scene)
+    moments = scene.changing or scene.moments
+    values, turned = _ascending(times)
+    if scene.changing is not None:
+        scene.changing.check((values[0], values[-1]))
+        # The reference has equations of its own for such a scene.
+        scene = scene if method == "reference" else with_constant_body(scene)
     # The reference rounds no amplitude.
     if method != "reference" and isinstance(scene.torque, TorqueLaw):
         scene = with_merged_waves(scene)
     effort = checked_effort(effort)
-    values, turned = _ascending(times)
     below = [t for t in values if t < 0.0]
     # The times on either side of 0, in order away from 0.
     sides = (below[::-1], values[len(below) :])
@@ -130,7 +144,13 @@ def solve(
         parts[0] = _reversed(parts[0])
     found = parts[0] if len(parts) == 1 else _joined(*parts)
     reported = None if chosen.is_fixed_step else tolerance
-    found = replace(found, moments=scene.moments, tolerance=reported)
+    found = replace(
+        found,
+        moments=moments,
+        tolerance=reported,
+        torque=given.torque,
+        initial_omega=given.omega,
+    )
     if is_full:
         found = in_scene_axes(found, axes)
     return _reversed(found) if turned else found
@@ -187,7 +207,7 @@ def _integrate(
     `tolerance` is the largest allowed error, relative to the largest |omega|. `effort` multiplies
     the work limit of some ten seconds.
     """
-    if not chosen.is_fixed_step and not is_ordinary(scene):
+    if not chosen.is_fixed_step and not is_ordinary(scene.omega):
         # The method does not use the step size, but in the new unit it might not be finite.
         scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
     factor = 1.0 if chosen.any_scale else rescaling_factor(scene, times[-1])
@@ -198,6 +218,9 @@ def _integrate(
         found = chosen.solve(scaled(scene, factor), faster, tolerance, effort)
     except TimedError as refusal:
         raise refusal.slower(factor) from refusal.__cause__
+    if isinstance(scene.torque, StateTorque) and not has_ordinary_rows(found):
+        # The omega that the torque causes is larger than it was estimated to be.
+        return chosen.solve(scene, times, tolerance, effort)
     return unscaled(found, times, factor)
 
 

@@ -1,12 +1,12 @@
 """The class `Solver`: a scene prepared for one method, for many fast calls through C."""
 
 import reprlib
-from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from pyharness.dynamics.system import is_recorded
 from pyharness.methods.last_call import LastCall
 from pyharness.methods.many_starts import many_starts
 from pyharness.methods.packed import packed_scene
@@ -14,14 +14,10 @@ from pyharness.methods.plan import RK4_OR_TAYLOR, Plan
 from pyharness.model.codes import Methods, Places
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
-from pyharness.model.scene import Scene
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import Array
 from pyharness.model.values import (
-    Number,
-    Numbers,
     Triple,
     number,
-    three,
     three_floats,
 )
 
@@ -150,25 +146,6 @@ class Solver(LastCall, BoundKernel):
             return "quick" if steps < 0 else "taylor"
         return self.plan.fallback or self.plan.method
 
-    def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
-        """Return the trajectory from `omega0` (rad/s) at `times` (s), as `solve` computes it.
-
-        `omega0` is the angular velocity at time 0. The times must be strictly monotonic; they may
-        be positive and negative. Raise InputError if `omega0` is not three finite numbers, or if
-        the times are not strictly monotonic.
-        """
-        return self._rows(replace(self.plan.scene, omega=three("omega0", omega0)), times)
-
-    def _rows(self, scene: Scene, times: Number | Numbers) -> Trajectory:
-        from pyharness.methods.registry import METHODS
-        from pyharness.methods.solve import solve
-
-        tolerance, asked, effort = self._given
-        method = "taylor" if asked == "quick" else asked
-        # A method with a fixed step takes no tolerance. For such a method `solve` expects 1.
-        tolerance = max(tolerance, METHODS[method].finest)
-        return solve(scene, times, method, tolerance, effort=effort)
-
 
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
     """Convert the arguments of a solver call if the C function can't read their types.
@@ -207,6 +184,8 @@ def _code(chosen: Plan) -> int:
     `chosen` is the plan, which names the method. The integers are defined in
     `pyharness.model.codes.Methods`.
     """
+    if is_recorded(chosen.scene):
+        return Methods.TAPE
     if chosen.closed_form == "sphere":
         return CODES["sphere"]
     if chosen.method == "closed-form":

@@ -13,10 +13,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from pyharness.dynamics.scaled_tape import MULTIPLE, scaled_tape
+from pyharness.model.attitude import IDENTITY
 from pyharness.model.scene import Scene, Triple
-from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Trajectory
 
+# The torque that depends on the state is evaluated at so many times.
+_SAMPLES = 9
 # Omegas from the inverse of this value to this value (rad/s) are so far from the limits of
 # binary64 that products of components of different size keep their digits.
 _LARGE = 2.0**300
@@ -26,8 +31,17 @@ def scaled(scene: Scene, factor: float) -> Scene:
     """Return the scene with rescaled time: omega is multiplied by `factor`, time divided by it.
 
     If omega(t) is the solution of the given scene, the solution of the returned scene is
-    factor * omega(factor * t). If `factor` is a power of 2, no number is rounded.
+    factor * omega(factor * t). If `factor` is a power of 2, no number is rounded. Raise InputError
+    if the torque depends on the state and can't be rescaled, for which see `rescaling_factor`, or
+    if the inertia changes with time.
     """
+    is_constant = scene.changing is None
+    tape = _tape(scene.torque, factor) if isinstance(scene.torque, StateTorque) else None
+    if is_constant and tape is not None:
+        first, second, third = (factor * each for each in scene.omega)
+        torque = StateTorque(tape, None, scene.torque.needs_attitude)
+        step = scene.step_size / factor
+        return replace(scene, omega=(first, second, third), torque=torque, step_size=step)
     law = scene.law
 
     def times(values: Triple, power: int) -> Triple:
@@ -51,12 +65,17 @@ def scaled(scene: Scene, factor: float) -> Scene:
     )
 
 
-def is_ordinary(scene: Scene) -> bool:
-    """Return whether products of components of the initial omega neither overflow nor underflow.
+def is_ordinary(omega: Triple) -> bool:
+    """Return whether products of components of omega (rad/s) neither overflow nor underflow.
 
     The test is that the largest component is between 2**-300 and 2**300 rad/s.
     """
-    return 1.0 / _LARGE <= max(map(abs, scene.omega)) <= _LARGE
+    return 1.0 / _LARGE <= max(map(abs, omega)) <= _LARGE
+
+
+def has_ordinary_rows(found: Trajectory) -> bool:
+    """Return whether a trajectory has all rows, and no omega above 2**300 rad/s."""
+    return found.has_all_rows and float(np.abs(found.omega).max(initial=0.0)) <= _LARGE
 
 
 def rescaling_factor(scene: Scene, time: float) -> float:
@@ -64,18 +83,27 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
     The function `scaled` uses this factor to rescale the time of the scene. Omega is the larger of
     the initial omega and the omega that the torque may cause until `time` (s), the end of the
-    integration. The result is 1 if the scene needs no rescaling, if the rescaled scene would
-    overflow or underflow, or if the torque depends on the state.
+    integration. The result is 1 if the scene needs no rescaling, or if the rescaled scene would
+    overflow or underflow. The omega that a torque of the state may cause is only estimated, and
+    an opaque torque is not rescaled.
     """
-    if is_ordinary(scene) or not isinstance(scene.torque, TorqueLaw):
+    if is_ordinary(scene.omega):
         return 1.0
+    state_torque = scene.torque if isinstance(scene.torque, StateTorque) else None
+    by_torque = omega_by_torque if state_torque is None else _omega_by_state_torque
     # The omega that the torque may add counts like the initial omega.
-    largest = max(max(map(abs, scene.omega)), omega_by_torque(scene, time))
+    largest = max(max(map(abs, scene.omega)), by_torque(scene, time))
     if not (0.0 < largest < math.inf) or 1.0 / _LARGE <= largest <= _LARGE:
         return 1.0
     # With an exponent nearer to the limits of binary64 the factor would overflow or underflow.
     exponent = max(-1000, min(1000, math.frexp(largest)[1]))
+    if state_torque is not None:
+        exponent -= exponent % MULTIPLE
     factor = math.ldexp(1.0, -exponent)
+    if state_torque is not None:
+        is_short = 0.0 < abs(time) / factor < sys.float_info.min
+        fits = math.isfinite(abs(time) / factor) and not is_short
+        return factor if fits and _tape(state_torque, factor) is not None else 1.0
     return factor if _fits(scene, time, factor) else 1.0
 
 
@@ -103,6 +131,33 @@ def omega_by_torque(scene: Scene, time: float) -> float:
         omega = impulse / moment
         largest = max(largest, omega if math.isfinite(omega) else math.inf)
     return largest
+
+
+def _omega_by_state_torque(scene: Scene, time: float) -> float:
+    """Return an estimate of the |omega| (rad/s) that a torque of the state causes until `time`.
+
+    The torque is that of the initial state, at times from 0 to `time` (s).
+    """
+    torque, moments = scene.torque, scene.moments or (1.0, 1.0, 1.0)
+    assert isinstance(torque, StateTorque)
+    if torque.tape is None:
+        return 0.0
+    rates = [
+        abs(each / moment)
+        for n in range(_SAMPLES)
+        for each, moment in zip(
+            torque.at(time * n / (_SAMPLES - 1), scene.omega, scene.attitude or IDENTITY),
+            moments,
+            strict=True,
+        )
+    ]
+    omega = max(filter(math.isfinite, rates), default=0.0) * abs(time)
+    return omega if math.isfinite(omega) else 0.0
+
+
+def _tape(torque: StateTorque, factor: float) -> Tape | None:
+    """Return the tape of a torque for rescaled time; None if it is opaque or can't be rescaled."""
+    return torque.tape and scaled_tape(torque.tape, math.frexp(factor)[1] - 1)
 
 
 def _fits(scene: Scene, time: float, factor: float) -> bool:

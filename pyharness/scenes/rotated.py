@@ -4,9 +4,13 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from pyharness.model.attitude import Quaternion
 from pyharness.model.errors import InputError
-from pyharness.model.scene import Scene, Triple
+from pyharness.model.scene import Scene, Triple, checked_scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.tape import N_INPUTS, TIME, Linear, Operation, Table, Tape
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.model.trajectory import Array
 
@@ -16,14 +20,19 @@ def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene
 
     `turn` takes and returns three components; for example, it permutes axes or changes signs. If
     `body` is true, `turn` is also applied to the moments. A torque about the axes of space is
-    unchanged. The attitude is also unchanged, so that the caller must transform it if necessary.
+    unchanged. A torque that depends on the state is that of the new axes, and `turn` must be a
+    rotation. The attitude is also unchanged, so that the caller must transform it if necessary.
+    Raise InputError if the inertia changes with time.
     """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
         return tuple((turn(amplitude), frequency) for amplitude, frequency in each)
 
-    law = scene.law
-    if not law.in_space:
+    checked_scene(scene, any_axes=True, any_torque=True, any_state=True)
+    law = scene.torque
+    if isinstance(law, StateTorque):
+        law = law.rotated(axes_of(turn))
+    elif not law.in_space:
         law = TorqueLaw(turn(law.constant), turn(law.rate), waves(law.sines), waves(law.cosines))
     return replace(
         scene,
@@ -33,16 +42,65 @@ def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene
     )
 
 
+def axes_of(turn: Callable[[Triple], Triple]) -> Array:
+    """Return new axes as the columns of a matrix, in components about the old axes.
+
+    `turn` takes the components of a vector about the old axes and returns those about the new ones.
+    """
+    return np.array([turn((1.0, 0.0, 0.0)), turn((0.0, 1.0, 0.0)), turn((0.0, 0.0, 1.0))])
+
+
+def later(torque: StateTorque, by: float) -> StateTorque:
+    """Return a recorded torque whose time 0 is the time `by` (s) of the given torque.
+
+    Raise InputError if the torque is opaque.
+    """
+    if torque.tape is None:
+        raise InputError(
+            "an opaque torque can't be shifted in time; allowed: a torque that can be recorded"
+        )
+
+    # The first operation of the new tape is the old time, in the first slot after the inputs.
+    def moved(slot: int) -> int:
+        return N_INPUTS if slot == TIME else slot + (slot >= N_INPUTS)
+
+    def moved_sum(linear: Linear) -> Linear:
+        terms = sorted((moved(slot), factor) for slot, factor in linear.terms)
+        return Linear(linear.constant, tuple(terms))
+
+    operations = [Operation("linear", (), Linear(by, ((TIME, 1.0),)))]
+    for kind, operands, linear, table in torque.tape.operations:
+        if table is not None:
+            table = Table(tuple(time - by for time in table.breaks), table.pieces)
+        own = None if linear is None else moved_sum(linear)
+        operations.append(Operation(kind, tuple(map(moved, operands)), own, table))
+    outputs = tuple(map(moved_sum, torque.tape.outputs))
+    return StateTorque(Tape(tuple(operations), outputs), None, torque.needs_attitude)
+
+
 def restarted_at(
     scene: Scene, omega: Array, by: float, attitude: Quaternion | None = None
 ) -> Scene:
     """Return the scene whose time 0 is the time `by` (s) of the given scene.
 
     `omega` (rad/s) and `attitude` (a quaternion) are the state at time `by` and become the initial
-    values. If `attitude` is None, the initial attitude of the given scene is used. The torque law
-    is shifted in time. Raise InputError if the torque is about the axes of space and `attitude` is
-    None.
+    values. If `attitude` is None, the initial attitude of the given scene is used. The torque is
+    shifted in time. Raise InputError if the torque is opaque, or if `attitude` is None and the
+    torque is about the axes of space or depends on the attitude.
     """
+    first, second, third = (float(w) for w in omega)
+    if isinstance(scene.torque, StateTorque):
+        if scene.torque.needs_attitude and attitude is None:
+            raise InputError(
+                "a scene with a torque that depends on the attitude can't be restarted without the "
+                "attitude at that time"
+            )
+        return replace(
+            scene,
+            omega=(first, second, third),
+            torque=later(scene.torque, by),
+            attitude=scene.attitude if attitude is None else attitude,
+        )
     law = scene.law
     if law.in_space and attitude is None:
         raise InputError(
@@ -63,7 +121,6 @@ def restarted_at(
         sines.append((times(amplitude, -math.sin(frequency * by)), frequency))
     c, r = law.constant, law.rate
     constant = (c[0] + r[0] * by, c[1] + r[1] * by, c[2] + r[2] * by)
-    first, second, third = (float(w) for w in omega)
     return replace(
         scene,
         omega=(first, second, third),

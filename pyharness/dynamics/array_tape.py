@@ -1,0 +1,43 @@
+"""Evaluation of a tape for many times and states at once, in NumPy's arrays."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pyharness.model.tape import N_INPUTS, Functions, Table, Tape, evaluate
+from pyharness.model.trajectory import Array
+
+
+def table_values(table: Table, times: Any) -> Array:
+    """Return the values of a table at an array of times (s)."""
+    breaks, pieces = np.array(table.breaks), np.array(table.pieces)
+    piece = np.maximum(0, np.searchsorted(breaks, times, side="right") - 1)
+    c0, c1, c2, c3 = pieces[piece].T
+    s = times - breaks[piece]
+    found: Array = c0 + s * (c1 + s * (c2 + s * c3))
+    return found
+
+
+ARRAYS: Functions[Any] = Functions(float, np.sqrt, np.exp, np.sin, np.cos, table_values)
+
+
+def inputs_of(times: Array, state: Array) -> list[Array]:
+    """Return the eight inputs of a tape as arrays of shape (n,).
+
+    `times` has shape (n,), and `state` shape (n, 3) or (n, 7): omega, and the attitude. Without an
+    attitude its inputs are 0.
+    """
+    columns = [times, *state.T]
+    return columns + [np.zeros(len(times))] * (N_INPUTS - len(columns))
+
+
+def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
+    """Return the outputs of a tape at n times and states, shape (n, outputs).
+
+    The arguments are those of `inputs_of`. A result is not finite where the tape is singular.
+    """
+    with np.errstate(all="ignore"):
+        found: Sequence[Any] = evaluate(tape, inputs_of(times, state), ARRAYS)
+    # An output that is a constant is a number.
+    return np.stack([np.broadcast_to(each, len(times)) for each in found], axis=1)

@@ -1,0 +1,114 @@
+"""A recorded torque in rescaled time, in which omega is near 1 rad/s.
+
+Every slot of the tape is multiplied by a power of two of its own. Intermediate results then neither
+overflow nor underflow, although a square of omega would in the original unit of time.
+"""
+
+import math
+from functools import lru_cache
+
+from pyharness.model.tape import N_INPUTS, OMEGA, TIME, Linear, Operation, Table, Tape
+
+# The exponents of rescaled time are multiples of this number, so that those of nested square roots
+# are whole numbers.
+MULTIPLE = 16
+
+
+@lru_cache(maxsize=64)
+def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
+    """Return the tape of a torque in another unit of time, 2**exponent s.
+
+    The inputs of the returned tape are the time divided by 2**exponent, omega multiplied by it, and
+    the attitude. Its outputs are those of `tape` multiplied by 2**(2 * exponent). No number is
+    rounded. The result is None if a number of the tape would not be representable.
+    """
+    scaling = _Scaling(exponent)
+    try:
+        for operation in tape.operations:
+            scaling.add(operation)
+        outputs = tuple(scaling.combined(each, 2 * exponent) for each in tape.outputs)
+    except ArithmeticError:
+        return None
+    return Tape(tuple(scaling.operations), outputs)
+
+
+class _Scaling:
+    """A tape while it is converted: slot n becomes slot `places[n]`, times 2**`exponents[n]`."""
+
+    def __init__(self, exponent: int) -> None:
+        """Begin with the inputs, for the unit of time 2**exponent s."""
+        self.operations: list[Operation] = []
+        self._unit = exponent
+        self._places = list(range(N_INPUTS))
+        self._exponents = [0] * N_INPUTS
+        self._exponents[TIME] = -exponent
+        for slot in OMEGA:
+            self._exponents[slot] = exponent
+        # The linear combination of each slot that is one.
+        self._linear: dict[int, Linear] = {TIME: Linear(0.0, ((TIME, 1.0),))}
+
+    def add(self, operation: Operation) -> None:
+        """Convert the next operation; raise ArithmeticError if a number is out of range."""
+        kind, operands, linear, table = operation
+        exponents = [self._exponents[slot] for slot in operands]
+        if linear is not None:
+            self._linear[len(self._places)] = linear
+            exponent = self._exponent_of(linear)
+            found = Operation(kind, (), self.combined(linear, exponent))
+        elif table is not None:
+            exponent, found = 0, Operation(kind, (), None, self._moved(table))
+        elif kind in ("product", "quotient"):
+            exponent = exponents[0] + (exponents[1] if kind == "product" else -exponents[1])
+            found = Operation(kind, tuple(self._places[slot] for slot in operands))
+        elif kind == "sqrt":
+            exponent, odd = divmod(exponents[0], 2)
+            if odd:
+                raise ArithmeticError("the exponent of a square root is not a whole number")
+            found = Operation(kind, (self._places[operands[0]],))
+        else:
+            exponent, found = 0, Operation(kind, (self._unscaled(operands[0]),))
+        self._places.append(self._append(found))
+        self._exponents.append(exponent)
+
+    def combined(self, linear: Linear, exponent: int) -> Linear:
+        """Return a linear combination of the new slots, whose value is multiplied by 2**exponent.
+
+        Raise ArithmeticError if a number is out of range.
+        """
+        terms = tuple(
+            (self._places[slot], _scaled(factor, exponent - self._exponents[slot]))
+            for slot, factor in linear.terms
+        )
+        return Linear(_scaled(linear.constant, exponent), terms)
+
+    def _append(self, operation: Operation) -> int:
+        self.operations.append(operation)
+        return N_INPUTS + len(self.operations) - 1
+
+    def _exponent_of(self, linear: Linear) -> int:
+        own = {self._exponents[slot] for slot, _ in linear.terms}
+        return 0 if linear.constant or not own else min(own, key=abs)
+
+    def _unscaled(self, slot: int) -> int:
+        """Return the new slot with the value of `slot` itself, an angle or an exponent."""
+        if self._exponents[slot] == 0:
+            return self._places[slot]
+        # The kernel recognises an angle proportional to time by its combination.
+        linear = self._linear.get(slot, Linear(0.0, ((slot, 1.0),)))
+        return self._append(Operation("linear", (), self.combined(linear, 0)))
+
+    def _moved(self, table: Table) -> Table:
+        breaks = tuple(_scaled(time, -self._unit) for time in table.breaks)
+        pieces = []
+        for piece in table.pieces:
+            a, b, c, d = (_scaled(x, n * self._unit) for n, x in enumerate(piece))
+            pieces.append((a, b, c, d))
+        return Table(breaks, tuple(pieces))
+
+
+def _scaled(value: float, exponent: int) -> float:
+    """Return value * 2**exponent; raise ArithmeticError if it is not representable."""
+    found = math.ldexp(value, exponent)
+    if math.ldexp(found, -exponent) != value:
+        raise ArithmeticError("the product underflows")
+    return found

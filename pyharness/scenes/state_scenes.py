@@ -1,0 +1,185 @@
+"""Random scenes with torques that depend on omega or attitude, reproducible from a seed.
+
+A torque is the sum of functions that are recorded, or of ready terms. All torques are drawn in
+proportion to the gyroscopic torque, so that they affect slow and fast bodies in the same way.
+"""
+
+from collections.abc import Callable
+from random import Random
+from typing import Any
+
+import numpy as np
+
+from pyharness.dynamics.field_terms import (
+    gravity_gradient,
+    in_space,
+    magnetic_damping,
+    magnetic_dipole,
+)
+from pyharness.dynamics.table_terms import pulses, table
+from pyharness.dynamics.terms import attitude_control, damping, drag, rate_control, wheels
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.torque_law import TorqueLaw
+
+# A torque over the size of the moments, for symbols or numbers: (t, omega, attitude).
+Term = Callable[[Any, Any, Any], Any]
+STEADY = ("damping", "wheel", "drag", "wave", "control", "quotient", "root", "decay", "swing")
+TURNING = ("gradient", "field", "spring", "mixed")
+
+READY = (
+    "damping",
+    "drag",
+    "rate_control",
+    "attitude_control",
+    "wheels",
+    "gravity_gradient",
+    "magnetic_dipole",
+    "magnetic_damping",
+    "in_space",
+    "table",
+    "pulses",
+)
+TIMED = ("table", "pulses")  # ready terms that depend on time alone
+
+
+def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Scene, float]:
+    """Return a random scene whose torque is the sum of one to three terms, and a time (s).
+
+    `names` are the kinds of terms. The scene has an attitude if a term needs one, or by chance. The
+    time may be negative.
+    """
+    chosen = source.sample(names, min(len(names), source.choice((1, 1, 2, 2, 3))))
+    size = 10.0 ** source.uniform(-2.0, 1.0)  # of the moments, kg m2
+    moments = [size * x for x in _moments(source)]
+    speed = 10.0 ** source.uniform(-1.0, 1.0)
+    terms = [term(source, name, size, speed) for name in chosen]
+    turning = any(name in TURNING for name in chosen)
+
+    def torque(t: Any, omega: Any, q: Any) -> Any:
+        return sum(each(t, omega, q) for each in terms)
+
+    def still(t: Any, omega: Any) -> Any:
+        return torque(t, omega, None)
+
+    with_attitude = turning or source.random() < 0.3
+    scene = Scene(
+        " + ".join(chosen),
+        [source.uniform(-speed, speed) for _ in range(3)],
+        moments=moments,
+        torque=torque if turning else still,
+        attitude=[source.gauss(0.0, 1.0) for _ in range(4)] if with_attitude else None,
+    )
+    radians = 10.0 ** source.uniform(-0.5, 1.7)
+    return scene, source.choice((1.0, 1.0, -0.3)) * radians / speed
+
+
+def draw_ready(source: Random, names: tuple[str, ...] = READY) -> tuple[Scene, float]:
+    """Return a random scene whose torque is one or two ready terms of `names`, and a time (s).
+
+    The time may be negative.
+    """
+    chosen = source.sample(names, source.choice((1, 2)))
+    size = 10.0 ** source.uniform(-2.0, 1.0)  # of the moments, kg m2
+    moments = [size * x for x in _moments(source)]
+    speed = 10.0 ** source.uniform(-1.0, 1.0)
+    torque = sum(ready(source, name, moments, speed) for name in chosen)
+    assert isinstance(torque, StateTorque)
+    scene = Scene(
+        " + ".join(chosen),
+        [source.uniform(-speed, speed) for _ in range(3)],
+        moments=moments,
+        torque=torque,
+        attitude=[source.gauss(0.0, 1.0) for _ in range(4)],
+    )
+    radians = 10.0 ** source.uniform(-0.5, 1.7)
+    return scene, source.choice((1.0, 1.0, -0.3)) * radians / speed
+
+
+def ready(source: Random, name: str, moments: list[float], speed: float) -> StateTorque:
+    """Return a ready term with random arguments, about the size of the gyroscopic torque."""
+    part = max(moments) * speed * source.uniform(0.05, 1.0)
+    vector = [source.uniform(-1.0, 1.0) for _ in range(3)]
+    several = [source.uniform(0.1, 0.5) * part for _ in range(3)]
+    rate = speed * 10.0 ** source.uniform(-1.0, 0.5)
+    field = TorqueLaw(vector, sines=[([part, 0.0, part], rate)], frame="space")
+    made: dict[str, Callable[[], Any]] = {
+        "damping": lambda: damping(several),
+        "drag": lambda: drag([0.1 * part, 0.2 * part / speed**2]),
+        "rate_control": lambda: rate_control(several, [speed * x for x in vector]),
+        "attitude_control": lambda: attitude_control(part * speed, several, [1.0, *vector]),
+        "wheels": lambda: wheels([part * x for x in vector], [0.1 * part * speed, 0, 0]),
+        "gravity_gradient": lambda: gravity_gradient(moments, rate),
+        "magnetic_dipole": lambda: magnetic_dipole([speed * x for x in vector], field),
+        "magnetic_damping": lambda: magnetic_damping(0.3 * part, vector),
+        "in_space": lambda: in_space([part * speed * x for x in vector]),
+        "table": lambda: _table(source, part * speed, 1.0 / speed),
+        "pulses": lambda: _pulses(source, part * speed, 1.0 / speed),
+    }
+    found: StateTorque = made[name]()
+    return found
+
+
+def _table(source: Random, size: float, length: float) -> StateTorque:
+    """Return a table of torques up to `size` (N m), whose intervals are about `length` (s)."""
+    times = np.cumsum([source.uniform(0.1, 3.0) * length for _ in range(12)]) - 3.0 * length
+    values = [[source.uniform(-size, size) for _ in range(3)] for _ in times]
+    return table(times, values, source.choice(("held", "linear", "cubic")))
+
+
+def _pulses(source: Random, size: float, length: float) -> StateTorque:
+    """Return pulses of torques up to `size` (N m), which last for about `length` (s)."""
+    ends = np.cumsum([source.uniform(0.1, 3.0) * length for _ in range(12)]) - 3.0 * length
+    values = [[source.uniform(-size, size) for _ in range(3)] for _ in range(6)]
+    return pulses(ends[::2], ends[1::2] - ends[::2], values)
+
+
+def _moments(source: Random) -> list[float]:
+    while True:
+        found = sorted(10.0 ** source.uniform(-0.5, 0.3) for _ in range(3))
+        if found[2] < found[0] + found[1]:
+            source.shuffle(found)
+            return found
+
+
+def term(source: Random, name: str, size: float, speed: float) -> Term:
+    """Return a random torque of one kind that is about `size` (kg m2) times `speed` squared."""
+    scale = size * speed * source.uniform(0.05, 1.0)
+    a, b, c = (source.uniform(-1.0, 1.0) for _ in range(3))
+    vector = np.array([source.uniform(-1.0, 1.0) for _ in range(3)])
+    other = np.array([source.uniform(-1.0, 1.0) for _ in range(3)])
+    matrix = np.array([[source.uniform(-1.0, 1.0) for _ in range(3)] for _ in range(3)])
+    f = speed * 10.0 ** source.uniform(-1.0, 0.7)
+    terms: dict[str, Term] = {
+        "damping": lambda t, w, q: -0.2 * scale * ((matrix @ matrix.T) @ w),
+        "wheel": lambda t, w, q: scale * np.cross(vector, w),
+        "drag": lambda t, w, q: -0.2 * scale / speed * w * np.sqrt(w @ w + 0.01 * speed**2),
+        "wave": lambda t, w, q: scale * speed * (vector * np.sin(f * t + a) + b * other),
+        "control": lambda t, w, q: -scale * (w - speed * vector),
+        "quotient": lambda t, w, q: scale * w * (a + b * f * t) / (1.0 + (f * t) ** 2),
+        "root": lambda t, w, q: scale * vector * w[0] / np.sqrt(1.5 + (w[1] / speed) ** 2),
+        "decay": lambda t, w, q: scale * speed * vector * np.exp(-((w[2] / speed) ** 2) - c * c),
+        "swing": lambda t, w, q: scale * speed * vector * np.cos(w[0] / speed + a * w[1] / speed),
+        "gradient": lambda t, w, q: gradient(t, q, scale * speed * (1.0 + np.abs(vector)), f),
+        "field": lambda t, w, q: scale * speed * np.cross(vector, to_body(q, orbit(t, f) + other)),
+        "spring": lambda t, w, q: -scale * speed * q[0] * q[1:] - 0.3 * scale * w,
+        "mixed": lambda t, w, q: scale * vector * (w @ vector) * q[1] * np.sin(q[2] + f * t),
+    }
+    return terms[name]
+
+
+def orbit(t: Any, rate: float) -> Any:
+    """Return the direction to a satellite in a circular orbit about the third axis of space."""
+    return np.array([np.cos(rate * t), np.sin(rate * t), 0.0 * t])
+
+
+def gradient(t: Any, q: Any, inertia: Any, rate: float) -> Any:
+    """Return a torque like that of the gravity gradient, r x I r with the direction r."""
+    r = to_body(q, orbit(t, rate))
+    return np.cross(r, inertia * r)
+
+
+def to_body(q: Any, vector: Any) -> Any:
+    """Return components about the body axes of a vector given about the axes of space."""
+    w, v = q[0], q[1:]
+    return (w * w - v @ v) * vector + 2.0 * (v @ vector) * v - 2.0 * w * np.cross(v, vector)

@@ -150,6 +150,7 @@ def test_reference_lists_every_method_with_its_tolerances() -> None:
         "run --scene docs/space-torque.toml --method auto --times 1 --attitude matrix",
         "run --case 6 --program two-term", "compare --case 3",
         "compare --case 3 --program two-term --attitude --word cdc48",
+        "compare --scene docs/damped.toml --method auto,dop853",
         "compare --case 3 --program two-term --ablate", "plan --case 3",
         "claims --explain abstract-superior", "defects",
         "defects stage-base", "defects 1660", "cards runge-kutta:860",

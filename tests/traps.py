@@ -21,7 +21,7 @@ import numpy as np
 
 from pyharness.methods.plan import RK4_OR_TAYLOR
 from pyharness.methods.solver import CODES as _CODES
-from pyharness.model.codes import Places
+from pyharness.model.codes import Methods, Places
 from pyharness.model.extension import GAVE_UP, OVERFLOW, SENSITIVE
 
 _ON_ARM = platform.machine().lower() in ("arm64", "aarch64")
@@ -70,17 +70,20 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
         if not raised:
             return answer
         found = dict(zip(results, answer if isinstance(answer, tuple) else (answer,), strict=True))
-        has_infinity = bool(raised & TOO_LARGE) or not _finite((*args, *named.values()))
-        if name == "tape_rows" and found["status"] == OVERFLOW:
+        packed = name in ("solve_packed", "solve_packed_attitude")
+        method = args[0][Places.METHOD] if packed else None
+        is_tape = name == "tape_rows" or method == Methods.TAPE
+        # A tape has integers in the places of numbers.
+        numbers = args[1:] if is_tape else args
+        has_infinity = bool(raised & TOO_LARGE) or not _finite((*numbers, *named.values()))
+        if is_tape and found["status"] == OVERFLOW:
             # The torque that the user wrote may be singular, as 1/0 is.
             has_infinity = True
-        if name == "tape_rows" or (
-            name == "solve_packed" and args[0][Places.METHOD] in _TRIES_AGAIN
-        ):
+        if is_tape or (name == "solve_packed" and method in _TRIES_AGAIN):
             # An attempt with too long steps may overflow; shorter steps or the series then follow.
             found["status"] = OVERFLOW
         untold = raised & ~_told(found, has_infinity)
-        if not untold or _are_extreme((*args, found.get("rows", 0.0))):
+        if not untold or _are_extreme((*numbers, found.get("rows", 0.0))):
             return answer
         words = ", ".join(word for bit, word in _NAMES.items() if untold & bit)
         print(f"\n{name}: {words}, untold; again with traps: {args}", file=sys.stderr)

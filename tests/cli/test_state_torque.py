@@ -1,8 +1,10 @@
 """Every verb with a scene whose torque depends on the state: it works, or refuses in one line."""
 
+import json
 import re
 import shlex
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -29,7 +31,6 @@ from pyharness import (
 from pyharness.checks.external_file import read_problem
 from pyharness.cli.main import VERBS, main
 from pyharness.cli.parser import Parser
-from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.methods.registry import METHODS
 from pyharness.model.expressions import parsed
 from pyharness.model.scene import STATE_TORQUE
@@ -118,9 +119,9 @@ def test_problem_with_published_numbers_refuses_a_torque_that_depends_on_the_sta
 
 
 def test_every_verb_with_a_scene_is_tried() -> None:
-    """The verb `plan`, and `run` with other methods, are tried with the methods that they need."""
+    """The verbs `plan` and `stress`, and `run` with other methods, take such a torque."""
     with_scene = {verb for verb in VERBS if "--scene FILE" in Parser(verb).module.OPTIONS}
-    assert with_scene == {command.split()[0] for command in REFUSED} | {"plan"}
+    assert with_scene == {command.split()[0] for command in REFUSED} | {"plan", "stress"}
 
 
 @pytest.mark.usefixtures("damped")
@@ -130,6 +131,8 @@ def test_methods_and_their_plan_take_a_torque_that_depends_on_the_state(
     for method in ("auto", "taylor", "dop853", "reference"):
         assert main(["run", "--scene", "damped.toml", "--method", method]) == 0
         assert "complete" in capsys.readouterr().out
+    assert main(shlex.split("stress --scene damped.toml --only threads,length/auto")) == 0
+    assert "all well" in capsys.readouterr().out
     assert main(["plan", "--scene", "damped.toml"]) == 0
     assert "its torque depends on the state" in capsys.readouterr().out
 
@@ -285,18 +288,20 @@ def test_principal_scene_has_the_torque_in_principal_axes() -> None:
 
 
 @pytest.mark.usefixtures("damped")
-@pytest.mark.parametrize("scene", ['file = "damped.toml"', "tables"])
-def test_sweep_refuses_a_torque_that_depends_on_the_state(
-    scene: str, capsys: pytest.CaptureFixture[str]
+def test_sweep_solves_by_a_method_and_refuses_a_program(
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    table = f"[scene]\n{scene}\n"
-    if scene == "tables":
-        table = "[scene.body]\nmoments = [3, 2, 1]\n[scene.initial]\nomega = [1, 2, 3]\n"
-        table += '[scene.torque]\nexpression = ["-w1", "0", "0"]\n'
-    axis = '[[axis]]\nfield = "omega.1"\nvalues = [1.0, 2.0]\n'
-    Path("sweep.toml").write_text(f'reductions = ["end"]\n{table}[solve]\nt_end = 1.0\n{axis}')
-    with pytest.raises(InputError, match="needs a TorqueLaw"):
-        read_sweep("sweep.toml")
-    assert main(["sweep", "sweep.toml", "--out", "store"]) == 2
+    axis = '[[axis]]\nfield = "omega.1"\nvalues = [0.1, 2.0]\n'
+    scene = '[scene]\nfile = "damped.toml"\n'
+    sweep = f'reductions = ["end"]\n{scene}[solve]\nt_end = 1.0\n{axis}'
+    Path("sweep.toml").write_text(sweep)
+    assert main(["sweep", "sweep.toml", "--out", "store", "--format", "json"]) == 0
+    shown = json.loads(capsys.readouterr().out)["reductions"]
+    ends = [solve(replace(read_scene("damped.toml"), omega=(x, 1, 1)), 1.0) for x in (0.1, 2.0)]
+    lower, upper = np.sort([each.omega[0] for each in ends], axis=0)
+    assert [each["least"] for each in shown] == pytest.approx(lower.tolist(), abs=1e-11)
+    assert [each["largest"] for each in shown] == pytest.approx(upper.tolist(), abs=1e-11)
+    Path("sweep.toml").write_text(sweep.replace("t_end = 1.0", 'program = "two-term"'))
+    assert main(["sweep", "sweep.toml", "--out", "other"]) == 2
     assert STATE_TORQUE in capsys.readouterr().err
-    assert not Path("store").exists()
+    assert not Path("other").exists()

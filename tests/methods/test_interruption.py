@@ -105,7 +105,10 @@ LONG: dict[str, Callable[[], object]] = {
     "reference": _method(PUSHED, "reference", 1e4),
 }
 # Methods of SciPy, in Python, or prepared before: they do not call kernels through `extension`.
-DOORLESS = ["dop853", "lsoda", "radau", "reference", "quick", "quick-waves", "prepared-series"]
+DOORLESS = [
+    *("dop853", "lsoda", "radau", "reference"),
+    *("quick", "quick-waves", "prepared-series", "recorded-prepared"),
+]
 
 
 class _Keyboard:
@@ -137,7 +140,7 @@ def test_kernel_ends_at_once(
     name: str, keyboard: _Keyboard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rooms = [f"methods.{each}" for each in ("taylor", "fixed_step", "closed_form", "gauss", "many")]
-    rooms += ["methods.recorded", "methods.prepared_recorded"]
+    rooms += ["methods.recorded"]
     for each in (*rooms, "original.compiled", "original.many", "model.extension"):
         monkeypatch.setattr(f"pyharness.{each}.extension", keyboard.door)
     if name in DOORLESS:

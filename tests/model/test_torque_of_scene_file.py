@@ -114,7 +114,7 @@ def test_message_names_the_file(tmp_path: Path) -> None:
     [
         (lambda t, omega: -0.1 * omega, {"recorded": 0}, "N is a recorded function of omega, in",
          "[torque]: a torque that is recorded from a function can't be written to a file; allowed: "
-         "expressions"),
+         "ready terms, expressions or a TorqueLaw, and the sum of ready terms and one of these"),
         (lambda t, omega, q: t * q[0] * omega, {"recorded": 4},
          "N is a recorded function of t, omega and attitude, in N m", "recorded from a function"),
         (opaque(lambda t, omega: omega), {"opaque": True},

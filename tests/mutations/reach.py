@@ -23,7 +23,11 @@ NOT_HERE = ("tests/mutations/", "tests/browser/", "tests/bench/")
 # The files that most mutations need are recorded first, so that an interrupted recording is useful.
 FIRST = ("methods", "model", "original", "truth", "compare", "theory", "ensembles", "checks")
 OF_ONE_FILE, UNKNOWN = 3000.0, 20.0  # s
-INSTRUMENTED = tuple(f"-D{language}_args=-finstrument-functions" for language in ("c", "fortran"))
+# A build for debuggers keeps the names of its functions.
+INSTRUMENTED = (
+    "-Ddebug=true",
+    *(f"-D{language}_args=-finstrument-functions" for language in ("c", "fortran")),
+)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ EQUIVALENT = Path(__file__).parent / "equivalent.toml"
 # Code that computes, judges, reads and keeps numbers. Excluded are `cli`, `views`, `edition`,
 # pictures and reports, whose texts `tests/outputs` compares, and `bench`, whose results are run
 # times.
-_PYTHON = ("model", "methods", "theory", "truth", "original", "compare", "checks",
+_PYTHON = ("model", "dynamics", "methods", "theory", "truth", "original", "compare", "checks",
            "ensembles", "history/claims")  # fmt: skip
 _FOR_READERS = re.compile(r"report|picture|sentences|__init__|facts|ledger")
 # Excluded are `levels.c` and `levels.f90`, which choose among instruction sets of equal results,
@@ -102,12 +102,18 @@ def lines_of_code(file: str) -> int:
     return sum(bool(line.strip()) and line.strip()[0] != "#" for line in plain.splitlines())
 
 
-def draw(seed: int | str) -> Iterator[Mutation]:
+def draw(seed: int | str, only: str = "") -> Iterator[Mutation]:
     """Draw changes without end: a file by its lines of code, a line, an operator, a place.
 
     Languages are thus drawn in proportion to their lines of code, and an operator with many
-    variants is no likelier than one with few.
+    variants is no likelier than one with few. `only` has parts of file names, separated by commas;
+    changes to files without any of them are left out of the same sequence. Raise ValueError if no
+    file has any of them.
     """
+    parts = only.split(",")
+    wanted = {file for file in files() if any(part in file for part in parts)}
+    if not wanted:
+        raise ValueError(f"no file that may be changed has {only} in its name")
     generator = random.Random(f"mutations {seed}")
     names = files()
     weights = [lines_of_code(file) for file in names]
@@ -125,7 +131,8 @@ def draw(seed: int | str) -> Iterator[Mutation]:
         one = generator.choice([each for each in of_line if each.operator == operator])
         if (file, one.id) not in drawn:
             drawn.add((file, one.id))
-            yield one
+            if file in wanted:
+                yield one
 
 
 def equivalent(path: Path = EQUIVALENT) -> dict[tuple[str, str], str]:

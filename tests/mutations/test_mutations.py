@@ -120,6 +120,16 @@ def test_a_seed_gives_the_same_draw_and_another_seed_another() -> None:
     assert len(set(first)) == 2
 
 
+def test_a_draw_can_be_restricted_to_parts_of_file_names() -> None:
+    drawn = list(islice(draw("1", "dynamics,modern/tape"), 8))
+    assert all("dynamics" in each.file or "modern/tape" in each.file for each in drawn)
+    assert {each.is_compiled for each in drawn} == {False, True}
+    whole = draw("1")
+    assert drawn[0].id in {each.id for each in islice(whole, 200)}
+    with pytest.raises(ValueError, match="no file that may be changed has nothing in its name"):
+        next(draw("1", "nothing"))
+
+
 def test_a_file_without_changes_is_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     one = find(*PLANTED[2][:2])
     changes = {"empty.py": [], "full.py": [one]}
@@ -136,7 +146,8 @@ def test_every_language_has_its_share() -> None:
     assert set(lines) == {"Python", FORTRAN, C, JAVASCRIPT}
     assert lines["Python"] > lines[FORTRAN] > lines[C]
     core = {"pyharness/methods/gauss.py", "pyharness/ensembles/store.py", "web/port.js",
-            "pyharness/original/word.py", "fortran/modern/taylor.f90"}  # fmt: skip
+            "pyharness/original/word.py", "fortran/modern/taylor.f90", "pyharness/model/tape.py",
+            "pyharness/dynamics/system.py", "fortran/modern/tape_solve.f90"}  # fmt: skip
     assert core <= set(files())
     assert not any("report" in file or "picture" in file for file in files())
 
@@ -157,12 +168,13 @@ def test_the_function_around_a_mutation_is_known() -> None:
         assert find(file, id).function() == wanted
 
 
-def test_tests_of_a_module_that_is_compiled_for_each_instruction_set_are_near() -> None:
-    mutation = next(
-        each for each in mutations("fortran/modern/taylor_march.f90") if each.function()
-    )
-    entered = Check("a", 1.0, frozenset({f"taylor_march_hot:{mutation.function()}"}))
-    other = Check("b", 1.0, frozenset({f"taylor_rows_hot:{mutation.function()}"}))
+@pytest.mark.parametrize(("module", "library"), [("taylor_march", "hot"), ("tape_march", "tapes")])
+def test_tests_of_a_module_that_is_compiled_for_each_instruction_set_are_near(
+    module: str, library: str
+) -> None:
+    mutation = next(each for each in mutations(f"fortran/modern/{module}.f90") if each.function())
+    entered = Check("a", 1.0, frozenset({f"{module}_{library}:{mutation.function()}"}))
+    other = Check("b", 1.0, frozenset({f"taylor_rows_{library}:{mutation.function()}"}))
     assert [each.name for each in near(mutation, [other, entered])] == ["a"]
 
 

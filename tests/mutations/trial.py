@@ -93,7 +93,7 @@ def near(mutation: Mutation, checks: list[Check]) -> list[Check]:
         # A module that is expanded for each instruction set has its library's name after its own.
         found = re.search(r"^\s*module (\w+?)_?(?:\$|$)", (ROOT / mutation.file).read_text(), re.M)
         modules = (
-            {f"{found[1].lower()}{of}" for of in ("", "_bodies", "_hot", "_many")}
+            {f"{found[1].lower()}{of}" for of in ("", "_bodies", "_hot", "_many", "_tapes")}
             if found
             else set()
         )

@@ -27,8 +27,11 @@ PACKAGE = Path(pyharness.__file__).parent
 Place = tuple[str, int]
 
 
-def _made(id: str) -> list[Check]:
+def _made(slack: Slack) -> list[Check]:
     """Make one check."""
+    id = slack.check
+    if slack.trials is not None:
+        return list(stress([id], slack.trials()))
     if id.partition("/")[0] in KINDS:
         return list(verify(Selection(only=[id], seed="fixed", draws=1000)))
     if id.startswith("port/"):
@@ -89,9 +92,9 @@ def _fared(slack: Slack) -> tuple[list[Check], list[Check], frozenset[Place]]:
     """Return the checks within the limit and beyond it, and the places of those that failed."""
     places: set[Place] = set()
     with slack.planted(slack.within):
-        within = _made(slack.check)
+        within = _made(slack)
     with slack.planted(slack.beyond), _failing(places):
-        beyond = _made(slack.check)
+        beyond = _made(slack)
     return within, beyond, frozenset(places)
 
 

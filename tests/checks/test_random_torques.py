@@ -1,0 +1,96 @@
+"""The checks of `verify` under random torques that depend on omega or attitude."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, partial
+from typing import Any
+from unittest.mock import patch
+
+import pytest
+
+from pyharness.checks import judge
+from pyharness.checks import random_torques as room
+from pyharness.checks.check import Check, made
+from pyharness.checks.random_torques import random_torques
+from pyharness.checks.selection import Selection
+from pyharness.compare import candidates
+from pyharness.dynamics import system
+from pyharness.methods import many_space, recorded, solve
+from pyharness.methods.registry import FIXED_STEP, METHODS
+from pyharness.model import arrays
+from pyharness.model.tape import Linear, Tape
+from pyharness.model.trajectory import Trajectory
+
+TRUTH = cache(judge.reference_truth)
+
+
+def checks(only: str, draws: int = 100) -> list[Check]:
+    """Return the checks in the random scenes of a seed whose ids begin with `only`."""
+    chosen = Selection(only=[only] if only else [], seed="fixed", draws=draws, thin=True)
+    with patch.object(room, "reference_truth", TRUTH):
+        return list(made(random_torques(chosen), chosen.only))
+
+
+def test_all_pass_and_have_names_of_their_own() -> None:
+    found = checks("")
+    assert [check.id for check in found if not check.passed] == []
+    assert len({check.id for check in found}) == len(found) > 30
+    assert all(check.value is not None for check in found)
+    names = {check.id.split("/", 2)[2] for check in found}
+    assert {"torque-solve-many/omega", "torque-prepare-auto/angle"} <= names
+
+
+def test_only_requested_checks_are_made() -> None:
+    found = checks("random/20/torque-solve-taylor")
+    assert found
+    assert {check.name.subject for check in found} == {"torque-solve-taylor"}
+    again = found[0].replay.partition("--only ")[2].split()[0]
+    (same,) = [check for check in checks(again) if check.id == again]
+    assert same.value == found[0].value
+
+
+def test_orders_are_measured_and_a_wrong_one_is_seen() -> None:
+    only = [f"random/{number}/torque-order" for number in (0, 160)]
+    chosen = Selection(only=only, seed="fixed", draws=200)
+    found = list(made(random_torques(chosen), only))
+    assert {check.name.setting for check in found} == set(FIXED_STEP)
+    assert len(found) == 6
+    assert all(check.passed for check in found)
+    assert any(check.limit is not None for check in found)
+    wrong = {name: replace(METHODS[name], order=METHODS[name].order + 1) for name in FIXED_STEP}
+    with patch.dict(METHODS, wrong):
+        again = made(random_torques(chosen), only)
+        assert [not x.passed for x in again] == [x.limit is not None for x in found]
+
+
+def _off(scene: Any, attitude: bool, real: Callable[..., Tape] = system.system_of) -> Tape:
+    tape = real(scene, attitude)
+    first, *rest = tape.outputs
+    terms = tuple((slot, x * (1.0 + 1e-6)) for slot, x in first.terms)
+    return replace(tape, outputs=(Linear(first.constant, terms), *rest))
+
+
+def _moved(real: Callable[..., Trajectory], *given: Any, **more: Any) -> Trajectory:
+    found = real(*given, **more)
+    return replace(found, omega=found.omega * (1.0 + 1e-3))
+
+
+FAULTS: dict[str, tuple[Any, str, Any, str]] = {
+    "equations of motion": (recorded, "system_of", _off, "torque-solve-taylor"),
+    "prepared": (recorded, "system_of", _off, "torque-prepare-taylor"),
+    "many": (recorded, "system_of", _off, "torque-solve-many"),
+    "solve": (candidates, "solve", partial(_moved, solve.solve), "torque-solve-auto"),
+    "initial attitude": (
+        many_space, "row_of", lambda rows, i, real=arrays.row_of:
+            real(rows, i) * (1.0 + 1e-6) if rows.shape[1:] == (3,) else real(rows, i),
+        "torque-solve-many",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_fault_is_seen(fault: str) -> None:
+    module, name, planted, subject = FAULTS[fault]
+    with patch.object(module, name, planted):
+        found = [check for check in checks("") if check.name.subject == subject]
+    assert not all(check.passed for check in found)

@@ -1,0 +1,132 @@
+"""The trials of `stress --scene`, on scenes with any torque."""
+
+import json
+import shlex
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+from pyharness import Scene, opaque, read_scene, torques
+from pyharness.checks import scene_trials as room
+from pyharness.checks.check import Check
+from pyharness.checks.stress import SCENE_TRIALS, TRIALS, stress
+from pyharness.cli.main import main
+from pyharness.methods.registry import METHODS
+from pyharness.model.errors import InputError
+from pyharness.model.scene_file import scene_text
+from pyharness.scenes.random_scenes import random_scene
+
+DAMPED = "docs/damped.toml"
+MOMENTS = (4.0, 3.0, 2.0)
+SCENES: dict[str, Callable[[], Scene]] = {
+    "expressions": lambda: replace(read_scene(DAMPED), step_size=1.0),
+    "terms": lambda: Scene(
+        "terms", (0.2, 1.0, -0.3), moments=MOMENTS, attitude=(0.5, 0.5, -0.5, 0.5), steps=200,
+        torque=torques.gravity_gradient(MOMENTS, 0.7)
+        + torques.table([0.0, 0.6, 1.3], np.eye(3), "cubic"),
+    ),
+    "coefficients": lambda: Scene(
+        "coefficients", (0.2, 1.0, -0.3), coefficients=(0.25, -0.7, 0.5), steps=200,
+        torque=lambda t, w: [-0.2 * w[0], np.sin(t * w[1]), 0.0],
+    ),
+    "law": lambda: replace(random_scene("driven", 3, "law"), step_size=0.01, steps=100),
+    "free": lambda: Scene("free", (0.2, 1.0, -0.3), moments=MOMENTS, steps=200),
+}  # fmt: skip
+
+
+def checks_of(scene: Scene, *only: str) -> list[Check]:
+    """Return the requested checks of the trials of a scene."""
+    return list(stress(only, room.scene_trials(scene, " --scene x.toml")))
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_all_checks_pass_and_have_names_of_their_own(kind: str) -> None:
+    found = checks_of(SCENES[kind]())
+    assert [(check.id, check.note) for check in found if not check.passed] == []
+    assert len({check.id for check in found}) == len(found) > 60
+    assert {check.suite for check in found} == set(SCENE_TRIALS) <= set(TRIALS)
+    bounded = {check.name.subject for check in found if check.limit is not None}
+    assert bounded >= {"auto", "taylor", "gauss-8", "dop853"}
+    assert ("rk4" in bounded) == (kind != "terms")  # a table lowers the order
+    assert all(check.replay.endswith(" --scene x.toml") for check in found)
+    # The bounds are useful: none of them is near the largest possible difference.
+    assert max(check.limit for check in found if check.limit is not None) < 0.3
+
+
+def _off(real: Callable[..., Any], only_at: Callable[[Scene], bool]) -> Callable[..., Any]:
+    def wrong(scene: Scene, *given: Any, **more: Any) -> Any:
+        found = real(scene, *given, **more)
+        return replace(found, omega=found.omega * 1.001) if only_at(scene) else found
+
+    return wrong
+
+
+@pytest.mark.parametrize("trial", ["invariance/taylor/axes", "invariance/taylor/back",
+                                   "invariance/taylor/split", "length/taylor"])  # fmt: skip
+def test_fault_is_seen(trial: str) -> None:
+    """Omega has an error of .001 in some of the calls."""
+    scene = SCENES["terms"]()
+    place = "pyharness.compare.candidates.solve" if "length" in trial else None
+    is_same = trial.endswith(("split", "length/taylor"))
+    with patch(
+        place or "pyharness.checks.scene_trials.solve",
+        _off(room.solve, lambda each: is_same == (each.torque == scene.torque)),  # type: ignore[attr-defined]
+    ):
+        found = checks_of(scene, trial)
+    found = [check for check in found if check.name.quantity != "angle"]
+    assert found
+    assert not any(check.passed for check in found)
+
+
+def test_wrong_order_and_other_bits_are_seen() -> None:
+    scene = SCENES["coefficients"]()
+    with patch.object(room, "FIXED_STEP", ("improved-euler",)), patch.dict(
+        METHODS, {"improved-euler": replace(METHODS["improved-euler"], order=3)}
+    ):  # fmt: skip
+        (check,) = checks_of(scene, "step-size")
+    assert not check.passed
+    bits = iter(range(10**6))
+    with patch.object(room, "_bits", lambda scene, method: str(next(bits)).encode()):
+        assert not any(check.passed for check in checks_of(scene, "threads/auto"))
+
+
+def test_what_has_no_trial_is_refused() -> None:
+    with pytest.raises(InputError, match=r"give \[initial\] attitude"):
+        room.scene_trials(replace(SCENES["expressions"](), attitude=None), "")
+    hidden = replace(SCENES["terms"](), torque=opaque(np.subtract))
+    with pytest.raises(InputError, match="opaque torque"):
+        room.scene_trials(hidden, "")
+
+
+def test_verb_stress_with_a_scene(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a scene.toml"
+    path.write_text(scene_text(SCENES["expressions"]()))
+    monkeypatch.chdir(tmp_path)
+    command = f"stress --scene '{path}' --only length/auto"
+    assert main(shlex.split(f"{command} --format json")) == 0
+    checks = json.loads(capsys.readouterr().out)["checks"]
+    assert checks
+    again = shlex.split(checks[0]["replay"])[3:]
+    assert main([*again, "--format", "json"]) == 0
+    assert json.loads(capsys.readouterr().out)["checks"] == checks[:1]
+    refused = {
+        f"stress --scene '{path}' --only separatrix": "has scenes of its own; allowed with --scene",
+        f"stress --scene '{path}' --only length/quick": "unknown check 'length/quick'",
+        f"stress --scene '{path}' --only nothing": "unknown trial 'nothing'",
+        f"stress --scene '{path}' --save x": "--save has no meaning with --scene",
+        f"stress --scene '{path}' --plot x.png": "--plot has no meaning with --scene",
+        "stress --scene nowhere.toml": "nowhere.toml",
+    }
+    for line, words in refused.items():
+        assert main(shlex.split(line)) == 2
+        message = capsys.readouterr().err
+        assert words in message
+        assert message.count("\n") == 1
+    assert [each.name for each in tmp_path.iterdir()] == ["a scene.toml"]

@@ -1,0 +1,234 @@
+"""Sweeps of scenes whose torque depends on omega or attitude."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import InputError, Scene, read_scene, solve, torques
+from pyharness.ensembles.batches import batches
+from pyharness.ensembles.chunk import solve_points
+from pyharness.ensembles.executors import EXECUTORS
+from pyharness.ensembles.forecast import places_of_a_chunk
+from pyharness.ensembles.run import swept
+from pyharness.ensembles.store import opened
+from pyharness.ensembles.sweep import Sweep, points, spread
+from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.methods.batch import Batch
+from pyharness.model.codes import Statuses
+from tests.ensembles.sweeps import written
+
+SCENE = """
+[scene.body]
+moments = [4.0, 3.0, 2.0]
+[scene.initial]
+omega = [0.1, 1.0, 0.8]
+attitude = [0.5, 0.5, -0.5, 0.5]
+[scene.torque]
+expression = ["-k*w1 + m*q0*q1", "-k*w2", "a*cos(t)/(1 + k)"]
+constants = { k = 0.3, m = 2.0, a = 0.5 }
+[scene.run]
+step_size = 0.1
+steps = 20
+"""
+TERMS = """
+[[scene.torque.terms]]
+kind = "damping"
+matrix = 0.2
+[[scene.torque.terms]]
+kind = "gravity_gradient"
+rate = 0.7
+"""
+FREE = SCENE.replace("m*q0*q1", "m*w2")
+
+
+def axis(field: str, values: list[float]) -> str:
+    """Return a table [[axis]] with these values."""
+    return f'[[axis]]\nfield = "{field}"\nvalues = {values}\n'
+
+
+def text(*axes: str, scene: str = SCENE, solver: str = "") -> str:
+    """Return a sweep file that stores omega at the end and the status."""
+    head = 'reductions = ["end", "status"]\n'
+    return "\n".join([head, scene, f"[solve]\n{solver}", *axes])
+
+
+def ends(sweep: Sweep) -> Any:
+    """Return omega at the end for all scenes, and check that all were solved."""
+    found = solve_points(sweep, points(tuple(slice(0, n) for n in sweep.shape)))
+    assert (found["status"] == Statuses.COMPLETE).all()
+    return found["end"]
+
+
+def torque_of(k: float = 0.3, m: float = 2.0, a: float = 0.5) -> Callable[[Any, Any, Any], Any]:
+    """Return the torque of the scene as a function, with its constants."""
+
+    def torque(t: Any, w: Any, q: Any) -> Any:
+        return [-k * w[0] + m * q[0] * q[1], -k * w[1], a * np.cos(t) / (1.0 + k)]
+
+    return torque
+
+
+def scene_of(**own: Any) -> Scene:
+    """Return the scene of the sweep files, with other values."""
+    given = {
+        "omega": (0.1, 1.0, 0.8), "moments": (4.0, 3.0, 2.0), "attitude": (0.5, 0.5, -0.5, 0.5),
+        "torque": torque_of(),
+    }  # fmt: skip
+    return Scene("own", **{**given, **own})
+
+
+# For each field: values, and the scene and the time of the end that have one of the values.
+FIELDS: dict[str, tuple[list[float], Callable[[float], tuple[Scene, float]]]] = {
+    "omega.2": ([0.5, 1.5], lambda x: (scene_of(omega=(0.1, x, 0.8)), 2.0)),
+    "body.moments.1": ([3.5, 4.5], lambda x: (scene_of(moments=(x, 3.0, 2.0)), 2.0)),
+    "attitude.1": ([0.0, -0.7], lambda x: (scene_of(attitude=(0.5, x, -0.5, 0.5)), 2.0)),
+    "t_end": ([-1.0, 3.0], lambda x: (scene_of(), x)),
+    "torque.constants.k": ([0.0, 0.8], lambda x: (scene_of(torque=torque_of(k=x)), 2.0)),
+    "torque.constants.m": ([0.0, -1.0], lambda x: (scene_of(torque=torque_of(m=x)), 2.0)),
+}
+
+
+@pytest.mark.parametrize("field", FIELDS)
+@pytest.mark.parametrize("solver", ["", 'method = "dop853"'])
+def test_each_scene_has_its_own_solution(field: str, solver: str, tmp_path: Path) -> None:
+    values, scene = FIELDS[field]
+    found = ends(read_sweep(written(tmp_path, text(axis(field, values), solver=solver))))
+    for row, value in zip(found, values, strict=True):
+        one, time = scene(value)
+        wanted = solve(one, time, attitude=True).omega[0]
+        assert np.abs(row - wanted).max() < 1e-7
+    assert np.abs(found[0] - found[1]).max() > 1e-3
+
+
+def test_constants_and_omega_on_one_grid(tmp_path: Path) -> None:
+    axes = axis("omega.1", [0.2, 0.4, 0.6]), axis("torque.constants.a", [0.0, 1.0])
+    sweep = read_sweep(written(tmp_path, text(*axes)))
+    found = ends(sweep).reshape(3, 2, 3)
+    for i, x in enumerate((0.2, 0.4, 0.6)):
+        for j, a in enumerate((0.0, 1.0)):
+            one = scene_of(omega=(x, 1.0, 0.8), torque=torque_of(a=a))
+            assert np.abs(found[i, j] - solve(one, 2.0, attitude=True).omega[0]).max() < 1e-10
+    counts = [len(members) for members, _ in batches(sweep, points((slice(0, 3), slice(0, 2))))]
+    assert counts == [3, 3]
+
+
+@pytest.mark.parametrize("inertia", ["", "inertia = [4.0, 3.0, 2.5]\n"])
+def test_term_has_the_inertia_of_the_varied_body(inertia: str, tmp_path: Path) -> None:
+    terms = TERMS + inertia
+    scene = SCENE.replace("[scene.run]", f"{terms}[scene.run]").replace("m*q0*q1", "0")
+    sweep = read_sweep(written(tmp_path, text(axis("body.moments.1", [3.5, 4.5]), scene=scene)))
+    found = ends(sweep)
+    for row, moment in zip(found, (3.5, 4.5), strict=True):
+        moments = (moment, 3.0, 2.0)
+        own = moments if not inertia else (4.0, 3.0, 2.5)
+        total = torques.damping(0.2) + torques.gravity_gradient(own, 0.7) + torque_of(m=0.0)
+        wanted = solve(scene_of(moments=moments, torque=total), 2.0, attitude=True).omega[0]
+        assert np.abs(row - wanted).max() < 1e-10
+
+
+def test_constant_that_is_not_allowed_refuses_its_scenes_alone(tmp_path: Path) -> None:
+    sweep = read_sweep(written(tmp_path, text(axis("torque.constants.k", [-1.0, 0.3]))))
+    found = solve_points(sweep, points((slice(0, 2),)))
+    assert found["status"].tolist() == [Statuses.REFUSED, Statuses.COMPLETE]
+    assert np.isnan(found["end"][0]).all()
+    assert np.isfinite(found["end"][1]).all()
+
+
+@pytest.mark.parametrize("constant", [0.0, 2.0])
+def test_attitudes_are_relative_to_the_start(constant: float, tmp_path: Path) -> None:
+    content = text(axis("torque.constants.m", [constant]), axis("attitude.2", [0.6, -0.5]))
+    sweep = read_sweep(written(tmp_path, content))
+    ((_, batch),) = batches(sweep, points((slice(0, 1), slice(0, 2))))
+    start = np.array([[0.5, 0.5, x, 0.5] for x in (0.6, -0.5)])
+    for one, attitude in zip(start, batch.attitudes(1)[:, 0], strict=True):
+        scene = scene_of(attitude=one, torque=torque_of(m=constant))
+        path = solve(scene, 2.0, attitude=True)
+        assert path.attitude is not None
+        (before, after) = (_matrix(q) for q in (one, path.attitude[0]))
+        assert before.T @ after == pytest.approx(_matrix(attitude), abs=1e-9)
+
+
+def _matrix(q: Any) -> Any:
+    w, v = q[0], np.array(q[1:])
+    cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    size = w * w + v @ v
+    return ((w * w - v @ v) * np.eye(3) + 2.0 * np.outer(v, v) + 2.0 * w * cross) / size
+
+
+OMEGA = axis("omega.1", [0.2])
+MISTAKES = {
+    text(axis("torque.constant.1", [1.0])): "allowed: torque.constants.k, torque.constants.m, tor",
+    text(axis("torque.rate.3", [1.0])): "depends on the state and is no TorqueLaw",
+    text(axis("torque.constants.b", [1.0])): "unknown constant 'b'",
+    text(axis("torque.constants.k", [float("inf")])): "not finite",
+    text(axis("attitude.0", [1.0]), scene=FREE): "does not depend on the attitude",
+    text(OMEGA, scene=SCENE.replace("attitude = [0.5, 0.5, -0.5, 0.5]", "")): "[initial] attitude",
+    text(OMEGA, solver='program = "two-term"'): "needs a TorqueLaw",
+    text(OMEGA, solver='method = "closed-form"'): "closed-form can't solve a scene with a torque",
+    text(OMEGA, '[[axis]]\nfield = "method"\nvalues = ["auto", "quick"]'): "method quick can't",
+    text(OMEGA).replace('"end"', '"drift"'): "needs a scene without torque",
+    text(OMEGA).replace('"end"', '{ name = "error", against = "closed-form" }'):
+        "closed-form can't solve",
+    text(axis("torque.constants.k", [1.0]), scene="[scene]\ncase = 5"): "is a TorqueLaw",
+    text(axis("attitude.0", [1.0]), scene="[scene]\ncase = 5"): "does not depend on the attitude",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("content", "words"), MISTAKES.items(), ids=range(len(MISTAKES)))
+def test_mistake_is_one_line(content: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        read_sweep(written(tmp_path, content))
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_store_has_the_torque_and_refuses_another(tmp_path: Path) -> None:
+    scene = tmp_path / "damped.toml"
+    scene.write_text(SCENE.replace("scene.", ""))
+    content = text(OMEGA, scene='[scene]\nfile = "damped.toml"')
+    store = tmp_path / "store"
+    sweep = read_sweep(written(tmp_path, content))
+    with swept(sweep, str(store), EXECUTORS[0]):
+        pass
+    attributes = json.loads((store / "zarr.json").read_text())["attributes"]
+    again = tmp_path / "again.toml"
+    again.write_text(attributes["scene"])
+    assert read_scene(again) == read_scene(scene)
+    with opened(read_sweep(written(tmp_path, content)), str(store)) as same:
+        assert same.done() == [True]
+    scene.write_text(SCENE.replace("scene.", "").replace("k = 0.3", "k = 0.4"))
+    with (
+        pytest.raises(InputError, match="store of another sweep file"),
+        opened(read_sweep(written(tmp_path, content)), str(store)),
+    ):
+        pass
+
+
+def test_scenes_solved_one_by_one_refuse_what_they_can_not_solve(tmp_path: Path) -> None:
+    """The attitude of the second scene has no direction."""
+    scene = SCENE.replace("0.5, 0.5, -0.5, 0.5", "1.0, 0.0, 0.0, 0.0")
+    for solver in ("", 'method = "dop853"'):
+        content = text(axis("attitude.0", [1.0, 0.0]), scene=scene, solver=solver)
+        sweep = read_sweep(written(tmp_path, content))
+        batch: Batch
+        ((_, batch),) = batches(sweep, points((slice(0, 2),)))
+        assert batch.status.tolist() == [Statuses.COMPLETE, Statuses.REFUSED]
+
+
+def test_forecast_keeps_constants_that_every_scene_has_of_its_own(tmp_path: Path) -> None:
+    drawn = (
+        '[[axis]]\nfield = "{}"\ndraw = "uniform"\nfrom = 0.1\nto = 1.0\ncount = 900\nseed = 1\n'
+    )
+    fields = "torque.constants.k", "omega.1"
+    sweep = read_sweep(written(tmp_path, text(*map(drawn.format, fields))))
+    (places,) = places_of_a_chunk(sweep, spread(sweep, 100))
+    assert len({*places.tolist()}) == 100
+    grid = axis("torque.constants.k", [x / 50 for x in range(50)])
+    many = drawn.format("omega.1").replace("900", "9000")
+    sweep = read_sweep(written(tmp_path, text(grid, many)))
+    places, _ = places_of_a_chunk(sweep, spread(sweep, 100))
+    assert len({*places.tolist()}) == 5

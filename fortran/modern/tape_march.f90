@@ -9,9 +9,9 @@ module tape_march
   use step_limit, only: check_steps, limit_of, step_limit_t
   use tape, only: FIRST_UNKNOWN, next_break, tape_t, TIME_SLOT
   use tape_growth, only: begin, count_step, growth_of, MOST_UNKNOWNS, transitions_t
-  use tape_plan, only: before_zero_of_root, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
+  use tape_plan, only: converging, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
                        MOST_TRIES, order_for
-  use tape_series, only: expand, noise_of, perturb_tape, series_t, SIDE_BY_SIDE, &
+  use tape_series, only: derivatives_at, expand, noise_of, perturb_tape, series_t, SIDE_BY_SIDE, &
                          sum_perturbations, VARIATION_TOLERANCE
   use two_words, only: two_sum
   implicit none(type, external)
@@ -26,6 +26,10 @@ module tape_march
   ! Products of smaller omegas underflow, rad/s.
   real(dp), parameter :: LEAST_SCALE = 2.0_dp**(-500)
   integer, parameter :: ROWS_BETWEEN_LOOKS = 2**17
+  ! Largest difference of a derivative and that of its series at the end of a step, times the step,
+  ! over the local tolerance and the rounding errors. A series that converges as its last terms
+  ! promise stays far below.
+  real(dp), parameter :: MOST_DEFECT = 4.0_dp
 
   ! One integration of a request.
   type, public :: attempt_t
@@ -63,12 +67,15 @@ contains
     real(dp) :: left(tape%n_unknowns)         ! truncation error of the step
     real(dp) :: weights(tape%n_unknowns)      ! which make the unknowns comparable
     real(dp) :: noise(tape%n_unknowns)
+    real(dp) :: change(tape%n_unknowns)       ! of the unknowns in the step
     real(dp) :: lanes(SIDE_BY_SIDE, MOST_UNKNOWNS) ! the error, and a perturbation of each unknown
-    real(dp) :: t(2)                          ! time and its rounding error, s
+    real(dp) :: t(2), t_next(2)               ! time and its rounding error, s
     real(dp) :: t_end, rest, factor, local_tolerance, scale, power
     real(dp) :: break_time                    ! next breakpoint of a table, or t_end, s
     real(dp) :: to_stop                       ! time to it, s
     logical :: arrives, at_end, from_rest, is_full, has_guess
+    logical :: is_rejected                    ! whether a longer step was rejected
+    logical :: has_values                     ! whether terms 0 of all slots are known
     integer :: is_short
     integer :: i, k, n, n_before, tries, last_term
     type(step_limit_t) :: limit
@@ -92,11 +99,14 @@ contains
     s%h = t_end
     limit = limit_of(attempt%most_steps, attempt%stride)
     tries = 0
+    is_rejected = .false.
+    has_values = .false.
     has_guess = .false.
     from_rest = .not. scale > 0.0_dp
     do
       call set_unknowns()
-      call expand(tape, t(2), s)
+      call expand(tape, t(2), has_values, s)
+      has_values = .false.
       break_time = next_break(tape, t(1), t_end)
       to_stop = (break_time - t(1)) - t(2)
       ! The scale of a body at rest is the omega that it is about to reach.
@@ -129,22 +139,39 @@ contains
           cycle
         end if
       end if
-      tries = 0
+      if (is_rejected) factor = min(1.0_dp, factor)
       factor = to_end(factor)
       call set_lanes()
       last_term = perturb_tape(s%arrays, s%h, s%order, factor, weights, VARIATION_TOLERANCE, &
                                is_short)
       ! Perturbations may change faster than the motion, as about a steady rotation.
       if (is_short /= 0) factor = factor*fitting_lanes()
-      factor = before_zero_of_root(tape, s%order, s%a, factor)
+      factor = converging(tape, s%order, s%is_squared, s%a, factor)
       arrives = abs(factor*s%h) >= abs(to_stop)*(1.0_dp - epsilon(s%h))
       if (arrives) factor = to_stop/s%h
       at_end = arrives .and. .not. abs(break_time) < abs(t_end)
+      if (arrives) then
+        t_next = [break_time, 0.0_dp]
+      else
+        call two_sum(t(1), factor*s%h + t(2), t_next(1), t_next(2))
+      end if
       call estimate_truncation()
       call noise_of(tape, s, noise)
       do i = 1, n
         found%noise = found%noise + (weights(i)*noise(i)*factor*s%h)**2
       end do
+      if (.not. is_continued()) then
+        is_rejected = .true.
+        tries = tries + 1
+        if (tries > MOST_TRIES) then
+          solution%status = OVERFLOW
+          exit
+        end if
+        s%h = 0.5_dp*factor*s%h
+        cycle
+      end if
+      tries = 0
+      is_rejected = .false.
       n_before = solution%n_rows
       call add_rows()
       if (solution%status /= COMPLETE) exit
@@ -166,11 +193,8 @@ contains
       end if
       call count_step(solution%n_rows > n_before, transposed(lanes), transitions, is_full)
       if (is_full) call begin_block()
-      if (arrives) then
-        t = [break_time, 0.0_dp]
-      else
-        call two_sum((t(1)), factor*s%h + t(2), t(1), t(2))
-      end if
+      t = t_next
+      has_values = size(tape%table_starts) == 1
       from_rest = .not. scale > 0.0_dp
       rest = (t_end - t(1)) - t(2)
       s%h = factor*s%h
@@ -322,19 +346,42 @@ contains
       found%least = max(found%least, near*min(0.5_dp, near/max(far, tiny(far))))
     end subroutine estimate_truncation
 
-    subroutine take_step()
-      !! Advance the unknowns, the error and the perturbations to the end of the step.
-      real(dp) :: change
+    logical function is_continued()
+      !! Return whether the series continue beyond the end of the step: whether the derivatives there
+      !! are those of the series. A pulse within the step may be too small to be seen at its
+      !! beginning. The change of the unknowns is computed too.
+      real(dp) :: derivatives(tape%n_unknowns), slope(tape%n_unknowns)
+      real(dp) :: size_of_terms, rounded, allowed
       integer :: i, k
 
-      call sum_perturbations(s%arrays, last_term, factor, lanes)
+      rounded = 1.0_dp
       do i = 1, n
-        change = 0.0_dp
+        change(i) = 0.0_dp
+        slope(i) = 0.0_dp
+        size_of_terms = 0.0_dp
         do k = s%order, 1, -1
-          change = factor*(change + s%a(k, FIRST_UNKNOWN - 1 + i))
+          associate (term => s%a(k, FIRST_UNKNOWN - 1 + i))
+            change(i) = factor*(change(i) + term)
+            slope(i) = factor*(slope(i) + k*term)
+            size_of_terms = factor*(size_of_terms + k*abs(term))
+          end associate
         end do
-        call two_sum((y(i)), change + y_low(i), y(i), y_low(i))
-        lanes(1, i) = lanes(1, i) - left(i)
+        rounded = max(rounded, weights(i)*(size_of_terms + noise(i)*abs(factor*s%h)))
+      end do
+      call derivatives_at(tape, t_next, y + (change + y_low), -s%h, s, derivatives)
+      allowed = MOST_DEFECT*(local_tolerance + epsilon(rounded)*rounded)
+      ! NaN is not allowed.
+      is_continued = all(weights*abs(factor*s%h*derivatives - slope) <= allowed)
+    end function is_continued
+
+    subroutine take_step()
+      !! Advance the unknowns, the error and the perturbations to the end of the step.
+      integer :: i
+
+      call sum_perturbations(s%arrays, last_term, factor, lanes)
+      lanes(1, :n) = lanes(1, :n) - left
+      do i = 1, n
+        call two_sum((y(i)), change(i) + y_low(i), y(i), y_low(i))
       end do
     end subroutine take_step
 

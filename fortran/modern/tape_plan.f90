@@ -1,7 +1,8 @@
 module tape_plan
   !! The order, local tolerance and step of an integration of a tape.
   use kinds, only: dp
-  use operations, only: SQUARE_ROOT => SQRT
+  use operations, only: EXPONENTIAL => EXP, QUOTIENT, SINE_COSINE, SQUARE_ROOT => SQRT, &
+                        TANGENT => TANH
   use tape, only: FIRST_UNKNOWN, tape_t
   use tape_series, only: LAST_TERM, MOST_ORDER
   implicit none(type, external)
@@ -12,9 +13,15 @@ module tape_plan
   integer, parameter :: CHECKED = 3  ! last terms checked: from rest a ramp makes only every third
   real(dp), parameter :: LONGER = 16.0_dp  ! largest factor on the step that was tried
   real(dp), parameter, public :: LEAST_LOCAL_TOLERANCE = 1e-18_dp ! below rounding
-  real(dp), parameter :: ROOT_TOLERANCE = 0.1_dp ! relative deviation of a squared root
+  real(dp), parameter :: WITHIN_CIRCLE = 0.9_dp ! part of the distance of a zero
 
-  public :: before_zero_of_root, fitting, local_tolerance_of, order_for
+  ! An exponential below exp(-INVISIBLE) changes no digit of a result, unless its factor is huge.
+  real(dp), parameter :: INVISIBLE = 100.0_dp
+
+  ! Largest change over the order of an angle whose sine is squared, and perhaps again, rad.
+  real(dp), parameter :: ANGLE_OF_ORDER = 0.1_dp
+
+  public :: converging, fitting, local_tolerance_of, order_for
 
 contains
 
@@ -48,32 +55,63 @@ contains
     end do
   end function fitting
 
-  pure real(dp) function before_zero_of_root(tape, order, a, factor)
-    !! Return the factor on the step, reduced until each series of a square root is the root of the
-    !! series of its argument at the end of the step. The series of a root continues with the wrong
-    !! sign where its argument touches zero.
+  pure real(dp) function converging(tape, order, is_squared, a, factor)
+    !! Return the factor on the step, reduced so that the series of every operation converges.
+    !! The last terms of the unknowns alone do not show it: an exponential may be so small at the
+    !! beginning of a step that it changes no digit, and large a little later. Its argument
+    !! therefore changes by at most half the order, unless the exponential stays invisible; the
+    !! terms of its series then decrease before the last. The derivative of a hyperbolic tangent is
+    !! such a pulse too. A divisor, and the argument of a square root, has no zero in the circle
+    !! around the beginning of the step. A high power of a sine is a series of pulses, too.
     type(tape_t), intent(in) :: tape
     integer, intent(in) :: order
+    logical, intent(in) :: is_squared(:) !! (slots)
     real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots)
     real(dp), intent(in) :: factor
-    real(dp) :: argument, root
-    integer :: k, n, tries
+    integer :: n
 
-    before_zero_of_root = factor
+    converging = factor
     do n = 1, tape%n_operations
-      if (tape%operations(1, n) /= SQUARE_ROOT) cycle
-      do tries = 1, MOST_TRIES
-        argument = 0.0_dp
-        root = 0.0_dp
-        do k = order - 1, 0, -1
-          argument = before_zero_of_root*argument + a(k, tape%operations(2, n))
-          root = before_zero_of_root*root + a(k, tape%operations(4, n))
-        end do
-        if (root >= 0.0_dp .and. abs(root*root - argument) <= ROOT_TOLERANCE*argument) exit
-        before_zero_of_root = 0.5_dp*before_zero_of_root
-      end do
+      associate (first => tape%operations(2, n), second => tape%operations(3, n), &
+                 out => tape%operations(4, n))
+        select case (tape%operations(1, n))
+        case (EXPONENTIAL)
+          call limit(first, max(0.5_dp*order, -a(0, first) - INVISIBLE))
+        case (TANGENT)
+          ! The derivative decreases as exp(-2 abs(x)).
+          call limit(first, 0.5_dp*max(0.5_dp*order, 2.0_dp*abs(a(0, first)) - INVISIBLE))
+        case (QUOTIENT)
+          call limit(second, WITHIN_CIRCLE*abs(a(0, second)))
+        case (SQUARE_ROOT)
+          call limit(first, WITHIN_CIRCLE*a(0, first))
+        case (SINE_COSINE)
+          if (any(is_squared(out:out + 1))) call limit(first, ANGLE_OF_ORDER*order)
+        end select
+      end associate
     end do
-  end function before_zero_of_root
+
+  contains
+
+    pure subroutine limit(slot, most)
+      !! Reduce the factor until a slot changes by at most `most` in the circle of the step.
+      integer, intent(in) :: slot
+      real(dp), intent(in) :: most
+      real(dp) :: change
+      integer :: k
+
+      do
+        change = 0.0_dp
+        do k = order - 1, 1, -1
+          change = converging*(change + abs(a(k, slot)))
+        end do
+        if (.not. change > most) return
+        ! The change is a convex function of the factor, so that the quotient is small enough.
+        converging = converging*max(0.5_dp, most/change)
+        if (most >= 0.5_dp*change .or. .not. converging > 0.0_dp) return
+      end do
+    end subroutine limit
+
+  end function converging
 
   pure integer function order_for(local_tolerance)
     !! Return the order with the least work for the requested digits (Jorba and Zou 2005).

@@ -4,7 +4,7 @@ module tape_series
   use, intrinsic :: iso_c_binding, only: c_int, c_intptr_t, c_loc
   use kinds, only: dp
   use operations, only: EXPONENTIAL => EXP, LINEAR, PRODUCT, QUOTIENT, SINE_COSINE, &
-                        SQUARE_ROOT => SQRT, TABLE
+                        SQUARE_ROOT => SQRT, TABLE, TANGENT => TANH
   use tape, only: arrays_of, FIRST_UNKNOWN, piece_at, tape_arrays_t, tape_t, TIME_SLOT
   use two_words, only: sine_cosine_of
   implicit none(type, external)
@@ -27,6 +27,7 @@ module tape_series
     ! (SIDE_BY_SIDE, 0:MOST_ORDER, slots): perturbations
     real(dp), pointer, contiguous :: v(:, :, :) => null()
     real(dp), allocatable :: noise(:)       !! (slots): rounding errors of terms 0, in units
+    logical, allocatable :: is_squared(:)   !! (slots): whether a product squares the slot
     type(tape_arrays_t) :: arrays           !! what tape_terms.c reads of the tape
   end type series_t
 
@@ -65,7 +66,7 @@ module tape_series
     end subroutine sum_perturbations
   end interface
 
-  public :: allocate_series, expand, noise_of, perturb_tape, sum_perturbations
+  public :: allocate_series, derivatives_at, expand, noise_of, perturb_tape, sum_perturbations
 
 contains
 
@@ -76,7 +77,7 @@ contains
     type(series_t), intent(inout) :: s
     logical, intent(out) :: fits !! whether there is enough memory
     integer(c_intptr_t) :: address ! in numbers
-    integer :: at, failed, n_terms, n_perturbations
+    integer :: at, failed, n, n_terms, n_perturbations
 
     n_terms = (LAST_TERM + 1)*tape%n_slots
     n_perturbations = SIDE_BY_SIDE*(MOST_ORDER + 1)*tape%n_slots
@@ -85,26 +86,55 @@ contains
     if (failed /= 0) return
     allocate (s%noise(tape%n_slots), stat=failed)
     if (failed /= 0) return
+    allocate (s%is_squared(tape%n_slots), stat=failed)
+    if (failed /= 0) return
     ! Perturbations begin a line of the cache, and so does term 1 of each slot.
     address = transfer(c_loc(memory), address)/BYTES
     at = 1 + int(modulo(-address, int(SIDE_BY_SIDE, c_intptr_t)))
     s%v(1:SIDE_BY_SIDE, 0:MOST_ORDER, 1:tape%n_slots) => memory(at:at + n_perturbations - 1)
     at = at + n_perturbations + SIDE_BY_SIDE - 1
     s%a(0:LAST_TERM, 1:tape%n_slots) => memory(at:at + n_terms - 1)
+    s%is_squared = .false.
+    do n = 1, tape%n_operations
+      if (tape%operations(1, n) /= PRODUCT) cycle
+      if (tape%operations(2, n) == tape%operations(3, n)) then
+        s%is_squared(tape%operations(2, n)) = .true.
+      end if
+    end do
     s%arrays = arrays_of(tape, c_loc(s%a), c_loc(s%v))
     fits = .true.
   end subroutine allocate_series
 
-  subroutine expand(tape, t_low, s)
+  subroutine expand(tape, t_low, has_values, s)
     !! Compute the terms of all slots, and those of the unknowns up to the order. Terms 0 of the
     !! time and of the unknowns are inputs, and so is term 1 of the time.
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t_low  !! rounding error of the time, s
+    logical, intent(in) :: has_values !! whether terms 0 of all slots, and the tables, are inputs
     type(series_t), intent(inout) :: s
 
-    call set_values(tape, t_low, s%h, s%a)
+    if (.not. has_values) call set_values(tape, t_low, s%h, s%a)
     call expand_tape(s%arrays, s%h, s%order)
   end subroutine expand
+
+  pure subroutine derivatives_at(tape, t, y, h, s, derivatives)
+    !! Compute the derivatives of the unknowns. Terms 0 of all slots, and the terms of the tables,
+    !! are overwritten.
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: t(2)  !! time and its rounding error, s
+    real(dp), intent(in) :: y(:)  !! unknowns
+    real(dp), intent(in) :: h     !! points to the side of which the pieces of tables are taken
+    type(series_t), intent(inout) :: s
+    real(dp), intent(out) :: derivatives(:)
+    integer :: i
+
+    s%a(0, TIME_SLOT) = t(1)
+    s%a(0, FIRST_UNKNOWN:FIRST_UNKNOWN + size(y) - 1) = y
+    call set_values(tape, t(2), h, s%a)
+    do i = 1, size(y)
+      derivatives(i) = value_of(tape, size(tape%constants) - size(y) + i, s%a)
+    end do
+  end subroutine derivatives_at
 
   pure subroutine set_values(tape, t_low, h, a)
     !! Compute term 0 of all slots, and all terms of the tables.
@@ -127,6 +157,10 @@ contains
           a(0, out) = sqrt(a(0, first))
         case (EXPONENTIAL)
           a(0, out) = exp(a(0, first))
+        case (TANGENT)
+          a(0, out) = tanh(a(0, first))
+          ! The square of the tangent may be rounded to 1.
+          a(0, out + 1) = (2.0_dp/(exp(abs(a(0, first))) + exp(-abs(a(0, first)))))**2
         case (TABLE)
           call set_table_terms(tape, first, a(0, TIME_SLOT), t_low, h, a(:, out))
         case default
@@ -202,6 +236,8 @@ contains
           s%noise(out) = abs(s%a(0, out)) + s%noise(first)/(2.0_dp*abs(s%a(0, out)))
         case (EXPONENTIAL)
           s%noise(out) = abs(s%a(0, out))*(EPSILON_OF_FUNCTION + s%noise(first))
+        case (TANGENT)
+          s%noise(out) = EPSILON_OF_FUNCTION*abs(s%a(0, out)) + s%a(0, out + 1)*s%noise(first)
         case (TABLE)
           s%noise(out) = EPSILON_OF_FUNCTION*abs(s%a(0, out))
         case default

@@ -103,7 +103,8 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
     /* Terms beyond the order are zeroed too: sums in the other places of a register must not grow
        from step to step. */
     memset(out + 1, 0, (TERMS - 1) * sizeof *out);
-    if (tape->operations[n][0] == SINE_COSINE) memset(out + TERMS + 1, 0, (TERMS - 1) * sizeof *out);
+    if (tape->operations[n][0] == SINE_COSINE || tape->operations[n][0] == TANH)
+      memset(out + TERMS + 1, 0, (TERMS - 1) * sizeof *out);
   }
   for (int k = 0; k < order; k++) {
     const struct range range = range_of(k, order);
@@ -137,6 +138,13 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
         sum = add_products(out, angle, out + TERMS, 1.0, &range);
         out[TERMS + k] = (add_products(out + TERMS, angle, out, -1.0, &range) - angle[k] * out[0]) / k;
         out[k] = (sum + angle[k] * out[TERMS]) / k;
+        break;
+      case TANH:
+        /* The second slot is 1 minus the square, the derivative. */
+        angle = out + 2 * TERMS;
+        angle[k] = k * x[k];
+        out[k] = (add_products(out, angle, out + TERMS, 1.0, &range) + angle[k] * out[TERMS]) / k;
+        out[TERMS + k] = add_products(out + TERMS, out, out, -1.0, &range) - 2.0 * out[k] * out[0];
         break;
       default: /* a table */
         break;
@@ -205,6 +213,9 @@ static void perturb(const struct tape *tape, double h, int k)
       break;
     case EXP:
       x = convolved_one(v[first], a[out], k) + loaded(v[first][k]) * a[out][0];
+      break;
+    case TANH:
+      x = convolved_one(v[first], a[out + 1], k) + loaded(v[first][k]) * a[out + 1][0];
       break;
     case SINE_COSINE:
       x = convolved_one(v[first], a[out], k) + loaded(v[first][k]) * a[out][0];

@@ -79,7 +79,13 @@ def _by_tape(scene: Scene, state: Sequence[Any]) -> list[Any]:
         raise InputError("heyoka can't evaluate a table; allowed: a torque without tables")
 
     functions: Functions[Any] = Functions(
-        heyoka.expression, heyoka.sqrt, heyoka.exp, heyoka.sin, heyoka.cos, table
+        heyoka.expression,
+        heyoka.sqrt,
+        heyoka.exp,
+        heyoka.tanh,
+        heyoka.sin,
+        heyoka.cos,
+        table,
     )
     # The inputs without attitude are not read.
     inputs = [heyoka.time, *state, *[None] * (7 - len(state))]

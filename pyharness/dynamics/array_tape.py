@@ -19,7 +19,7 @@ def table_values(table: Table, times: Any) -> Array:
     return found
 
 
-ARRAYS: Functions[Any] = Functions(float, np.sqrt, np.exp, np.sin, np.cos, table_values)
+ARRAYS: Functions[Any] = Functions(float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, table_values)
 
 
 def inputs_of(times: Array, state: Array) -> list[Array]:

@@ -24,6 +24,7 @@ _KINDS = {
     "quotient": (Operations.QUOTIENT, 1),
     "sqrt": (Operations.SQRT, 1),
     "exp": (Operations.EXP, 2),
+    "tanh": (Operations.TANH, 3),
     "sine": (Operations.SINE_COSINE, 3),
     "table": (Operations.TABLE, 1),
 }

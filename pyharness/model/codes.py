@@ -102,3 +102,4 @@ class Operations:
     EXP = 5  # slots: the exponential, and the weighted terms of its argument
     SINE_COSINE = 6  # slots: the sine, the cosine, and the weighted terms of their argument
     TABLE = 7  # cubic polynomials of time between breakpoints
+    TANH = 8  # slots: the tangent, its derivative, and the weighted terms of the argument

@@ -269,7 +269,7 @@ class Symbol:
 
     def tanh(self) -> "Symbol":
         """Return the hyperbolic tangent."""
-        return 1.0 - 2.0 / ((2.0 * self).exp() + 1.0)
+        return self._of("tanh", math.tanh)
 
     def of_table(self, table: Table) -> "Symbol":
         """Return the value of a table at this time; raise InputError if it isn't the plain time."""
@@ -324,6 +324,7 @@ SYMBOLS: Functions[Any] = Functions(
     float,
     lambda x: np.sqrt(x),
     lambda x: np.exp(x),
+    lambda x: np.tanh(x),
     lambda x: np.sin(x),
     lambda x: np.cos(x),
     lambda table, time: time.of_table(table),

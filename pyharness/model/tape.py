@@ -47,8 +47,8 @@ class Table(NamedTuple):
 class Operation(NamedTuple):
     """An operation of a tape.
 
-    `kind` is "product", "quotient", "sqrt", "exp", "sine" or "cosine", and `operands` are its one
-    or two slots; or it is "linear", and `linear` is a linear combination of slots; or it is
+    `kind` is "product", "quotient", "sqrt", "exp", "tanh", "sine" or "cosine", and `operands` are
+    its one or two slots; or it is "linear", and `linear` is a linear combination of slots; or it is
     "table", and `table` is a function of the time.
     """
 
@@ -94,6 +94,7 @@ class Functions(Generic[T]):
     number: Callable[[float], T]  # converts a constant of the tape
     sqrt: Callable[[T], T]
     exp: Callable[[T], T]
+    tanh: Callable[[T], T]
     sine: Callable[[T], T]
     cosine: Callable[[T], T]
     table: Callable[[Table, T], T]  # the value of a table at a time
@@ -151,4 +152,4 @@ def _value(table: Table, time: float) -> float:
 
 
 # For arguments of type float. A division by zero raises ZeroDivisionError.
-FLOATS: Functions[float] = Functions(float, _sqrt, _exp, sine, cosine, _value)
+FLOATS: Functions[float] = Functions(float, _sqrt, _exp, math.tanh, sine, cosine, _value)

@@ -89,6 +89,13 @@ def _exp(x: Any) -> Any:
     return x.chained(value, value)
 
 
+def _tanh(x: Any) -> Any:
+    if not isinstance(x, _Dual):
+        return math.tanh(x)
+    value = np.tanh(x.value)
+    return x.chained(value, 1.0 + -1.0 * (value * value))
+
+
 def _sine(x: Any) -> Any:
     return x.chained(np.sin(x.value), np.cos(x.value)) if isinstance(x, _Dual) else math.sin(x)
 
@@ -106,4 +113,4 @@ def _of_table(table: Table, time: _Dual) -> _Dual:
     )
 
 
-_DUALS: Functions[Any] = Functions(float, _sqrt, _exp, _sine, _cosine, _of_table)
+_DUALS: Functions[Any] = Functions(float, _sqrt, _exp, _tanh, _sine, _cosine, _of_table)

@@ -26,6 +26,8 @@ from pyharness.model.torque_law import TorqueLaw
 Term = Callable[[Any, Any, Any], Any]
 STEADY = ("damping", "wheel", "drag", "wave", "control", "quotient", "root", "decay", "swing")
 TURNING = ("gradient", "field", "spring", "mixed")
+# Terms that change within a small range of time or omega, and are constant or nearly 0 elsewhere.
+SUDDEN = ("switch", "friction", "bell", "peak", "burst", "flash", "sigmoid", "swings")
 
 READY = (
     "damping",
@@ -150,6 +152,9 @@ def term(source: Random, name: str, size: float, speed: float) -> Term:
     other = np.array([source.uniform(-1.0, 1.0) for _ in range(3)])
     matrix = np.array([[source.uniform(-1.0, 1.0) for _ in range(3)] for _ in range(3)])
     f = speed * 10.0 ** source.uniform(-1.0, 0.7)
+    if name in SUDDEN:
+        width = 10.0 ** source.uniform(-2.0 if name == "sigmoid" else -3.0, -0.5)
+        middle = source.uniform(0.0, 5.0)
     terms: dict[str, Term] = {
         "damping": lambda t, w, q: -0.2 * scale * ((matrix @ matrix.T) @ w),
         "wheel": lambda t, w, q: scale * np.cross(vector, w),
@@ -163,6 +168,18 @@ def term(source: Random, name: str, size: float, speed: float) -> Term:
         "gradient": lambda t, w, q: gradient(t, q, scale * speed * (1.0 + np.abs(vector)), f),
         "field": lambda t, w, q: scale * speed * np.cross(vector, to_body(q, orbit(t, f) + other)),
         "spring": lambda t, w, q: -scale * speed * q[0] * q[1:] - 0.3 * scale * w,
+        "switch": lambda t, w, q: -scale * speed * vector * np.tanh(w[0] / (width * speed)),
+        "friction": lambda t, w, q: -scale * speed * w / np.sqrt(w @ w + (width * speed) ** 2),
+        "bell": lambda t, w, q: scale * speed * vector * np.exp(-((w[1] / (width * speed)) ** 2)),
+        "peak": lambda t, w, q: scale * speed * vector / (1.0 + (w[2] / (width * speed)) ** 2) ** 2,
+        "burst": lambda t, w, q: (
+            scale * speed * vector * np.exp(-(((speed * t - middle) / width) ** 2))
+        ),
+        "flash": lambda t, w, q: (
+            scale * speed * vector / (1.0 + ((speed * t - middle) / width) ** 2)
+        ),
+        "sigmoid": lambda t, w, q: scale * speed * vector / (1.0 + np.exp(-w[0] / (width * speed))),
+        "swings": lambda t, w, q: scale * speed * vector * np.sin(f * t + a) ** 24,
         "mixed": lambda t, w, q: scale * vector * (w @ vector) * q[1] * np.sin(q[2] + f * t),
     }
     return terms[name]

@@ -161,6 +161,7 @@ _BOUNDS: Functions[Any] = Functions(
     float,
     lambda x: x.chained(np.sqrt(x.value), 0.5 / np.sqrt(x.value)),
     lambda x: x.chained(np.exp(x.value), np.exp(x.value)),
+    lambda x: x.chained(np.tanh(x.value), 1.0 - np.tanh(x.value) ** 2),
     # The reduction of a large angle has an error of its own.
     lambda x: x.chained(np.sin(x.value), 1.0),
     lambda x: x.chained(np.cos(x.value), 1.0),

@@ -24,6 +24,10 @@ _ORDINARY_STEPS = 20_000
 # be exceeded. The forecast allows for a motion that becomes slower by the factor _PACE_SLACK.
 _FIRST_STEPS = 100
 _PACE_SLACK = 3.0
+# Largest difference of a derivative and that of its series at the end of a step, times the step,
+# over the local tolerance. A series that converges as its last terms promise stays below.
+_MOST_DEFECT = 64
+_NEARLY_1 = 1 - Decimal("1e-26")  # a relative change of thousands of rounding errors
 # If the number of steps grows with time to a higher power than this, the forecast uses that power.
 _GROWING = Decimal("1.3")
 
@@ -49,7 +53,9 @@ def taylor_series(
     steps, and fewer if the torque depends on the state. Raise InputError if the work limit is
     exceeded.
     """
-    equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
+    equations, at_end = (_Equations(scene, coefficients, velocity) for _ in range(2))
+    is_recorded = isinstance(scene.torque, StateTorque)
+    limit = _Limit(scene, effort)
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
     moving = len(state)
     state += [Decimal(x) for x in scene.attitude or ()]
@@ -67,6 +73,7 @@ def taylor_series(
         length = _step(series[:moving], tolerance, rest)
         if scene.attitude is not None:
             length = min(length, _step(series[moving:], tolerance, rest, 4))
+        length = equations.reach(length)
         length = length.copy_sign(times[-1])
         if begin + length == begin and rest:
             return rows
@@ -75,6 +82,12 @@ def taylor_series(
         # The Taylor series of a table is valid until the table changes.
         if stop is not None and abs(stop) <= abs(end):
             end, length = stop, stop - begin
+        while is_recorded and not _is_continued(at_end, series, end, length, tolerance):
+            length /= 2
+            end = begin + length
+            if end == begin:
+                return rows
+        if end == stop:
             stops += 1
         else:
             step += 1
@@ -206,6 +219,40 @@ def _evaluate(coefficients: list[Row], t: Decimal) -> Row:
     return totals
 
 
+def _derivatives(coefficients: list[Row], t: Decimal) -> Row:
+    """Return the derivatives of polynomials with the given coefficients at `t`."""
+    return _evaluate([[k * x for k, x in enumerate(row)][1:] for row in coefficients], t)
+
+
+def _is_continued(
+    equations: "_Equations", series: list[Row], end: Decimal, length: Decimal, tolerance: Decimal
+) -> bool:
+    """Return whether the derivatives at the end of a step are those of the Taylor series.
+
+    A pulse of the torque within the step may be too small to be seen at its beginning. `series`
+    contains the Taylor coefficients of the unknowns around the beginning. The step has the length
+    `length` and ends at the time `end` (s). `tolerance` is the local tolerance, relative to omega.
+    """
+    state, slopes = _evaluate(series, length), _derivatives(series, length)
+
+    def rates(factor: Decimal) -> Row:
+        # Where a table changes at the end of the step, its earlier piece is meant.
+        moved = [factor * x for x in state]
+        return [row[1] for row in equations.expand(factor * end, moved, 1, length < 0)[:3]]
+
+    def largest_difference(first: Row, second: Row) -> Decimal:
+        return max(abs(length * (x - y)) for x, y in zip(first, second, strict=True))
+
+    scale = max(abs(x) for x in (*state[:3], *(row[0] for row in series[:3])))
+    try:
+        found = rates(Decimal(1))
+        defect = largest_difference(found, slopes[:3]) - _MOST_DEFECT * tolerance * scale
+        # Rounding errors of the time and of the state are no defect.
+        return defect <= 0 or defect <= largest_difference(found, rates(_NEARLY_1))
+    except ArithmeticError:
+        return False
+
+
 def divisors(scene: Scene) -> tuple[Fraction, Fraction, Fraction]:
     """Return, as exact fractions, the numbers by which the torques of a scene are divided.
 
@@ -282,6 +329,13 @@ class _Equations:
         if self._changing is None:
             return []
         return [[_moved(each, time) for each in row] for row in self._changing.elements]
+
+    def reach(self, length: Decimal) -> Decimal:
+        """Return the length (s) of the step, reduced so that no pulse of the torque is skipped.
+
+        The series is that of the last call of `expand`.
+        """
+        return length if self._tape is None else self._tape.reach(length)
 
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
         """Return the next time (s) at which a table of the torque changes, or None.

@@ -13,6 +13,10 @@ from pyharness.truth.decimal_functions import Row, product, sine_cosine
 # An angle beyond the range of binary64 has no sine in any method. Its reduction would take as many
 # digits as the angle has.
 _LARGEST_ANGLE = Decimal("1e308")
+# An exponential below exp(-_INVISIBLE) affects no digit of a result, whatever its factor.
+_INVISIBLE = 400
+# Part of the distance of a divisor's zero that a step may be long.
+_WITHIN_CIRCLE = Decimal("0.9")
 # Relative accuracy with which the square of a root's polynomial must agree with its operand, so
 # that a negative value of the polynomial is not merely its truncation error.
 _TRUSTED = Decimal("1e-6")
@@ -24,12 +28,13 @@ _Sum = tuple[Decimal, list[tuple[Decimal, int]]]
 def series_products(tape: Tape) -> int:
     """Return the number of products of two series that each order of a tape's series takes.
 
-    A sine and a cosine are computed together, by two products. A table takes none.
+    A sine and a cosine are computed together, by two products, and so are a hyperbolic tangent and
+    its derivative. A table takes none.
     """
     waves = ("sine", "cosine")
     angles = {each.operands for each in tape.operations if each.kind in waves}
     others = [each for each in tape.operations if each.kind not in ("linear", "table", *waves)]
-    return 2 * len(angles) + len(others)
+    return 2 * len(angles) + len(others) + sum(each.kind == "tanh" for each in others)
 
 
 class TapeSeries:
@@ -72,7 +77,9 @@ class TapeSeries:
         self._slots += [[] for _ in self._operations]
         # For each operand of a sine or a cosine: the series of the sine, and of the cosine.
         self._waves: dict[int, tuple[Row, Row]] = {}
-        # For each operand of an exponential, a sine or a cosine: coefficient j times j.
+        # For each operand of a hyperbolic tangent: the series of 1 minus its square.
+        self._bells: dict[int, Row] = {}
+        # For each operand of a transcendental function: coefficient j times j.
         self._slopes: dict[int, Row] = {}
 
     def next(self) -> Row:
@@ -113,6 +120,8 @@ class TapeSeries:
             if k == 0:
                 return x[0].exp()
             return product(self._slope(operands[0], k), found[::-1]) / k
+        if kind == "tanh":
+            return self._tangent(operands[0], found, k)
         sine, cosine = self._wave(operands[0], k)
         return (sine if kind == "sine" else cosine)[k]
 
@@ -133,12 +142,52 @@ class TapeSeries:
             cosine.append(terms[1])
         return sine, cosine
 
+    def _tangent(self, operand: int, found: Row, k: int) -> Decimal:
+        """Return coefficient k of the hyperbolic tangent of a slot.
+
+        `found` contains the coefficients 0 to k - 1.
+        """
+        if k == 0:
+            x = self._slots[operand][0]
+            small = (-2 * abs(x)).exp()
+            self._bells[operand] = [4 * small / (1 + small) ** 2]
+            return ((1 - small) / (1 + small)).copy_sign(x)
+        bell = self._bells[operand]
+        new = product(self._slope(operand, k), bell[::-1]) / k
+        bell.append(-product([*found, new], [new, *found[::-1]]))
+        return new
+
     def _slope(self, operand: int, k: int) -> Row:
         """Return the coefficients 1 to k of a slot, each multiplied by its number."""
         slope = self._slopes.setdefault(operand, [])
         if len(slope) < k:
             slope.append(k * self._slots[operand][k])
         return slope
+
+    def reach(self, length: Decimal) -> Decimal:
+        """Return the length (s) of the step, reduced so that every operation's series converges.
+
+        An exponential may be so small at the beginning of a step that it changes no digit, and
+        large a little later. Therefore its argument changes by at most half the order, unless the
+        exponential stays invisible. The derivative of a hyperbolic tangent is such a pulse too. A
+        divisor has no zero in the circle around the beginning of the step.
+        """
+        for operation, _ in self._operations:
+            if operation.kind not in ("exp", "tanh", "quotient"):
+                continue
+            x, *terms = self._slots[operation.operands[-1]]
+            sizes = [Decimal(0), *map(abs, terms)]
+            if operation.kind == "quotient":
+                most = _WITHIN_CIRCLE * abs(x)
+            elif operation.kind == "exp":
+                most = max(Decimal(self._order) / 2, -x - _INVISIBLE)
+            else:
+                # The derivative decreases as exp(-2 abs(x)).
+                most = max(Decimal(self._order) / 2, 2 * abs(x) - _INVISIBLE) / 2
+            while (change := _value(sizes, length)) > most:
+                # The change is a convex function of the length.
+                length *= max(Decimal("0.5"), most / change)
+        return length
 
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
         """Return the next time (s) after `time` at which a table changes, or None if there is none.

@@ -2,11 +2,12 @@
 
 The command is ``python -m tests.methods.state_campaign COUNT SEED [FIRST]``. Scenes FIRST to FIRST
 + COUNT - 1 are solved, by default from 0. Even numbers have one or two ready terms, and odd numbers
-random expressions. A scene is solved with eleven tolerances from 1e-3 to 1e-13, with the attitude,
-and without it if the torque does not depend on it. Every result is compared with a reference of 30
-digits. A result exceeds the limit if its error is larger than the tolerance plus 4e-15 K, where the
-error amplification K is below 1e6. The command prints a line for each such result, then a summary.
-It returns exit status 1 if there is such a result. 10 000 scenes take half an hour of one core.
+random expressions, of which every fourth changes suddenly. A scene is solved with eleven tolerances
+from 1e-3 to 1e-13, with the attitude, and without it if the torque does not depend on it. Every
+result is compared with a reference of 30 digits. A result exceeds the limit if its error is larger
+than the tolerance plus 4e-15 K, where the error amplification K is below 1e6. The command prints a
+line for each such result, then a summary. It returns exit status 1 if there is such a result.
+10 000 scenes take half an hour of one core.
 """
 
 import decimal
@@ -25,7 +26,15 @@ import numpy as np
 from pyharness import InputError, Scene, prepare, solve, solve_many
 from pyharness.model.attitude import angle_between
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.scenes.state_scenes import READY, TIMED, draw, draw_ready
+from pyharness.scenes.state_scenes import (
+    READY,
+    STEADY,
+    SUDDEN,
+    TIMED,
+    TURNING,
+    draw,
+    draw_ready,
+)
 from pyharness.truth.decimal_series import taylor_series
 from pyharness.truth.reference import exact_coefficients
 
@@ -209,10 +218,17 @@ class Tally:
         )
 
 
+def drawn(source: Random, number: int) -> tuple[Scene, float]:
+    """Return the random scene of a number, and its time (s)."""
+    if number % 2 == 0:
+        return draw_ready(source, READY + TIMED)
+    return draw(source, STEADY + TURNING if number % 8 != 3 else (source.choice(SUDDEN),))
+
+
 def try_scene(tally: Tally, seed: str, number: int) -> None:
     """Solve one random scene by every entry point and with all tolerances."""
     source = Random(f"campaign {seed} {number}")
-    scene, time = draw(source) if number % 2 else draw_ready(source, READY + TIMED)
+    scene, time = drawn(source, number)
     begin = process_time()
     truth = None
     while truth is None:

@@ -122,13 +122,14 @@ def test_every_function_has_its_series() -> None:
         x = t + 0.0 * omega[0]
         first = np.cos(x * x) * 2.0 * x + np.exp(-x)
         second = 0.5 / np.sqrt(x + 2.0) - np.sin(0.5 * x + 1.0) * 0.5
-        return [first, second, 1.0 / (1.0 + x) - 1.0 / (x + 3.0) ** 2]
+        third = 1.0 / (1.0 + x) - 1.0 / (x + 3.0) ** 2 + 3.0 * np.tanh(3.0 * x - 2.0)
+        return [first, second, third]
 
     def integral(t: float) -> list[float]:
         return [
             math.sin(t * t) - math.exp(-t),
             math.sqrt(t + 2.0) + math.cos(0.5 * t + 1.0),
-            math.log(1.0 + t) + 1.0 / (t + 3.0),
+            math.log(1.0 + t) + 1.0 / (t + 3.0) + math.log(math.cosh(3.0 * t - 2.0)),
         ]
 
     scene = scene_of(torque, omega=(0.3, 0.2, 0.1), moments=(1.0, 1.0, 1.0))
@@ -204,6 +205,7 @@ def test_a_root_ends_the_rows_where_its_argument_touches_zero(time: float) -> No
         lambda x: np.sin(x),
         lambda x: 1.0 - np.cos(x),
         lambda x: np.exp(x) - 1.0,
+        lambda x: np.tanh(x),
         lambda x: np.sqrt(1.0 + x) - 1.0,
         lambda x: x / (1.0 + 0.3 * x),
         lambda x: x - 0.4 / (2.0 - x) + 0.2,

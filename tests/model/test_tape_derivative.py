@@ -23,7 +23,7 @@ def _piece(table: Table, time: Any) -> Any:
 
 
 MPMATH: Functions[Any] = Functions(
-    mpmath.mpf, mpmath.sqrt, mpmath.exp, mpmath.sin, mpmath.cos, _piece
+    mpmath.mpf, mpmath.sqrt, mpmath.exp, mpmath.tanh, mpmath.sin, mpmath.cos, _piece
 )
 
 

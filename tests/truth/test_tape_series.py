@@ -23,7 +23,7 @@ _OMEGA = (0.3, -1.1, 2.2)
 _ATTITUDE = (0.5, 0.5, -0.5, 0.5)  # of norm 1 exactly
 # The same functions record a tape and evaluate it in the arithmetic of mpmath.
 _Functions = dict[str, Callable[[Any], Any]]
-_SYMBOLS: _Functions = {name: getattr(np, name) for name in ("sqrt", "exp", "sin", "cos")}
+_SYMBOLS: _Functions = {name: getattr(np, name) for name in ("sqrt", "exp", "tanh", "sin", "cos")}
 _MPMATH: _Functions = {name: getattr(mpmath, name) for name in _SYMBOLS}
 
 
@@ -43,7 +43,11 @@ def _field(t: Any, w: Any, q: Any, f: _Functions) -> list[Any]:
 def _pulse(t: Any, w: Any, q: Any, f: _Functions) -> list[Any]:
     """Use exponentials of exponentials, and a sine whose angle has no cosine beside it."""
     bell = f["exp"](-2.0 * (t - 0.5) * (t - 0.5))
-    return [bell * w[1], f["exp"](0.2 * w[0] - bell), f["sin"](2.0 * w[2]) + 0.25]
+    return [
+        bell * w[1],
+        f["exp"](0.2 * w[0] - bell),
+        f["sin"](2.0 * w[2]) + 0.25 * f["tanh"](t - w[0]),
+    ]
 
 
 def _pointing(t: Any, w: Any, q: Any, f: _Functions) -> list[Any]:
@@ -126,7 +130,7 @@ def test_all_operations_are_tested() -> None:
         tape = _torque(function).tape
         assert tape is not None
         kinds |= {each.kind for each in tape.operations}
-    assert kinds == {"linear", "product", "quotient", "sqrt", "exp", "sine", "cosine"}
+    assert kinds == {"linear", "product", "quotient", "sqrt", "exp", "tanh", "sine", "cosine"}
 
 
 def test_the_less_precise_series_states_its_error() -> None:

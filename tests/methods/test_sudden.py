@@ -1,0 +1,111 @@
+"""Tests of torques that change suddenly: pulses, peaks and switches narrower than a step."""
+
+import math
+from collections.abc import Callable
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import Scene, solve
+from pyharness.scenes.state_scenes import SUDDEN, draw
+from pyharness.truth.reference import reference
+
+SPHERE = (2.0, 2.0, 2.0)
+MIDDLE = 4.321
+WIDTHS = (1e-1, 1e-3, 1e-6)
+
+# A torque as a function of x, the time since MIDDLE over a width, and its integral over x.
+PULSES: dict[str, tuple[Callable[[Any], Any], Callable[[float], float]]] = {
+    "bell": (lambda x: np.exp(-x * x), lambda x: 0.5 * math.sqrt(math.pi) * math.erf(x)),
+    "peak": (lambda x: 1.0 / (1.0 + x * x), math.atan),
+    "switch": (
+        lambda x: np.tanh(x),
+        lambda x: abs(x) + math.log1p(math.exp(-2.0 * abs(x))) - math.log(2.0),
+    ),
+    "root": (lambda x: x / np.sqrt(1.0 + x * x), lambda x: math.hypot(1.0, x)),
+    "sigmoid": (
+        lambda x: 0.5 + 0.5 * np.tanh(0.5 * x),
+        lambda x: max(x, 0.0) + math.log1p(math.exp(-abs(x))),
+    ),
+}
+
+
+def pulse(name: str, width: float) -> tuple[Scene, list[float], list[float]]:
+    """Return a sphere under a pulse about its first axis, times, and omega1 at these times."""
+    value, integral = PULSES[name]
+    scene = Scene(
+        name,
+        (0.1, 0.2, 0.3),
+        moments=SPHERE,
+        torque=lambda t, omega: [3.0 * value((t - MIDDLE) / width) + 0.0 * omega[0], 0.0, 0.0],
+    )
+    times = [2.0, MIDDLE, 4.4, 9.0]
+    begin = integral(-MIDDLE / width)
+    change = [1.5 * width * (integral((t - MIDDLE) / width) - begin) for t in times]
+    return scene, times, [0.1 + each for each in change]
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("name", PULSES)
+def test_a_pulse_of_time_is_not_missed(name: str, width: float) -> None:
+    scene, times, wanted = pulse(name, width)
+    for tolerance in (1e-3, 1e-6, 1e-9, 1e-12):
+        found = solve(scene, times, "taylor", tolerance)
+        assert found.ended == "complete"
+        error = np.abs(found.omega[:, 0] - wanted).max() / max(0.3, *map(abs, wanted))
+        # The time itself is rounded, relative to the width of the pulse.
+        assert error <= tolerance + 4e-15
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("name", PULSES)
+def test_the_reference_misses_no_pulse_of_time(name: str, width: float) -> None:
+    scene, times, wanted = pulse(name, width)
+    assert reference(scene, times).omega[:, 0] == pytest.approx(wanted, rel=0.0, abs=2e-14)
+
+
+@pytest.mark.parametrize("number", range(4))
+@pytest.mark.parametrize("name", SUDDEN)
+def test_a_sudden_change_with_omega_is_not_missed(name: str, number: int) -> None:
+    scene, time = draw(Random(f"{name} {number}"), (name,))
+    truth = reference(scene, [time])
+    scale = max(np.abs(scene.omega).max(), np.abs(truth.omega).max())
+    for tolerance in (1e-3, 1e-5, 1e-7, 1e-10):
+        found = solve(scene, [time], "taylor", tolerance)
+        assert found.growth is not None
+        limit = tolerance + 4e-15 * found.growth
+        assert np.abs(found.omega - truth.omega).max() <= limit * scale
+
+
+@pytest.mark.parametrize("power", [8, 12, 16, 24, 32])
+def test_a_power_of_a_sine_is_a_series_of_pulses(power: int) -> None:
+    # Each full turn of the sine adds the same integral, a quotient of double factorials.
+    scene = Scene(
+        "pulses",
+        (0.1, 0.2, 0.3),
+        moments=SPHERE,
+        torque=lambda t, omega: [2.0 * np.sin(t) ** power + 0.0 * omega[0], 0.0, 0.0],
+    )
+    turns = [1, 5, 20]
+    share = math.comb(power, power // 2) / 2.0**power
+    wanted = [0.1 + 2.0 * math.pi * n * share for n in turns]
+    for tolerance in (1e-3, 1e-6, 1e-9, 1e-12):
+        found = solve(scene, [2.0 * math.pi * n for n in turns], "taylor", tolerance)
+        error = np.abs(found.omega[:, 0] - wanted).max() / max(wanted)
+        assert error <= tolerance + 4e-15
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-8, 1e-300])
+def test_a_tangent_of_any_argument_is_finite(width: float) -> None:
+    """A saturated brake is a constant torque until omega is near 0."""
+    scene = Scene(
+        "brake",
+        (0.0, 1.0, 0.0),
+        moments=SPHERE,
+        torque=lambda t, omega: [0.0, -np.tanh(omega[1] / width), 0.0],
+    )
+    found = solve(scene, [1.0, 1.5, 1.9])
+    assert found.ended == "complete"
+    assert found.omega[:, 1] == pytest.approx([0.5, 0.25, 0.05], rel=1e-2 if width > 1e-3 else 1e-9)

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.model.array_type import Array as Array
 from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
+from pyharness.model.conversions import Conversions
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.shown import short_repr
 from pyharness.model.torque_law import TorqueLaw
@@ -16,14 +18,13 @@ from pyharness.model.values import Triple
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-    from pyharness.model.state_torque import StateTorque
-
-Array = NDArray[np.float64]
+    from pyharness.model.scene import Scene
 
 # Largest relative rounding error of a number in binary64.
 ROUNDING = 2.0**-53
 # The ways to end a run (`Trajectory.ended`) with all requested rows present.
 WITH_ALL_ROWS = ("complete", "sensitive")
+ENDINGS = (*WITH_ALL_ROWS, "stopped", "overflow")
 FRAMES = ("body", "space")
 STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
 
@@ -57,7 +58,7 @@ class Stop:
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Conversions):
     """The results of an integration, one row for each time, and how the integration ended.
 
     Attributes
@@ -106,10 +107,8 @@ class Trajectory:
     tolerance : float or None
         The tolerance to which a method integrated the scene. None for programs and for methods
         with a fixed step, which have no tolerance.
-    torque : TorqueLaw, StateTorque or None
-        The torque of the scene that the function `solve` solved. None for programs.
-    initial_omega : tuple of three floats, or None
-        Omega at time 0 (rad/s), about the body axes. None for programs.
+    scene : Scene or None
+        The scene that the function `solve` solved. None for programs.
 
     Examples
     --------
@@ -135,8 +134,7 @@ class Trajectory:
     axes: Array | None = None
     exact: NDArray[np.object_] | None = None
     tolerance: float | None = None
-    torque: "TorqueLaw | StateTorque | None" = field(default=None, repr=False)
-    initial_omega: Triple | None = field(default=None, repr=False)
+    scene: "Scene | None" = field(default=None, repr=False)
 
     __repr__ = short_repr
 
@@ -231,7 +229,7 @@ class Trajectory:
         array([-2.      , -0.270671])
         """
         self._checked_moments()
-        torque, _ = self._scene_of_solve()
+        torque = self._scene_of_solve().torque
         if isinstance(torque, TorqueLaw):
             values = np.array([torque.at(time) for time in self.time.tolist()]).reshape(-1, 3)
             along = torque.in_space
@@ -288,7 +286,7 @@ class Trajectory:
                 "work: the inertia changes with time; allowed: a constant inertia; `power` is "
                 "available for both"
             )
-        _, start = self._scene_of_solve()
+        start = np.array(self._scene_of_solve().omega)
         work: Array = 0.5 * ((self.omega - start) * self._momentum(self.omega + start)).sum(axis=1)
         return work
 
@@ -298,7 +296,9 @@ class Trajectory:
         if isinstance(moments, Changing):
             return moments.momentum(self.time, omega)
         axes = np.eye(3) if self.axes is None else self.axes
-        momentum: Array = ((omega @ axes) * np.array(moments)) @ axes.T
+        # The rounding of a matrix product depends on the order of the elements in memory.
+        ordered = np.ascontiguousarray(omega)
+        momentum: Array = ((ordered @ axes) * np.array(moments)) @ axes.T
         return momentum
 
     def _checked_moments(self) -> Triple | ChangingMoments | ChangingInertia:
@@ -308,13 +308,12 @@ class Trajectory:
             )
         return self.moments
 
-    def _scene_of_solve(self) -> "tuple[TorqueLaw | StateTorque, Array]":
-        """Return the torque of the scene, and omega at time 0 (rad/s)."""
-        if self.torque is None or self.initial_omega is None:
+    def _scene_of_solve(self) -> "Scene":
+        if self.scene is None:
             raise InputError(
-                "the trajectory has no torque; allowed: a trajectory that solve has returned"
+                "the trajectory has no scene; allowed: a trajectory that solve has returned"
             )
-        return self.torque, np.array(self.initial_omega)
+        return self.scene
 
     def _attitudes(self) -> Array:
         if self.attitude is None:

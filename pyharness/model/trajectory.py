@@ -296,7 +296,8 @@ class Trajectory(Conversions):
         if isinstance(moments, Changing):
             return moments.momentum(self.time, omega)
         axes = np.eye(3) if self.axes is None else self.axes
-        # The rounding of a matrix product depends on the order of the elements in memory.
+        # The rounding of a matrix product may depend on the order of the elements in memory, which
+        # a file does not preserve in full.
         ordered = np.ascontiguousarray(omega)
         momentum: Array = ((ordered @ axes) * np.array(moments)) @ axes.T
         return momentum

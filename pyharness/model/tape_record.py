@@ -6,13 +6,17 @@ and its operands, its linear combination, or the breaks and the pieces of its ta
 """
 
 import math
+from dataclasses import fields
 from itertools import pairwise
 from typing import Any
 
 from pyharness.model.symbols import MOST_OPERATIONS
-from pyharness.model.tape import N_INPUTS, Linear, Operation, Table, Tape
+from pyharness.model.tape import N_INPUTS, Functions, Linear, Operation, Table, Tape
 
-_OPERANDS = {"product": 2, "quotient": 2, "sqrt": 1, "exp": 1, "sine": 1, "cosine": 1}
+# The number of operands by the kind of an operation. The functions have one.
+_OPERANDS = {"product": 2, "quotient": 2} | {
+    each.name: 1 for each in fields(Functions) if each.name not in ("number", "table")
+}
 
 
 def tape_record(tape: Tape) -> dict[str, Any]:

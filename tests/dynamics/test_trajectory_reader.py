@@ -60,7 +60,7 @@ def prepared(attitude: bool) -> Trajectory:
 
 
 def two_functions(t: Any, omega: Any) -> Any:
-    return [omega[1] / (2.0 + t * t), np.exp(-t), np.sqrt(1.0 + omega[0] ** 2)]
+    return [omega[1] / (2.0 + t * t), np.exp(-t) + np.cos(omega[2]), np.sqrt(1.0 + omega[0] ** 2)]
 
 
 def impossible() -> Trajectory:
@@ -373,13 +373,17 @@ def test_foreign_file_is_refused_in_a_line(
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_file_of_another_kind_or_size_is_refused_at_once(tmp_path: Path) -> None:
+def test_file_of_another_kind_or_size_is_refused_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "found.npz"
     for name in (path, tmp_path, "/dev/zero"):
         with pytest.raises(InputError, match=r"give a file that Trajectory\.save wrote"):
             load(name)
     with path.open("wb") as file:
         file.truncate(1 << 42)  # without any data on the disk
+    # Not even a part of the file is read.
+    monkeypatch.setattr("pyharness.model.pipes.os.read", lambda *_: pytest.fail("was read"))
     with pytest.raises(InputError, match=r"larger than \d+ bytes"):
         load(path)
 
@@ -424,6 +428,26 @@ def _places(record: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
         if isinstance(value, (dict, list)):
             found += _places(value, (*path, key))
     return found
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("ended", "later"), ("ended", 0), ("steps", -1), ("steps", True), ("evaluations", 2.0),
+        ("error", 1), ("growth", "1.0"), ("tolerance", []), ("moments", [1.0, 2.0]),
+        ("moments", {"masses": [1.0]}), ("stop", {"step": 1}), ("scene", []),
+        ("stop", {"step": 1, "variable": "W", "quotient": 1.0}),
+        ("stop", {"step": 1, "variable": "U", "quotient": None}),
+        ("stop", {"step": -1, "variable": "U", "quotient": 1.0}),
+    ],
+)  # fmt: skip
+def test_wrong_value_of_the_header_is_refused(name: str, value: Any, tmp_path: Path) -> None:
+    with np.load(io.BytesIO(file_content(solve(case_scene(5), [1.0])))) as file:
+        arrays = dict(file)
+    header = json.dumps(json.loads(str(arrays["header"])) | {name: value})
+    np.savez(tmp_path / "found.npz", **{**arrays, "header": np.array(header)})
+    with pytest.raises(InputError, match=r"^trajectory file '\S+': (a value is missing|moments)"):
+        load(tmp_path / "found.npz")
 
 
 def test_each_value_of_the_header_is_checked(tmp_path: Path) -> None:

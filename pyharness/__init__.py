@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from pyharness.compare.comparison import Comparison, compare_programs
     from pyharness.compare.method_comparison import compare_methods
     from pyharness.dynamics.scene_reader import read_scene
+    from pyharness.dynamics.trajectory_reader import load
     from pyharness.methods.many import Ensemble, solve_many
     from pyharness.methods.prepared import prepare
     from pyharness.methods.prepared_attitude import AttitudeSolver
@@ -54,6 +55,7 @@ __all__ = [
     "case_scene",
     "compare_methods",
     "compare_programs",
+    "load",
     "opaque",
     "prepare",
     "principal",
@@ -71,6 +73,7 @@ _SUBMODULES = {
     "compare.comparison": ("Comparison", "compare_programs"),
     "compare.method_comparison": ("compare_methods",),
     "dynamics.scene_reader": ("read_scene",),
+    "dynamics.trajectory_reader": ("load",),
     "model.changing": ("ChangingInertia", "ChangingMoments"),
     "model.errors": ("InputError", "NotBuiltError"),
     "model.impossible": ("ImpossibleBodyWarning",),

@@ -16,6 +16,7 @@ from pyharness import (
     Trajectory,
     __version__,
     case_scene,
+    load,
     prepare,
     read_scene,
     solve,
@@ -45,9 +46,14 @@ found: list[Trajectory] = [
 solver: Solver = prepare(scenes[1], "auto", tolerance=np.float64(1e-9))
 found.append(solver.trajectory([0, 1, 1], np.array([1.0, 2.0])))
 last: float = found[-1].omega[-1, 0]
+columns: int = found[-1].y.shape[1]
+ending: tuple[bool, int, str, int] = (
+    found[-1].success, found[-1].status, found[-1].message, found[-1].nfev,
+)  # fmt: skip
 steps: int = found[-1].steps + solver.steps
 listing: Listing = subset("runge-kutta", fix=["base-not-restored"], keep=("stage-base",))
 try:
+    loaded: Trajectory = load(Path("no such file.npz"))
     read_scene(Path("no such file.toml"))
     read_scene("no such file.toml")
 except (InputError, NotBuiltError) as error:

@@ -303,7 +303,8 @@ def check_outputs(options: argparse.Namespace) -> None:
     picture = getattr(options, "plot", None)
     if picture is None and options.out is None:
         return
-    from pyharness.cli.output import check_apart, check_writable
+    from pyharness.cli.output import check_apart
+    from pyharness.model.output_files import check_writable
 
     if picture is not None:
         from pyharness.views.pictures import check_picture, numbers_beside
@@ -333,7 +334,7 @@ def show(
     form = options.format or FORMATS[0]
     content = own[form]() if own and form in own else render(report, form)
     if getattr(options, "plot", None) is not None:
-        from pyharness.cli.output import write_files
+        from pyharness.model.output_files import write_files
         from pyharness.views.pictures import saved
 
         assert report.pictures is not None
@@ -345,7 +346,7 @@ def show(
 def emit(content: str | bytes, out: str | None) -> None:
     """Write `content`, a report or other result, to the file `out`; if `out` is None, to stdout."""
     if out is not None:
-        from pyharness.cli.output import write_files
+        from pyharness.model.output_files import write_files
 
         data = content if isinstance(content, bytes) else shown(content).encode()
         write_files({out: data}, "--out")

@@ -71,7 +71,12 @@ def _entry(name: str, of: Any, of_class: str = "") -> Entry:
 
 
 def _methods(owner: str, of: type) -> Iterator[Entry]:
-    for name, value in vars(of).items():
+    # Base classes of this package have a part of the methods of a class.
+    ours = (base for base in of.__mro__ if base.__module__.startswith(pyharness.__name__))
+    named: dict[str, Any] = {}
+    for base in ours:
+        named = {**named, **{name: x for name, x in vars(base).items() if name not in named}}
+    for name, value in named.items():
         told = value.fget if isinstance(value, property) else value
         if not name.startswith("_") and inspect.isfunction(told) and inspect.getdoc(told):
             entry = _entry(name, told, owner)

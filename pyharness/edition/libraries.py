@@ -1,9 +1,6 @@
 """The third-party libraries that write the pages; a user installs these optional packages."""
 
-from importlib import import_module
-
-from pyharness.model.distribution import install_command
-from pyharness.model.errors import InputError
+from pyharness.model.distribution import check_package, install_command
 
 LIBRARIES = (
     "docstring_parser", "jinja2", "latex2mathml", "markdown_it", "markupsafe", "matplotlib",
@@ -17,7 +14,4 @@ def check_libraries() -> None:
     The error message has the command that installs the libraries.
     """
     for name in LIBRARIES:
-        try:
-            import_module(name)
-        except ImportError:
-            raise InputError(f"edition needs {name}: {install_command('edition')}") from None
+        check_package(name, "edition", install_command("edition"))

@@ -35,7 +35,7 @@ from pyharness.ensembles.store_layout import (
     metadata_files,
 )
 from pyharness.ensembles.sweep import Arrays, Sweep
-from pyharness.model.distribution import install_command
+from pyharness.model.distribution import check_package, install_command
 from pyharness.model.errors import InputError
 from pyharness.model.schema import check_schema
 
@@ -46,10 +46,7 @@ _REPAIR = "'pyharness sweep' with --repair"
 
 def check_zarr() -> None:
     """Raise InputError if the package Zarr, which stores the results of sweeps, is missing."""
-    try:
-        import zarr  # noqa: F401
-    except ImportError:
-        raise InputError(f"sweep needs zarr: {install_command('sweep')}") from None
+    check_package("zarr", "sweep", install_command("sweep"))
 
 
 class Store:

@@ -120,11 +120,12 @@ def solve(
     check_torque(scene, method, attitude)
     if attitude:
         check_attitude(method, scene)
+    given = scene
     # An attitude that was not requested is not computed.
     start = (scene.attitude or IDENTITY) if attitude else None
     if start is not scene.attitude:
         scene = replace(scene, attitude=start)
-    given, is_full = scene, scene.inertia is not None
+    is_full = scene.inertia is not None
     scene, axes = principal(scene)
     moments = scene.changing or scene.moments
     values, turned = _ascending(times)
@@ -144,13 +145,7 @@ def solve(
         parts[0] = _reversed(parts[0])
     found = parts[0] if len(parts) == 1 else _joined(*parts)
     reported = None if chosen.is_fixed_step else tolerance
-    found = replace(
-        found,
-        moments=moments,
-        tolerance=reported,
-        torque=given.torque,
-        initial_omega=given.omega,
-    )
+    found = replace(found, moments=moments, tolerance=reported, scene=given)
     if is_full:
         found = in_scene_axes(found, axes)
     return _reversed(found) if turned else found

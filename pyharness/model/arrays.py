@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, kind_of
-from pyharness.model.trajectory import Array
 from pyharness.model.values import integer, number
 
 _MOST_THREADS = 1024

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
+from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, kind_of, unknown
-from pyharness.model.trajectory import Array
 from pyharness.model.values import finite, number_list, three
 
 Quaternion = tuple[float, float, float, float]

@@ -1,5 +1,7 @@
 """Name and version of the installable distribution, which is not called `pyharness`."""
 
+from pyharness.model.errors import InputError
+
 # On the package index, the name `pyharness` belongs to another package.
 DISTRIBUTION = "rigid-body-harness"
 
@@ -17,3 +19,17 @@ def install_command(extra: str) -> str:
     `extra` is the name of the group in pyproject.toml, for example ``plots``.
     """
     return f"pip install '{DISTRIBUTION}[{extra}]'"
+
+
+def check_package(name: str, what: str, command: str) -> None:
+    """Raise InputError if the optional package `name` is not installed.
+
+    The message names `what`, the option or function that needs the package, and `command`, which
+    installs the package.
+    """
+    from importlib import import_module
+
+    try:
+        import_module(name)
+    except ImportError:
+        raise InputError(f"{what} needs {name}: {command}") from None

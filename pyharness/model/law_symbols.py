@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.model.array_type import Array
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.trajectory import Array
 
 
 def law_value(law: TorqueLaw, time: Any) -> Array:

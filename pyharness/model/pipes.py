@@ -40,25 +40,27 @@ def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) 
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{where}: {reason}; give {what} that can be read") from None
-    if len(content) > limit:
+    if content is None:
         raise InputError(f"{where}: larger than {limit} bytes; give {what} of at most that size")
     return content
 
 
-def _read(path: str, limit: int) -> bytes:
-    """Return the first `limit` + 1 bytes of a file, or all if it has fewer bytes.
+def _read(path: str, limit: int) -> bytes | None:
+    """Return the content of a file, or None if it has more than `limit` bytes.
 
-    If the result has more than `limit` bytes, the file is too large. Raise OSError if the file
-    can't be read.
+    Raise OSError if the file can't be read.
     """
     # Without O_NONBLOCK, opening a pipe waits for a writer.
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
     try:
-        mode = os.fstat(handle).st_mode
+        status = os.fstat(handle)
+        mode = status.st_mode
         if stat.S_ISDIR(mode):
             raise IsADirectoryError(errno.EISDIR, "Is a directory")
         if stat.S_ISBLK(mode) or (stat.S_ISCHR(mode) and not _is_quiet(handle)):
             raise OSError(errno.EINVAL, "is a device")
+        if stat.S_ISREG(mode) and status.st_size > limit:
+            return None
         content = bytearray()
         while len(content) <= limit:
             if not select.select([handle], [], [], PATIENCE)[0]:
@@ -67,7 +69,7 @@ def _read(path: str, limit: int) -> bytes:
             if not piece:
                 break
             content += piece
-        return bytes(content)
+        return bytes(content) if len(content) <= limit else None
     finally:
         os.close(handle)
 

@@ -10,6 +10,7 @@ SCHEMAS = {
     "sweep store": 2,
     "sweep file": 1,
     "scene file": 1,
+    "trajectory file": 1,
     "external file": 1,
     "vector file": 1,
     "golden record": 1,

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes
 from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.law_symbols import body_torque
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, refusal
 from pyharness.model.tape import FLOATS, N_INPUTS, TIME, Tape, evaluate
 from pyharness.model.torque_law import FRAMES, TorqueLaw
-from pyharness.model.trajectory import Array
 from pyharness.model.values import Triple, three_floats
 
 Function = Callable[..., Any]

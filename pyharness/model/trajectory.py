@@ -7,24 +7,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
-from pyharness.model.errors import InputError, unknown
+from pyharness.model.array_type import Array as Array
+from pyharness.model.changing import ChangingInertia, ChangingMoments
+from pyharness.model.conversions import Conversions
+from pyharness.model.mechanics import Mechanics
+from pyharness.model.mechanics import turned_to_space as turned_to_space
 from pyharness.model.shown import short_repr
-from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.values import Triple
 
 if TYPE_CHECKING:
-    from scipy.spatial.transform import Rotation
-
-    from pyharness.model.state_torque import StateTorque
-
-Array = NDArray[np.float64]
+    from pyharness.model.scene import Scene
 
 # Largest relative rounding error of a number in binary64.
 ROUNDING = 2.0**-53
 # The ways to end a run (`Trajectory.ended`) with all requested rows present.
 WITH_ALL_ROWS = ("complete", "sensitive")
-FRAMES = ("body", "space")
+ENDINGS = (*WITH_ALL_ROWS, "stopped", "overflow")
 STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
 
 
@@ -57,7 +54,7 @@ class Stop:
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Mechanics, Conversions):
     """The results of an integration, one row for each time, and how the integration ended.
 
     Attributes
@@ -106,10 +103,8 @@ class Trajectory:
     tolerance : float or None
         The tolerance to which a method integrated the scene. None for programs and for methods
         with a fixed step, which have no tolerance.
-    torque : TorqueLaw, StateTorque or None
-        The torque of the scene that the function `solve` solved. None for programs.
-    initial_omega : tuple of three floats, or None
-        Omega at time 0 (rad/s), about the body axes. None for programs.
+    scene : Scene or None
+        The scene that the function `solve` solved. None for programs.
 
     Examples
     --------
@@ -135,191 +130,9 @@ class Trajectory:
     axes: Array | None = None
     exact: NDArray[np.object_] | None = None
     tolerance: float | None = None
-    torque: "TorqueLaw | StateTorque | None" = field(default=None, repr=False)
-    initial_omega: Triple | None = field(default=None, repr=False)
+    scene: "Scene | None" = field(default=None, repr=False)
 
     __repr__ = short_repr
-
-    def rotation(self) -> "Rotation":
-        """Return the attitudes as SciPy rotations, which rotate vectors from body to space.
-
-        Returns
-        -------
-        scipy.spatial.transform.Rotation
-            One rotation for each row (time) of the trajectory.
-
-        Raises
-        ------
-        InputError
-            If the attitude was not requested.
-        """
-        from scipy.spatial.transform import Rotation
-
-        return Rotation.from_quat(self._attitudes()[:, [1, 2, 3, 0]])
-
-    def angular_momentum(self, frame: str = "body") -> Array:
-        """Return the angular momentum in each of n rows, about the axes of the body or of space.
-
-        An inertia that changes with time is that at the time of the row.
-
-        Parameters
-        ----------
-        frame : {"body", "space"}
-            The axes of the components.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            The angular momentum, kg m2/s.
-
-        Raises
-        ------
-        InputError
-            If the body was specified without moments of inertia. Also for an unknown frame, or the
-            axes of space if the attitude was not requested.
-        """
-        if frame not in FRAMES:
-            raise unknown("frame", str(frame), FRAMES)
-        momentum = self._momentum(self.omega)
-        return momentum if frame == "body" else turned_to_space(self._attitudes(), momentum)
-
-    def energy(self) -> Array:
-        """Return the kinetic energy of the rotation in each of the n rows of the trajectory.
-
-        An inertia that changes with time is that at the time of the row.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            The energy, J.
-
-        Raises
-        ------
-        InputError
-            If the body was specified without moments of inertia.
-        """
-        energy: Array = 0.5 * (self.omega * self._momentum(self.omega)).sum(axis=1)
-        return energy
-
-    def power(self) -> Array:
-        """Return the power of the torque in each of the n rows of the trajectory.
-
-        The power is the scalar product of the torque and omega. It is positive while the torque
-        increases the kinetic energy of the body.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            The power, W. It is NaN where the torque is singular.
-
-        Raises
-        ------
-        InputError
-            If the body was specified without moments of inertia, or if the trajectory is not a
-            result of the function `solve`.
-
-        References
-        ----------
-        H. Goldstein, C. Poole and J. Safko, Classical Mechanics, 3rd edition, 2002, section 5.3.
-
-        Examples
-        --------
-        >>> from pyharness import Scene, solve
-        >>> from pyharness.torques import damping
-        >>> scene = Scene("damped", (0, 0, 2), moments=(3, 2, 1), torque=damping(0.5))
-        >>> solve(scene, [0.0, 2.0]).power().round(6)
-        array([-2.      , -0.270671])
-        """
-        self._checked_moments()
-        torque, _ = self._scene_of_solve()
-        if isinstance(torque, TorqueLaw):
-            values = np.array([torque.at(time) for time in self.time.tolist()]).reshape(-1, 3)
-            along = torque.in_space
-            omega = turned_to_space(self._attitudes(), self.omega) if along else self.omega
-        else:
-            # A torque that does not depend on the attitude accepts any.
-            needed = torque.needs_attitude
-            attitudes = self._attitudes() if needed else np.eye(4)[[0] * len(self.time)]
-            rows = zip(self.time.tolist(), self.omega.tolist(), attitudes.tolist(), strict=True)
-            values = np.array([torque.at(*row) for row in rows]).reshape(-1, 3)
-            omega = self.omega
-        power: Array = (values * omega).sum(axis=1)
-        return power
-
-    def work(self) -> Array:
-        """Return the work that the torque has done on the body from time 0 to each of the n rows.
-
-        The work is the change of the kinetic energy since time 0. At negative times it has the
-        opposite sign of the work from that time until time 0. The wheels of the ready term `wheels`
-        are no part of the body; the energy of their motors is therefore not included.
-
-        The work is computed as (omega - omega0) . I (omega + omega0) / 2, where I is the inertia
-        and omega0 is omega at time 0. Unlike a difference of two energies, this product loses no
-        digits to rounding where all components of omega have changed little. Its error is then that
-        of omega, multiplied by the angular momentum.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            The work, J.
-
-        Raises
-        ------
-        InputError
-            If the body was specified without moments of inertia, if the inertia changes with time,
-            or if the trajectory is not a result of the function `solve`.
-
-        References
-        ----------
-        H. Goldstein, C. Poole and J. Safko, Classical Mechanics, 3rd edition, 2002, sections 1.1
-        and 5.3.
-
-        Examples
-        --------
-        >>> from pyharness import Scene, solve
-        >>> from pyharness.torques import damping
-        >>> scene = Scene("damped", (0, 0, 2), moments=(3, 2, 1), torque=damping(0.5))
-        >>> solve(scene, [0.0, 2.0]).work().round(6)
-        array([ 0.      , -1.729329])
-        """
-        if isinstance(self._checked_moments(), Changing):
-            # The forces that change the inertia change the kinetic energy too.
-            raise InputError(
-                "work: the inertia changes with time; allowed: a constant inertia; `power` is "
-                "available for both"
-            )
-        _, start = self._scene_of_solve()
-        work: Array = 0.5 * ((self.omega - start) * self._momentum(self.omega + start)).sum(axis=1)
-        return work
-
-    def _momentum(self, omega: Array) -> Array:
-        """Return the product of the inertia (kg m2) and each row of `omega` (rad/s)."""
-        moments = self._checked_moments()
-        if isinstance(moments, Changing):
-            return moments.momentum(self.time, omega)
-        axes = np.eye(3) if self.axes is None else self.axes
-        momentum: Array = ((omega @ axes) * np.array(moments)) @ axes.T
-        return momentum
-
-    def _checked_moments(self) -> Triple | ChangingMoments | ChangingInertia:
-        if self.moments is None:
-            raise InputError(
-                "the body is given by coefficients, and the result needs its moments; give moments"
-            )
-        return self.moments
-
-    def _scene_of_solve(self) -> "tuple[TorqueLaw | StateTorque, Array]":
-        """Return the torque of the scene, and omega at time 0 (rad/s)."""
-        if self.torque is None or self.initial_omega is None:
-            raise InputError(
-                "the trajectory has no torque; allowed: a trajectory that solve has returned"
-            )
-        return self.torque, np.array(self.initial_omega)
-
-    def _attitudes(self) -> Array:
-        if self.attitude is None:
-            raise InputError("the trajectory has no attitude; request it with attitude=True")
-        return self.attitude
 
     @property
     def digits(self) -> float | None:
@@ -337,17 +150,6 @@ class Trajectory:
         amplified rounding error exceeds the tolerance.
         """
         return self.ended in WITH_ALL_ROWS
-
-
-def turned_to_space(attitude: Array, vectors: Array) -> Array:
-    """Transform n vectors from body-axis components to components along the axes of space.
-
-    `attitude` has a unit quaternion, from body to space, for each vector, shape (n, 4). `vectors`
-    and the result have the shape (n, 3).
-    """
-    scalar, vector = attitude[:, :1], attitude[:, 1:]
-    twice = 2.0 * np.cross(vector, vectors)
-    return vectors + scalar * twice + np.cross(vector, twice)
 
 
 def digits_left(error: float | None) -> float | None:

@@ -16,11 +16,11 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError
 from pyharness.model.inertia import Exact
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
-from pyharness.model.trajectory import Array
 from pyharness.model.values import Triple
 
 ExactWave = tuple[Exact, float]

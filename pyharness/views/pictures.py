@@ -6,7 +6,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pyharness.model.distribution import install_command
+from pyharness.model.distribution import check_package, install_command
 from pyharness.model.errors import InputError
 from pyharness.model.report import Picture
 from pyharness.views.csv import csv_text
@@ -39,10 +39,7 @@ def check_matplotlib(what: str) -> None:
 
     The message names `what`, the option or subcommand that needs matplotlib, such as ``--plot``.
     """
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise InputError(f"{what} needs matplotlib: {install_command('plots')}") from None
+    check_package("matplotlib", what, install_command("plots"))
 
 
 def numbers_beside(path: str) -> str:

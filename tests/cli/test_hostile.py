@@ -9,13 +9,14 @@ from pathlib import Path
 import pytest
 
 from pyharness import InputError
-from pyharness.cli import forecast, output, shown
+from pyharness.cli import forecast, shown
 from pyharness.cli.main import main
 from pyharness.cli.options import warn
 from pyharness.cli.progress import progress
 from pyharness.edition.report import MARK
 from pyharness.model import pipes
 from pyharness.model.errors import printable
+from pyharness.model.output_files import check_writable
 from pyharness.model.pipes import read_input
 
 Capture = pytest.CaptureFixture[str]
@@ -196,8 +197,8 @@ def test_file_that_can_not_be_written_is_refused_before_any_work(
     assert list(Path().iterdir()) == []
     # The check leaves no new file, and leaves an existing file unchanged.
     Path("there").write_text("old")
-    output.check_writable("there", "--out")
-    output.check_writable("new", "--out")
+    check_writable("there", "--out")
+    check_writable("new", "--out")
     assert [(path.name, path.read_text()) for path in Path().iterdir()] == [("there", "old")]
 
 

@@ -20,8 +20,10 @@ from pyharness import InputError
 from pyharness.cli import output
 from pyharness.cli.main import main
 from pyharness.cli.options import warn
-from pyharness.cli.output import write_files, write_folder
+from pyharness.cli.output import write_folder
 from pyharness.cli.progress import end_progress, progress
+from pyharness.model import output_files
+from pyharness.model.output_files import write_files
 
 RUN = ["run", "--case", "3", "--program", "two-term", "--format", "csv"]
 
@@ -88,7 +90,7 @@ class _Failing:
 
 
 CALLS: dict[str, tuple[Any, str, Callable[..., Any]]] = {
-    "open": (output, "open", open),
+    "open": (output_files, "open", open),
     "link": (os, "link", os.link),
     "replace": (os, "replace", os.replace),
     "mkdir": (Path, "mkdir", Path.mkdir),
@@ -133,7 +135,7 @@ def ctrl_c() -> Iterator[None]:
 @pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("writer", ["three", "one", "made"])
 def test_a_ctrl_c_at_any_line_leaves_all_or_nothing(writer: str, tmp_path: Path) -> None:
-    """Send the signal at each line of the output module in turn."""
+    """Send the signal at each line of the modules that write, in turn."""
     write, after = WRITERS[writer]
     outcomes = []
     for number in range(400):
@@ -142,7 +144,7 @@ def test_a_ctrl_c_at_any_line_leaves_all_or_nothing(writer: str, tmp_path: Path)
 
         def trace(frame: FrameType, event: str, _: object, number: int = number) -> Any:
             nonlocal lines
-            if frame.f_code.co_filename != output.__file__:
+            if frame.f_code.co_filename not in (output.__file__, output_files.__file__):
                 return None
             if event == "line":
                 lines += 1
@@ -177,7 +179,7 @@ def test_a_ctrl_c_while_files_are_written_gives_up(
         signal.raise_signal(signal.SIGINT)
         return open(*given)
 
-    monkeypatch.setattr(output, "open", interrupted, raising=False)
+    monkeypatch.setattr(output_files, "open", interrupted, raising=False)
     for write, _ in WRITERS.values():
         folder = _folder(tmp_path)
         with pytest.raises(KeyboardInterrupt):

@@ -208,7 +208,7 @@ def test_nothing_is_left_where_writing_fails(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pyharness.cli.output.os.replace", full)
+    monkeypatch.setattr("pyharness.model.output_files.os.replace", full)
     kept = tmp_path / "kept"
     kept.mkdir()
     for folder in (tmp_path / "new", kept):

@@ -7,8 +7,10 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from pyharness import load, solve
 from pyharness.checks.external_file import read_problem
 from pyharness.checks.golden import read_record
 from pyharness.checks.port_protocol import request
@@ -68,6 +70,23 @@ def scene_file(folder: Path) -> Reader:
     return Reader(path, lambda: read_scene(path), may_lack=True)
 
 
+class _Archive(Reader):
+    """A trajectory file, which has its schema number in the text `header`."""
+
+    def replace(self, number: str | None) -> None:
+        with np.load(self.path) as file:
+            arrays = dict(file)
+        old, new = '"schema": 1, ', "" if number is None else f'"schema": {number}, '
+        assert str(arrays["header"]).count(old) == 1
+        np.savez(self.path, **{**arrays, "header": str(arrays["header"]).replace(old, new)})
+
+
+def trajectory_file(folder: Path) -> Reader:
+    path = folder / "found.npz"
+    solve(case_scene(3), [1.0]).save(path)
+    return _Archive(path, lambda: load(path))
+
+
 def external_file(folder: Path) -> Reader:
     path = folder / "problem.toml"
     path.write_text("schema = 1\n" + EXTERNAL.read_text())
@@ -112,6 +131,7 @@ FILES: dict[str, Callable[[Path], Reader]] = {
     "sweep store": sweep_store,
     "sweep file": sweep_file,
     "scene file": scene_file,
+    "trajectory file": trajectory_file,
     "external file": external_file,
     "vector file": vector_file,
     "golden record": golden_record,
@@ -129,14 +149,14 @@ def test_another_schema_is_refused_in_a_line(kind: str, tmp_path: Path) -> None:
     if kind == "port request":
         engine()
     reader = FILES[kind](tmp_path)
-    content = reader.path.read_text()
+    content = reader.path.read_bytes()
     if kind != "sweep store":  # its checksums were removed
         reader.read()
     known = SCHEMAS[kind]
     for number in (str(known + 1), str(known - 1), "-1", f"{known}.0", '"1"', "true", None):
-        reader.path.write_text(content)
+        reader.path.write_bytes(content)
         reader.replace(number)
-        assert reader.path.read_text() != content
+        assert reader.path.read_bytes() != content
         if kind == "port request" and number == "1.0":
             continue  # the same number in JavaScript
         if number is None and reader.may_lack:

@@ -177,8 +177,8 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     effort, attitude = shared.chosen_effort(options), options.attitude is not None
     trajectory = solve(scene, times, name, tolerance, effort=effort, attitude=attitude)
     if options.animate is not None:
-        from pyharness.cli.output import write_files
         from pyharness.methods.attitude_picture import animation
+        from pyharness.model.output_files import write_files
 
         moving = animation(scene, name, tolerance, max(times, key=abs), options.animate)
         write_files({options.animate: moving}, "--animate")
@@ -189,8 +189,8 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
 
 
 def _check_animation(options: argparse.Namespace, scene: Scene) -> None:
-    from pyharness.cli.output import check_writable
     from pyharness.methods.attitude_picture import check_animation
+    from pyharness.model.output_files import check_writable
     from pyharness.views.pictures import check_matplotlib
 
     if options.attitude is None:

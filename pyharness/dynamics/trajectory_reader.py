@@ -1,0 +1,189 @@
+"""Reading of the files that `Trajectory.save` writes.
+
+A file may come from anyone. Therefore nothing in it is executed or unpickled, no array is larger
+than the file, and every value is checked.
+"""
+
+import io
+import json
+import math
+import os
+import zipfile
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from pyharness.dynamics.scene_reader import scene_of_file
+from pyharness.model.changing import ChangingInertia, ChangingMoments
+from pyharness.model.errors import InputError
+from pyharness.model.pipes import read_input
+from pyharness.model.principal import PrincipalScene
+from pyharness.model.scene import Scene
+from pyharness.model.schema import check_schema
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.tape_record import tape_of
+from pyharness.model.trajectory import ENDINGS, STOP_VARIABLES, Stop, Trajectory
+from pyharness.model.trajectory_file import AXES, KIND, ROWS, TEXTS, checked_path
+from pyharness.model.values import three_floats
+
+_WRITTEN = "a file that Trajectory.save wrote"
+_CHANGING = {each.place: each for each in (ChangingMoments, ChangingInertia)}
+
+
+def load(path: str | os.PathLike[str]) -> Trajectory:
+    """Return the trajectory that `Trajectory.save` wrote to a file.
+
+    Every number is bit-for-bit identical to that of the saved trajectory, and so are the results of
+    its methods, such as `power` and `work`. A torque that no scene file can describe, as one that
+    was recorded from a Python function, is restored as a list of operations.
+
+    Parameters
+    ----------
+    path : str or path
+        The path of the file.
+
+    Returns
+    -------
+    Trajectory
+        The trajectory, with its scene if it had one.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read, was not written by `Trajectory.save`, is damaged, is of a version
+        that this version does not read, or is larger than a quarter of this machine's memory.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, load, solve
+    >>> solve(case_scene(1), [1.0, 2.0]).save("case-1.npz")  # doctest: +SKIP
+    >>> load("case-1.npz").omega[-1]  # doctest: +SKIP
+    array([6., 6., 6.])
+    """
+    name = checked_path(path)
+    where = f"trajectory file '{name}'"
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    content = read_input(name, where, memory // 4, _WRITTEN)
+    try:
+        arrays = _arrays(content)
+        header = json.loads(_text(arrays, "header"))
+        if header["kind"] != KIND:
+            raise ValueError("another kind of file")
+    except Exception:  # the packages that read archives raise errors of many types
+        raise InputError(f"{where}: not a trajectory, or damaged; give {_WRITTEN}") from None
+    check_schema(where, "trajectory file", header.get("schema"), "take a version that reads it")
+    try:
+        return _trajectory(arrays, header, where)
+    except InputError as error:
+        shown = str(error)
+        raise InputError(shown if shown.startswith(where) else f"{where}: {shown}") from None
+    except Exception:
+        raise InputError(f"{where}: a value is missing or damaged; give {_WRITTEN}") from None
+
+
+def _arrays(content: bytes) -> dict[str, Any]:
+    """Return the arrays in the content of a file by their names."""
+    found = {}
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        allowed = {f"{name}.npy" for name in (*TEXTS, *ROWS, AXES)}
+        for each in archive.infolist():
+            allowed.remove(each.filename)  # an error if the name is unknown, or occurs twice
+            if each.compress_type != zipfile.ZIP_STORED or each.file_size > len(content):
+                raise ValueError("an entry is compressed")
+            # This compares the data with their checksum.
+            found[each.filename.removesuffix(".npy")] = _array(archive.read(each))
+    return found
+
+
+def _array(data: bytes) -> Any:
+    stream = io.BytesIO(data)
+    if np.lib.format.read_magic(stream) != (1, 0):
+        raise ValueError("another version of NumPy's format")
+    shape, by_columns, dtype = np.lib.format.read_array_header_1_0(stream)
+    begin = stream.tell()
+    if dtype.kind not in "fiU" or math.prod(shape) * dtype.itemsize != len(data) - begin:
+        raise ValueError("another type, or another size")
+    flat = np.frombuffer(data, dtype, offset=begin).astype(dtype.newbyteorder("="))
+    return flat.reshape(shape, order="F" if by_columns else "C")
+
+
+def _text(arrays: dict[str, Any], name: str) -> str:
+    array = arrays[name]
+    if array.shape != () or array.dtype.kind != "U":
+        raise ValueError("no text")
+    return str(array)
+
+
+def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> Trajectory:
+    rows: dict[str, Any] = {}
+    count = len(arrays["time"])
+    for name, (kind, shape) in ROWS.items():
+        value = arrays.get(name)
+        if value is not None and (value.dtype != kind or value.shape != (count, *shape)):
+            raise ValueError("rows of another type or shape")
+        rows[name] = value
+    if rows["recorded_time"] is None:
+        rows["recorded_time"] = rows["time"]
+    axes = arrays.get(AXES)
+    if rows["omega"] is None or (axes is not None and (axes.dtype, axes.shape) != ("f8", (3, 3))):
+        raise ValueError("no omega, or axes of another type or shape")
+    if header["ended"] not in ENDINGS:
+        raise ValueError("an unknown ending")
+    scene = None
+    if header["scene"] is not None:
+        scene = _scene(_text(arrays, "scene"), header["scene"], where)
+    return Trajectory(
+        **rows,
+        axes=axes,
+        steps=_count(header["steps"]),
+        evaluations=_count(header["evaluations"]),
+        ended=header["ended"],
+        stop=_stop(header["stop"]),
+        moments=_moments(header["moments"]),
+        scene=scene,
+        error=_estimate(header["error"]),
+        growth=_estimate(header["growth"]),
+        tolerance=_estimate(header["tolerance"]),
+    )
+
+
+def _scene(text: str, record: dict[str, Any], where: str) -> Scene:
+    scene = scene_of_file(text.encode(), "", where)
+    if record["torque"] is not None:
+        tape = tape_of(record["torque"])
+        scene = replace(scene, torque=StateTorque(tape, None, tape.needs_attitude))
+    others = {name: record[name] for name in ("masses", "forces", "case")}
+    if record["moments_low"] is None:
+        return replace(scene, **others)
+    same = {each.name: getattr(scene, each.name) for each in fields(scene) if each.init}
+    low = three_floats("moments_low", record["moments_low"])
+    return PrincipalScene(**same | others, moments_low=low)
+
+
+def _moments(record: Any) -> Any:
+    if isinstance(record, dict):
+        ((place, values),) = record.items()
+        return _CHANGING[place](values)
+    return None if record is None else three_floats("moments", record)
+
+
+def _stop(record: Any) -> Stop | None:
+    if record is None:
+        return None
+    stop = Stop(**record)
+    if stop.variable not in STOP_VARIABLES or type(stop.quotient) is not float:
+        raise ValueError("an unknown variable")
+    return replace(stop, step=_count(stop.step))
+
+
+def _count(value: Any) -> int:
+    if type(value) is not int or value < 0:
+        raise ValueError("no count")
+    return value
+
+
+def _estimate(value: Any) -> float | None:
+    if value is not None and type(value) is not float:
+        raise ValueError("no number")
+    return value

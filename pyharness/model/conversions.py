@@ -1,0 +1,275 @@
+"""Trajectories as objects of pandas, xarray and matplotlib, as HTML and as files."""
+
+import os
+from html import escape
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.model.array_type import Array
+from pyharness.model.distribution import check_package, install_command
+from pyharness.model.errors import InputError, kind_of
+from pyharness.model.report import counted, short
+from pyharness.model.scipy_names import SciPyNames
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pandas import DataFrame
+    from xarray import Dataset
+
+    from pyharness.model.scene import Scene
+    from pyharness.model.trajectory import Trajectory
+
+# In HTML, the first and the last so many rows are shown.
+_SHOWN = 3
+
+
+class _Quantity(NamedTuple):
+    """An array of a trajectory with its names: a vector for each row, or a number for each row."""
+
+    name: str
+    long_name: str
+    unit: str
+    columns: tuple[str, ...]  # names of the components; one name if each row has a number
+    values: NDArray[Any]
+
+
+class Conversions(SciPyNames):
+    """A base class of trajectories, with the conversions to objects of other packages."""
+
+    recorded_time: Array
+    velocity: Array | None
+    ier: NDArray[np.int32] | None
+    steps: int
+    error: float | None
+    tolerance: float | None
+    scene: "Scene | None"
+
+    def to_pandas(self) -> "DataFrame":
+        """Return the rows as a DataFrame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row for each time, with `time` (s) as its index. The columns `omega1` to `omega3`
+            are omega (rad/s), `velocity1` to `velocity3` the translational velocity (m/s), and `q0`
+            to `q3` the quaternion of the attitude. `recorded_time` (s) is the time in a program's
+            output file, and `ier` the error code of its linear solver. Columns without values are
+            left out, and so is `recorded_time` if it is the same as `time`. The frame's attribute
+            ``attrs["units"]`` has the unit of each column by its name.
+
+        Raises
+        ------
+        InputError
+            If pandas is not installed.
+
+        Examples
+        --------
+        >>> from pyharness import case_scene, solve
+        >>> frame = solve(case_scene(1), [1.0, 2.0]).to_pandas()
+        >>> float(frame.loc[2.0, "omega1"]), frame.attrs["units"]["omega1"]
+        (6.0, 'rad/s')
+        """
+        check_package("pandas", "to_pandas", "pip install pandas")
+        from pandas import DataFrame, Index
+
+        columns: dict[str, Any] = {}
+        units = {"time": "s"}
+        for each in self._quantities():
+            parts = each.values.reshape(len(self.time), len(each.columns)).T
+            columns.update(zip(each.columns, parts, strict=True))
+            units.update(dict.fromkeys(each.columns, each.unit))
+        frame = DataFrame(columns, index=Index(self.time.copy(), name="time"))
+        frame.attrs["units"] = units
+        return frame
+
+    def to_xarray(self) -> "Dataset":
+        """Return the rows as a Dataset of xarray.
+
+        Returns
+        -------
+        xarray.Dataset
+            The variables `omega` and `velocity` with the dimensions `time` and `axis`, `attitude`
+            with `time` and `component`, and `recorded_time` and `ier` with `time`. Variables
+            without values are left out, and so is `recorded_time` if it is the same as `time`. Each
+            variable has the attributes `units` and `long_name`. The attributes of the dataset say
+            how the integration ended, with its estimates of the error.
+
+        Raises
+        ------
+        InputError
+            If xarray is not installed.
+
+        Examples
+        --------
+        >>> from pyharness import case_scene, solve
+        >>> data = solve(case_scene(1), [1.0, 2.0]).to_xarray()
+        >>> float(data.omega.sel(time=2.0, axis=1)), data.omega.units
+        (6.0, 'rad/s')
+        """
+        check_package("xarray", "to_xarray", "pip install xarray")
+        from xarray import Dataset
+
+        coordinates: dict[str, Any] = {
+            "time": ("time", self.time.copy(), {"units": "s", "long_name": "time"}),
+            "axis": ("axis", [1, 2, 3], {"long_name": "number of the body axis"}),
+        }
+        variables: dict[str, Any] = {}
+        for each in self._quantities():
+            dimensions: tuple[str, ...] = ("time",)
+            if each.name == "attitude":
+                names = list(each.columns)
+                about = {"long_name": "component of the quaternion, scalar first"}
+                coordinates["component"] = ("component", names, about)
+                dimensions += ("component",)
+            elif len(each.columns) > 1:
+                dimensions += ("axis",)
+            attributes = {"units": each.unit, "long_name": each.long_name}
+            variables[each.name] = (dimensions, each.values.copy(), attributes)
+        described = ("ended", "steps", "evaluations", "error", "growth", "tolerance")
+        facts = {} if self.scene is None else {"title": self.scene.name}
+        facts |= {name: getattr(self, name) for name in described}
+        known = {name: value for name, value in facts.items() if value is not None}
+        return Dataset(variables, coordinates, known)
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw the three components of omega over time with matplotlib.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            The diagram in which to draw. By default a new figure with one diagram is made.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The diagram, with a legend and with units at its axes. Its lines are in ascending order
+            of time.
+
+        Raises
+        ------
+        InputError
+            If matplotlib is not installed, or if `ax` is no Axes.
+
+        Examples
+        --------
+        >>> from pyharness import case_scene, solve
+        >>> ax = solve(case_scene(1), [1.0, 2.0]).plot()  # doctest: +SKIP
+        >>> ax.get_ylabel()  # doctest: +SKIP
+        'angular velocity (rad/s)'
+        """
+        check_package("matplotlib", "plot", install_command("plots"))
+        from matplotlib.axes import Axes
+
+        if ax is None:
+            from matplotlib import pyplot
+
+            _, ax = pyplot.subplots()
+        elif not isinstance(ax, Axes):
+            raise InputError(f"plot: ax is {kind_of(ax)}; allowed: an Axes of matplotlib, or none")
+        order = np.argsort(self.time, kind="stable")
+        marker = "o" if len(order) == 1 else ""
+        for axis in range(3):
+            label = rf"$\omega_{axis + 1}$"
+            ax.plot(self.time[order], self.omega[order, axis], marker=marker, label=label)
+        ax.set_xlabel("time (s)")
+        ax.set_ylabel("angular velocity (rad/s)")
+        ax.legend()
+        return ax
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
+
+        Every number of the restored trajectory is bit-for-bit identical, and so are the results of
+        its methods. The file is either written completely or not at all. Its format is that of
+        `numpy.savez`: arrays with the names of the attributes, the text `scene` of a scene file,
+        and the text `header` with the other attributes in JSON. A torque that was recorded from a
+        function is in the header too, as a list of operations.
+
+        Parameters
+        ----------
+        path : str or path
+            The path of the file, usually with the suffix ``.npz``. A file that exists is replaced.
+
+        Raises
+        ------
+        InputError
+            If the file can't be written, if the torque is opaque, or if the trajectory is of a
+            program that ran in another arithmetic than binary64.
+
+        Examples
+        --------
+        >>> from pyharness import case_scene, load, solve
+        >>> solve(case_scene(1), [1.0, 2.0]).save("case-1.npz")  # doctest: +SKIP
+        >>> load("case-1.npz").omega[-1]  # doctest: +SKIP
+        array([6., 6., 6.])
+        """
+        from pyharness.model.trajectory_file import save
+
+        save(cast("Trajectory", self), path)
+
+    def _repr_html_(self) -> str:
+        """Return a short table of the trajectory as HTML, which notebooks show."""
+        facts = {
+            "ended": self.message,
+            "rows": str(len(self.time)),
+            "work": f"{counted(self.steps, 'step')}, "
+            f"{counted(self.evaluations, 'evaluation')} of the right-hand side",
+        }
+        if self.error is not None and self.digits is not None:
+            facts["estimated error"] = f"{short(self.error)} of the largest |omega|"
+            facts["correct digits"] = f"{self.digits:.1f}"
+        if self.growth is not None:
+            facts["error amplification"] = short(self.growth)
+        title = "Trajectory" if self.scene is None else f"Trajectory of {self.scene.name}"
+        lines = [f"<table><caption>{escape(title)}</caption><tbody>"]
+        lines += [
+            f'<tr><th scope="row" style="text-align: left">{escape(name)}</th>'
+            f'<td style="text-align: left">{escape(text)}</td></tr>'
+            for name, text in facts.items()
+        ]
+        return "\n".join([*lines, "</tbody></table>", *self._html_rows()])
+
+    def _html_rows(self) -> list[str]:
+        """Return lines of HTML with a table of the first and the last rows."""
+        count = len(self.time)
+        if not count:
+            return []
+        quantities = [each for each in self._quantities() if each.name != "ier"]
+        heads = ["time (s)"]
+        for each in quantities:
+            unit = "" if each.unit == "1" else f" ({each.unit})"
+            heads += [f"{name}{unit}" for name in each.columns]
+        parts = [self.time, *(each.values for each in quantities)]
+        cells = "".join(f'<th scope="col">{escape(head)}</th>' for head in heads)
+        lines = [f"<table><thead><tr>{cells}</tr></thead><tbody>"]
+        kept = list(range(count))
+        if count > 2 * _SHOWN + 1:
+            kept = [*range(_SHOWN), -1, *range(count - _SHOWN, count)]
+        for row in kept:
+            values = np.concatenate([np.atleast_1d(part[row]) for part in parts]).tolist()
+            texts = ["..."] * len(heads) if row < 0 else [f"{value:.6g}" for value in values]
+            lines.append(f"<tr>{''.join(f'<td>{text}</td>' for text in texts)}</tr>")
+        return [*lines, "</tbody></table>"]
+
+    def _quantities(self) -> list[_Quantity]:
+        """Return the quantities of the rows that have values, except the time."""
+        about = "angular velocity about the body axes"
+        names = tuple(f"omega{axis}" for axis in (1, 2, 3))
+        found = [_Quantity("omega", about, "rad/s", names, self.omega)]
+        if self.velocity is not None:
+            about = "translational velocity along the body axes"
+            names = tuple(f"velocity{axis}" for axis in (1, 2, 3))
+            found.append(_Quantity("velocity", about, "m/s", names, self.velocity))
+        if self.attitude is not None:
+            about = "quaternion from body to space"
+            names = tuple(f"q{component}" for component in range(4))
+            found.append(_Quantity("attitude", about, "1", names, self.attitude))
+        if not np.array_equal(self.recorded_time, self.time, equal_nan=True):
+            name, about = "recorded_time", "time in the output file of the program"
+            found.append(_Quantity(name, about, "s", (name,), self.recorded_time))
+        if self.ier is not None:
+            about = "error code of the linear solver"
+            found.append(_Quantity("ier", about, "1", ("ier",), self.ier))
+        return found

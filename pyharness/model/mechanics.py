@@ -1,0 +1,221 @@
+"""The mechanical quantities of a trajectory: angular momentum, energy, power and work."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pyharness.model.array_type import Array
+from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.torque_law import FRAMES, TorqueLaw
+from pyharness.model.values import Triple
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+    from pyharness.model.scene import Scene
+
+
+class Mechanics:
+    """A base class of trajectories, with the quantities that follow from omega and the body."""
+
+    time: Array
+    omega: Array
+    attitude: Array | None
+    moments: Triple | ChangingMoments | ChangingInertia | None
+    axes: Array | None
+    scene: "Scene | None"
+
+    def rotation(self) -> "Rotation":
+        """Return the attitudes as SciPy rotations, which rotate vectors from body to space.
+
+        Returns
+        -------
+        scipy.spatial.transform.Rotation
+            One rotation for each row (time) of the trajectory.
+
+        Raises
+        ------
+        InputError
+            If the attitude was not requested.
+        """
+        from scipy.spatial.transform import Rotation
+
+        return Rotation.from_quat(self._attitudes()[:, [1, 2, 3, 0]])
+
+    def angular_momentum(self, frame: str = "body") -> Array:
+        """Return the angular momentum in each of n rows, about the axes of the body or of space.
+
+        An inertia that changes with time is that at the time of the row.
+
+        Parameters
+        ----------
+        frame : {"body", "space"}
+            The axes of the components.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            The angular momentum, kg m2/s.
+
+        Raises
+        ------
+        InputError
+            If the body was specified without moments of inertia. Also for an unknown frame, or the
+            axes of space if the attitude was not requested.
+        """
+        if frame not in FRAMES:
+            raise unknown("frame", str(frame), FRAMES)
+        momentum = self._momentum(self.omega)
+        return momentum if frame == "body" else turned_to_space(self._attitudes(), momentum)
+
+    def energy(self) -> Array:
+        """Return the kinetic energy of the rotation in each of the n rows of the trajectory.
+
+        An inertia that changes with time is that at the time of the row.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            The energy, J.
+
+        Raises
+        ------
+        InputError
+            If the body was specified without moments of inertia.
+        """
+        energy: Array = 0.5 * (self.omega * self._momentum(self.omega)).sum(axis=1)
+        return energy
+
+    def power(self) -> Array:
+        """Return the power of the torque in each of the n rows of the trajectory.
+
+        The power is the scalar product of the torque and omega. It is positive while the torque
+        increases the kinetic energy of the body.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            The power, W. It is NaN where the torque is singular.
+
+        Raises
+        ------
+        InputError
+            If the body was specified without moments of inertia, or if the trajectory is not a
+            result of the function `solve`.
+
+        References
+        ----------
+        H. Goldstein, C. Poole and J. Safko, Classical Mechanics, 3rd edition, 2002, section 5.3.
+
+        Examples
+        --------
+        >>> from pyharness import Scene, solve
+        >>> from pyharness.torques import damping
+        >>> scene = Scene("damped", (0, 0, 2), moments=(3, 2, 1), torque=damping(0.5))
+        >>> solve(scene, [0.0, 2.0]).power().round(6)
+        array([-2.      , -0.270671])
+        """
+        self._checked_moments()
+        torque = self._scene_of_solve().torque
+        if isinstance(torque, TorqueLaw):
+            values = np.array([torque.at(time) for time in self.time.tolist()]).reshape(-1, 3)
+            along = torque.in_space
+            omega = turned_to_space(self._attitudes(), self.omega) if along else self.omega
+        else:
+            # A torque that does not depend on the attitude accepts any.
+            needed = torque.needs_attitude
+            attitudes = self._attitudes() if needed else np.eye(4)[[0] * len(self.time)]
+            rows = zip(self.time.tolist(), self.omega.tolist(), attitudes.tolist(), strict=True)
+            values = np.array([torque.at(*row) for row in rows]).reshape(-1, 3)
+            omega = self.omega
+        power: Array = (values * omega).sum(axis=1)
+        return power
+
+    def work(self) -> Array:
+        """Return the work that the torque has done on the body from time 0 to each of the n rows.
+
+        The work is the change of the kinetic energy since time 0. At negative times it has the
+        opposite sign of the work from that time until time 0. The wheels of the ready term `wheels`
+        are no part of the body; the energy of their motors is therefore not included.
+
+        The work is computed as (omega - omega0) . I (omega + omega0) / 2, where I is the inertia
+        and omega0 is omega at time 0. Unlike a difference of two energies, this product loses no
+        digits to rounding where all components of omega have changed little. Its error is then that
+        of omega, multiplied by the angular momentum.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            The work, J.
+
+        Raises
+        ------
+        InputError
+            If the body was specified without moments of inertia, if the inertia changes with time,
+            or if the trajectory is not a result of the function `solve`.
+
+        References
+        ----------
+        H. Goldstein, C. Poole and J. Safko, Classical Mechanics, 3rd edition, 2002, sections 1.1
+        and 5.3.
+
+        Examples
+        --------
+        >>> from pyharness import Scene, solve
+        >>> from pyharness.torques import damping
+        >>> scene = Scene("damped", (0, 0, 2), moments=(3, 2, 1), torque=damping(0.5))
+        >>> solve(scene, [0.0, 2.0]).work().round(6)
+        array([ 0.      , -1.729329])
+        """
+        if isinstance(self._checked_moments(), Changing):
+            # The forces that change the inertia change the kinetic energy too.
+            raise InputError(
+                "work: the inertia changes with time; allowed: a constant inertia; `power` is "
+                "available for both"
+            )
+        start = np.array(self._scene_of_solve().omega)
+        work: Array = 0.5 * ((self.omega - start) * self._momentum(self.omega + start)).sum(axis=1)
+        return work
+
+    def _momentum(self, omega: Array) -> Array:
+        """Return the product of the inertia (kg m2) and each row of `omega` (rad/s)."""
+        moments = self._checked_moments()
+        if isinstance(moments, Changing):
+            return moments.momentum(self.time, omega)
+        axes = np.eye(3) if self.axes is None else self.axes
+        # The rounding of a matrix product may depend on the order of the elements in memory, which
+        # a file does not preserve in full.
+        ordered = np.ascontiguousarray(omega)
+        momentum: Array = ((ordered @ axes) * np.array(moments)) @ axes.T
+        return momentum
+
+    def _checked_moments(self) -> Triple | ChangingMoments | ChangingInertia:
+        if self.moments is None:
+            raise InputError(
+                "the body is given by coefficients, and the result needs its moments; give moments"
+            )
+        return self.moments
+
+    def _scene_of_solve(self) -> "Scene":
+        if self.scene is None:
+            raise InputError(
+                "the trajectory has no scene; allowed: a trajectory that solve has returned"
+            )
+        return self.scene
+
+    def _attitudes(self) -> Array:
+        if self.attitude is None:
+            raise InputError("the trajectory has no attitude; request it with attitude=True")
+        return self.attitude
+
+
+def turned_to_space(attitude: Array, vectors: Array) -> Array:
+    """Transform n vectors from body-axis components to components along the axes of space.
+
+    `attitude` has a unit quaternion, from body to space, for each vector, shape (n, 4). `vectors`
+    and the result have the shape (n, 3).
+    """
+    scalar, vector = attitude[:, :1], attitude[:, 1:]
+    twice = 2.0 * np.cross(vector, vectors)
+    return vectors + scalar * twice + np.cross(vector, twice)

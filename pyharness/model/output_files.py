@@ -1,0 +1,175 @@
+"""Writing of output files, each either completely or not at all."""
+
+import os
+import signal
+from contextlib import suppress
+from pathlib import Path
+from threading import current_thread, main_thread
+from typing import Self
+
+from pyharness.model.errors import InputError
+from pyharness.model.pipes import write_waiting
+
+
+def check_writable(path: str, option: str) -> None:
+    """Raise InputError if no file can be written at the path `path`.
+
+    The error message names `option`, the option that gave the path. Callers make this check before
+    any computation.
+    """
+    try:
+        # A link is followed to its target, as in an ordinary write.
+        target = Path(os.path.realpath(path)) if "\0" not in path else Path()
+        folder = target.parent
+        if "\0" in path:
+            reason = "a path has no null character"
+        elif not path:
+            reason = "a name is missing"
+        elif target.is_dir():
+            reason = "is a folder"
+        elif target.is_symlink():
+            reason = "is a link that leads back to itself"
+        elif _is_special(path):
+            if os.access(path, os.W_OK):
+                return
+            reason = "permission denied"
+        elif not folder.is_dir():
+            reason = f"there is no folder '{folder}'"
+        elif not os.access(folder, os.W_OK) or (target.exists() and not os.access(target, os.W_OK)):
+            reason = "permission denied"
+        else:
+            # A temporary file is written, because permissions do not show that a file system, such
+            # as /proc, accepts no file.
+            probe = _File(path)
+            try:
+                probe.write(b"")
+            finally:
+                _remove([probe.new])
+            return
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+    raise InputError(f"{option} '{path}': {reason}; give a file in a folder that can be written")
+
+
+def write_files(contents: dict[str, bytes], option: str) -> None:
+    """Write several files, either all or none.
+
+    `contents` has the content of each file by its path. The files are first written under temporary
+    names, and then all are renamed. After any failure or interrupt, Ctrl-C included, the previous
+    files are restored. A path that is a special file (a device, a pipe) is written to before the
+    other files, and is never replaced. Raise InputError, which names `option`, the option that gave
+    the paths, if a file can't be written.
+    """
+    path = ""
+    try:
+        for path, content in contents.items():
+            if _is_special(path):
+                write_waiting(path, content)
+        with DeferredInterrupt() as patience:
+            files = [_File(path) for path in contents if not _is_special(path)]
+            try:
+                for file in files:
+                    path = file.path
+                    file.write(contents[path])
+                    patience.check()
+                # A single rename is atomic and needs no copy of the old file.
+                for file in files if len(files) > 1 else ():
+                    path = file.path
+                    file.keep()
+                for file in files:
+                    path = file.path
+                    file.place()
+            except BaseException:
+                for file in files:
+                    file.undo()
+                raise
+            finally:
+                _remove([name for file in files for name in (file.new, file.old)])
+    except OSError as error:
+        raise InputError(f"{option} '{path}': {error.strerror or error}") from None
+
+
+class DeferredInterrupt:
+    """A context manager that defers Ctrl-C, which could otherwise leave temporary files behind."""
+
+    def __enter__(self) -> Self:
+        """Install a signal handler that only records an interrupt by Ctrl-C."""
+        self._came = False
+        self._before = signal.getsignal(signal.SIGINT)
+        # Python raises KeyboardInterrupt in the main thread alone.
+        self._holds = callable(self._before) and current_thread() is main_thread()
+        if self._holds:
+            signal.signal(signal.SIGINT, self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Restore the previous signal handler, and call it if Ctrl-C was pressed in between."""
+        if self._holds:
+            signal.signal(signal.SIGINT, self._before)
+        if self._came and callable(self._before):
+            self._before(signal.SIGINT, None)
+
+    def check(self) -> None:
+        """Raise KeyboardInterrupt if Ctrl-C was pressed since the context was entered."""
+        if self._came:
+            raise KeyboardInterrupt
+
+    def _note(self, *_: object) -> None:
+        self._came = True
+
+
+class _File:
+    """A file that is being written to a temporary path and is then renamed.
+
+    `target` is its final path, `new` the temporary path of the new content, and `old` the path of a
+    copy of the previous content.
+    """
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        # A link is followed to its target, as in an ordinary write. The temporary files are in the
+        # target's folder, as a rename works only within a file system.
+        self.target = os.path.realpath(path)
+        beside = os.path.join(os.path.dirname(self.target), f".pyharness-{os.urandom(8).hex()}")
+        self.new, self.old = f"{beside}-new", f"{beside}-old"
+        self.written = False
+        self.existed = os.path.lexists(self.target)
+
+    def write(self, content: bytes) -> None:
+        with open(self.new, "xb") as file:
+            file.write(content)
+        self.written = True
+
+    def keep(self) -> None:
+        if self.existed:
+            try:
+                os.link(self.target, self.old)
+            except OSError:  # a file system without links
+                import shutil
+
+                shutil.copy2(self.target, self.old)
+
+    def place(self) -> None:
+        os.replace(self.new, self.target)
+
+    def undo(self) -> None:
+        if not self.written or os.path.lexists(self.new):
+            return
+        if os.path.lexists(self.old):
+            try:
+                os.replace(self.old, self.target)
+            except OSError:
+                self.old = self.new  # keep the copy rather than lose the old content
+        elif not self.existed:
+            _remove([self.target])
+
+
+def _remove(names: list[str]) -> None:
+    for name in names:
+        with suppress(OSError):
+            os.unlink(name)
+
+
+def _is_special(path: str) -> bool:
+    """Return whether a path exists and is a device, a pipe or a folder, not an ordinary file."""
+    return Path(path).exists() and not Path(path).is_file()

@@ -1,0 +1,98 @@
+"""The attributes of a trajectory under the names of SciPy's `solve_ivp`."""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pyharness.model.array_type import Array
+from pyharness.model.report import counted, short
+
+if TYPE_CHECKING:
+    from pyharness.model.trajectory import Stop
+
+
+class SciPyNames:
+    """A base class of trajectories, with the names that results of `solve_ivp` have in SciPy."""
+
+    time: Array
+    omega: Array
+    attitude: Array | None
+    evaluations: int
+    ended: str
+    stop: "Stop | None"
+    growth: float | None
+
+    if TYPE_CHECKING:
+
+        @property
+        def digits(self) -> float | None:
+            """The number of correct decimal digits of omega."""
+
+        @property
+        def has_all_rows(self) -> bool:
+            """Whether all requested rows are present."""
+
+    @property
+    def t(self) -> Array:
+        """The times of the rows (s), shape (n,), which is the attribute `time`.
+
+        A result of SciPy's `solve_ivp` has its times in an attribute of this name.
+        """
+        return self.time
+
+    @property
+    def y(self) -> Array:
+        """The state with one column for each time, as in a result of SciPy's `solve_ivp`.
+
+        Without an attitude it is omega (rad/s), shape (3, n), and a view of the attribute `omega`.
+        With an attitude it is a new array, shape (7, n): omega, and then the four components of the
+        quaternion, scalar first.
+        """
+        if self.attitude is None:
+            return self.omega.T
+        return np.concatenate([self.omega.T, self.attitude.T])
+
+    @property
+    def success(self) -> bool:
+        """Whether the integration reached all requested times, as `has_all_rows`."""
+        return self.has_all_rows
+
+    @property
+    def status(self) -> int:
+        """The ending of the integration as a number, with the meaning that it has in SciPy.
+
+        It is 0 if the integration reached all requested times, and -1 if it ended before. The
+        attribute `ended` has the reason.
+        """
+        return 0 if self.has_all_rows else -1
+
+    @property
+    def message(self) -> str:
+        """A sentence that says how the integration ended.
+
+        The same information is in the attributes `ended`, `stop`, `growth` and `digits`.
+        """
+        if self.stop is not None:
+            return (
+                f"The Lipschitz test ended the run at step {self.stop.step}, because the Lipschitz "
+                f"quotient of {self.stop.variable} was {short(self.stop.quotient)} 1/s."
+            )
+        if self.ended == "overflow":
+            return "Omega overflowed; the rows end before the first omega that is not finite."
+        if self.ended != "sensitive":
+            return "The integration reached all requested times."
+        by = "" if self.growth is None else f", amplified by {short(self.growth)},"
+        left = counted(math.floor(self.digits or 0.0), "correct digit")
+        return (
+            f"The integration reached all requested times, but rounding errors{by} exceed the "
+            f"tolerance; omega has {left}."
+        )
+
+    @property
+    def nfev(self) -> int:
+        """The number of evaluations of the right-hand side, which is the attribute `evaluations`.
+
+        A result of SciPy's `solve_ivp` has this number in an attribute of this name.
+        """
+        return self.evaluations

@@ -1,0 +1,123 @@
+"""Writing of trajectories to files. `pyharness.dynamics.trajectory_reader` reads them.
+
+A file is a ZIP archive of arrays in NumPy's format, as `numpy.savez` writes it. The array `header`
+is a JSON text with the attributes that are no arrays, and with the schema number. The array `scene`
+is the text of a scene file.
+"""
+
+import io
+import json
+import os
+import zipfile
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
+from pyharness.model.errors import InputError, kind_of
+from pyharness.model.output_files import check_writable, write_files
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import scene_text
+from pyharness.model.schema import SCHEMAS
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.tape_record import tape_record
+from pyharness.model.torque_law import TorqueLaw
+
+if TYPE_CHECKING:
+    from pyharness.model.trajectory import Trajectory
+
+KIND = "pyharness trajectory"  # in the header of each file
+TEXTS = ("header", "scene")
+# For each array the kind of its numbers, and the shape of a row.
+ROWS: dict[str, tuple[str, tuple[int, ...]]] = {
+    "time": ("f8", ()),
+    "recorded_time": ("f8", ()),
+    "omega": ("f8", (3,)),
+    "velocity": ("f8", (3,)),
+    "attitude": ("f8", (4,)),
+    "ier": ("i4", ()),
+}
+AXES = "axes"  # an array without rows, shape (3, 3)
+_TAPED = "The torque was recorded from a function. Its operations are in the header."
+
+
+def checked_path(path: object) -> str:
+    """Return the path of a trajectory file as text; raise InputError if it is no path."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise InputError(f"trajectory file: {kind_of(path)}; allowed: a path, as text or a Path")
+    return os.fsdecode(path)
+
+
+def save(found: "Trajectory", path: str | os.PathLike[str]) -> None:
+    """Write a trajectory to the file `path`, as `Trajectory.save` describes it."""
+    name = checked_path(path)
+    check_writable(name, "trajectory file")
+    write_files({name: file_content(found)}, "trajectory file")
+
+
+def file_content(found: "Trajectory") -> bytes:
+    """Return the bytes of the file of a trajectory; they depend on the trajectory alone."""
+    if found.exact is not None:
+        raise InputError(
+            "the trajectory has numbers in another arithmetic than binary64, which can't be "
+            "written to a file; allowed: a trajectory in binary64"
+        )
+    header: dict[str, Any] = {"kind": KIND, "schema": SCHEMAS["trajectory file"]}
+    header |= {name: getattr(found, name) for name in ("ended", "error", "growth", "tolerance")}
+    header |= {name: int(getattr(found, name)) for name in ("steps", "evaluations")}
+    header["stop"] = None if found.stop is None else asdict(found.stop)
+    header["moments"] = _moments_record(found.moments)
+    header["scene"] = None
+    arrays: dict[str, Any] = {}
+    if found.scene is not None:
+        header["scene"], arrays["scene"] = _scene_record(found.scene)
+    arrays["header"] = json.dumps(header)
+    for name, (kind, _) in ROWS.items():
+        # For methods, the recorded time is the time itself.
+        if name != "recorded_time" or found.recorded_time is not found.time:
+            value = getattr(found, name)
+            arrays |= {} if value is None else {name: np.asarray(value, kind)}
+    if found.axes is not None:
+        arrays[AXES] = found.axes
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, array in arrays.items():
+            # An entry without a date has the same bytes in every run.
+            with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, np.asanyarray(array), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def _moments_record(moments: Any) -> Any:
+    """Return the moments of a trajectory for JSON: None, a list, or a dictionary of polynomials."""
+    if isinstance(moments, ChangingMoments):
+        return {moments.place: moments.polynomials}
+    if isinstance(moments, ChangingInertia):
+        return {moments.place: moments.matrices}
+    assert not isinstance(moments, Changing)
+    return moments
+
+
+def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
+    """Return the values of a scene that no scene file has, for JSON, and the text of its file."""
+    record: dict[str, Any] = {
+        "masses": scene.masses,
+        "forces": scene.forces,
+        "case": scene.case,
+        "moments_low": scene.moments_low if any(scene.moments_low) else None,
+        "torque": None,
+    }
+    torque = scene.torque
+    if isinstance(torque, StateTorque) and torque.tape is None:
+        raise InputError(
+            "[torque]: an opaque function can't be written to a file; allowed: a torque that can "
+            "be recorded, or dataclasses.replace(trajectory, scene=None) to save the rows alone"
+        )
+    try:
+        return record, scene_text(scene)
+    except InputError:
+        if not isinstance(torque, StateTorque) or torque.tape is None:
+            raise
+        record["torque"] = tape_record(torque.tape)
+        return record, scene_text(replace(scene, torque=TorqueLaw()), [_TAPED])

@@ -27,9 +27,9 @@ module tape_march
   real(dp), parameter :: LEAST_SCALE = 2.0_dp**(-500)
   integer, parameter :: ROWS_BETWEEN_LOOKS = 2**17
   ! Largest difference of a derivative and that of its series at the end of a step, times the step,
-  ! over the local tolerance and the rounding errors. A series that converges as its last terms
-  ! promise stays far below.
+  ! over the local tolerance, and over the rounding errors at the beginning of the step.
   real(dp), parameter :: MOST_DEFECT = 4.0_dp
+  real(dp), parameter :: MOST_ROUNDING = 1e3_dp
 
   ! One integration of a request.
   type, public :: attempt_t
@@ -347,8 +347,8 @@ contains
     end subroutine estimate_truncation
 
     logical function is_continued()
-      !! Return whether the series continue beyond the end of the step: whether the derivatives there
-      !! are those of the series. A pulse within the step may be too small to be seen at its
+      !! Return whether the series continue beyond the end of the step: whether the derivatives
+      !! there are those of the series. A pulse within the step may be too small to be seen at its
       !! beginning. The change of the unknowns is computed too.
       real(dp) :: derivatives(tape%n_unknowns), slope(tape%n_unknowns)
       real(dp) :: size_of_terms, rounded, allowed
@@ -369,7 +369,7 @@ contains
         rounded = max(rounded, weights(i)*(size_of_terms + noise(i)*abs(factor*s%h)))
       end do
       call derivatives_at(tape, t_next, y + (change + y_low), -s%h, s, derivatives)
-      allowed = MOST_DEFECT*(local_tolerance + epsilon(rounded)*rounded)
+      allowed = MOST_DEFECT*local_tolerance + MOST_ROUNDING*epsilon(rounded)*rounded
       ! NaN is not allowed.
       is_continued = all(weights*abs(factor*s%h*derivatives - slope) <= allowed)
     end function is_continued

@@ -86,6 +86,8 @@ contains
           call limit(first, WITHIN_CIRCLE*a(0, first))
         case (SINE_COSINE)
           if (any(is_squared(out:out + 1))) call limit(first, ANGLE_OF_ORDER*order)
+        case default
+          cycle
         end select
       end associate
     end do

@@ -1,8 +1,4 @@
-"""The loop of all measurements: prepare the calls of a task, time them in turn, and note the times.
-
-In each of several rounds, a batch of each call is timed in turn, so that other work of the machine
-affects all calls alike.
-"""
+"""The loop of all measurements: the calls of a task are prepared and then timed in turn."""
 
 import statistics
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -17,11 +13,10 @@ Say = Callable[[str], None]  # receives the current part of a task
 
 
 class Task(Protocol):
-    """A task of a benchmark, such as a scene to be integrated to an end time."""
+    """A task of a benchmark, such as a scene and an end time, with its name in messages."""
 
     @property
-    def place(self) -> str:
-        """Return the name of the task in messages."""
+    def place(self) -> str: ...  # noqa: D102
 
 
 _Task = TypeVar("_Task", bound=Task)
@@ -45,10 +40,10 @@ def timed(
     statistic: Callable[[Sequence[float]], float] = statistics.median,
     slow: float = SLOW,
 ) -> Iterator[_Row]:
-    """Yield the rows of all tasks: for each task, the calls that `calls` prepares are timed.
+    """Yield the rows of the results: for each task, `calls` prepares the calls, which are timed.
 
-    `progress` is called with a message before each part of the work. `length`, `rounds`,
-    `statistic` and `slow` are those of `pyharness.compare.timing.seconds`.
+    `progress` is called with a message before each part of the work. The last four parameters are
+    those of `pyharness.compare.timing.seconds`.
     """
     for number, task in enumerate(tasks):
 
@@ -56,8 +51,8 @@ def timed(
             progress(number, len(tasks), f"{place}: {text}")
 
         found = list(calls(task, say))
-        due = [(each.run, each.clock) for each in found if each.run]
-        runs, clocks = [run for run, _ in due], [clock for _, clock in due]
+        runs = [each.run for each in found if each.run]
+        clocks = [each.clock for each in found if each.run]
         times = iter(seconds(runs, length, rounds, say, statistic, clocks, slow))
         for each in found:
             yield each.row(seconds=next(times) if each.run else None)

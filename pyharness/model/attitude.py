@@ -7,6 +7,8 @@ q' = q (0, omega)/2, and is integrated. Angles and matrices are only other forms
 """
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -75,6 +77,20 @@ def product(p: Quaternion, q: Quaternion) -> Quaternion:
         a * g - b * h + c * e + d * f,
         a * h + b * g - c * f + d * e,
     )
+
+
+def quaternion_rates(omega: Sequence[Any], q: Sequence[Any]) -> list[Any]:
+    """Return the rates of the attitude quaternion q, which satisfies q' = q (0, omega)/2.
+
+    `omega` (rad/s) and `q` are numbers, symbols of a recorded function, or other expressions.
+    """
+    (x, y, z), (a, b, c, d) = omega, q
+    return [
+        -0.5 * (b * x + c * y + d * z),
+        0.5 * (a * x + c * z - d * y),
+        0.5 * (a * y + d * x - b * z),
+        0.5 * (a * z + b * y - c * x),
+    ]
 
 
 def angles(attitude: Array, sequence: str) -> Array:

@@ -15,6 +15,7 @@ from unittest.mock import patch
 
 from pyharness import original
 from pyharness.checks.plants.faults import Fault
+from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
@@ -24,10 +25,7 @@ from pyharness.original.programs import PROGRAM_REGISTRY, Program
 class TwinFault(NamedTuple):
     """A fault in the Python version (the twin) of programs: a piece of its source, and another.
 
-    `right` occurs once in `file`, and `wrong` replaces it. In `wrong`, the word ``SIZE`` stands for
-    the size of the fault, by default `size`. `programs` are names of programs. `shows` has the
-    comparisons that detect the fault: with the ``bits`` of the compiled program, with the
-    ``truth``, or a kind of check.
+    The fields are the columns of the table `data/plants.toml`.
     """
 
     file: str
@@ -38,68 +36,8 @@ class TwinFault(NamedTuple):
     shows: str
 
 
-# Where the truth does not show a fault, it is of the size of rounding, or in the velocity, or it
-# leaves a method of the same order.
-_COLLOCATION, _ALL, _RK = "two-term four-term", "two-term four-term runge-kutta", "runge-kutta"
-_STEPS, _SLOPES = "runge_kutta.py", "equations.py"
-TWIN_FAULTS = {
-    "sign": TwinFault(_SLOPES, "m[2] + c * u[0]", "m[2] + (1.0 - SIZE) * c * u[0]", 2.0,
-                      "two-term", "bits truth"),
-    "sign of a slope": TwinFault(_STEPS, "r2 + b * u[2]", "r2 - b * u[2]", 1.0, _RK, "bits truth"),
-    "axis": TwinFault(_SLOPES, "m[1] + b * u[0] * u[2]", "m[1] + b * u[1] * u[2]", 1.0,
-                      "four-term", "bits truth"),
-    "step": TwinFault(_STEPS, "(dt / 6.0)", "((1.0 - SIZE) * dt / 6.0)", 0.5, _RK, "bits truth"),
-    "interval": TwinFault("collocation.py", "interval(state, points, h,",
-                          "interval(state, points, (1.0 - SIZE) * h,", 0.5,
-                          "four-term", "bits truth"),
-    "point": TwinFault("two_term.py", "2.0 * dt / 3.0", "(2.0 + SIZE) * dt / 3.0", 0.1,
-                       "two-term", "bits"),
-    "last place of a point": TwinFault("four_term.py", "dt * 0.6", "dt * 0.6000000000000001", 1.0,
-                                       "four-term", "bits"),
-    "last place of a weight": TwinFault(_STEPS, "(dt / 6.0)", "(dt / 6.000000000000001)", 1.0,
-                                        _RK, "bits"),
-    "sign of an acceleration": TwinFault(_SLOPES, "acceleration[0] + v[1]",
-                                         "acceleration[0] - v[1]", 1.0, "two-term", "bits"),
-    "order of summation": TwinFault(_STEPS, "k1 + 2.0 * (k2 + k3) + k4",
-                                    "k1 + (2.0 * (k2 + k3) + k4)", 1.0, _RK, "bits"),
-    "last of equal pivots": TwinFault("linear_solver.py", "if scaled > biggest",
-                                      "if scaled >= biggest", 1.0, "four-term", "bits"),
-    "another point": TwinFault("two_term.py", "2.0 * dt / 3.0]", "dt / 3.0]", 1.0,
-                               "two-term", "orders"),
-    "order of points": TwinFault("four_term.py", "dt * 0.6,", "dt * 0.4,", 1.0,
-                                 "four-term", "orders"),
-    "pivot": TwinFault("linear_solver.py", "if n + biggest == n:", "if n + biggest > n:", 1.0,
-                       "four-term", "orders"),
-    "coefficient": TwinFault(_SLOPES, "m[1] + b * u[0]", "m[1] + (1.0 + SIZE) * b * u[0]", 1e-9,
-                             _COLLOCATION, "schemes"),
-    "torque": TwinFault(_SLOPES, "m[0] + a * u[1]", "(1.0 + SIZE) * m[0] + a * u[1]", 1e-9,
-                        _COLLOCATION, "schemes"),
-    "coefficient b": TwinFault(_STEPS, "r2 + b * u[2]", "r2 + (1.0 + SIZE) * b * u[2]", 1e-9,
-                               _RK, "schemes"),
-    "torque of a slope": TwinFault(_STEPS, "[r1 + a", "[(1.0 + SIZE) * r1 + a", 1e-9,
-                                   _RK, "schemes"),
-    "acceleration": TwinFault(_SLOPES, "acceleration[1] + v[2]",
-                              "(1.0 + SIZE) * acceleration[1] + v[2]", 1e-9, _ALL, "schemes"),
-    "sign of a velocity": TwinFault(_SLOPES, "- v[1] * u[0]", "+ v[1] * u[0]", 1.0,
-                                    _ALL, "schemes"),
-    **{
-        f"{name} of the stop test": TwinFault(_STEPS, right, wrong, size, _RK, "stops")
-        for name, right, wrong, size in (
-            ("stage", "_distances(slope[4], slope[1])", "_distances(slope[3], slope[1])", 1.0),
-            ("point", "_distances(point[3], first_point)", "_distances(point[2], first_point)",
-             1.0),
-            ("result", "_distances(result, base)", "_distances(result, point[3])", 1.0),
-            ("order", "found[3:] + found[:3]", "found", 1.0),
-            ("variable", "found = [*zip(STOP_VARIABLES[:last]",
-             "found = [*zip(STOP_VARIABLES[last - 1 :: -1]", 1.0),
-            ("velocity", "last = 6 if velocity_counts else 3", "last = 3", 1.0),
-            ("norm", "_norm(change_k[:last])", "(1.0 - SIZE) * _norm(change_k[:last])", 1e-10),
-            ("constant", "> by * lipschitz", "> (1.0 + SIZE) * by * lipschitz", 1e-7),
-            ("square", "total = total + each * each", "total = total + abs(each)", 1.0),
-            ("step", "Stop(step + 1, *found)", "Stop(step, *found)", 1.0),
-        )
-    },
-}  # fmt: skip
+TWIN_FAULTS = {name: TwinFault(*row) for name, *row in facts("plants")["twin"]}
+"""The faults of the twins, by name."""
 
 _COUNT = itertools.count()
 

@@ -7,7 +7,7 @@ q' = q (0, omega)/2, and is integrated. Angles and matrices are only other forms
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -67,10 +67,12 @@ def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
     return q
 
 
-def product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Return Hamilton's product p q of two quaternions, scalar first."""
-    a, b, c, d = p
-    e, f, g, h = q
+def product(p: Iterable[Any], q: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
+    """Return Hamilton's product p q of two quaternions, scalar first.
+
+    The components may be numbers of any kind, or arrays.
+    """
+    (a, b, c, d), (e, f, g, h) = p, q
     return (
         a * e - b * f - c * g - d * h,
         a * f + b * e + c * h - d * g,

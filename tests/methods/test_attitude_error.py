@@ -14,6 +14,7 @@ import pytest
 from pyharness import Scene, prepare, solve
 from pyharness.model.trajectory import Array
 from pyharness.scenes.timed_kinds import SPINS, timed_scenes
+from tests.exact_attitude import times as hamilton
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 ROUNDING = 2.0**-53
@@ -42,20 +43,11 @@ def _angle_errors(scene: Scene, times: Array | list[float], attitudes: Array) ->
             spun = [mpmath.cos(half), 0, 0, 0]
             spun[1 + axis] = mpmath.sin(half)
             length = mpmath.sqrt(sum(mpmath.mpf(x) ** 2 for x in scene.attitude))
-            true = _product([mpmath.mpf(x) / length for x in scene.attitude], spun)
+            true = hamilton([mpmath.mpf(x) / length for x in scene.attitude], spun)
             back = [true[0], -true[1], -true[2], -true[3]]
-            apart = _product(back, [mpmath.mpf(float(x)) for x in attitude])
+            apart = hamilton(back, [mpmath.mpf(float(x)) for x in attitude])
             found.append(float(2 * mpmath.sqrt(sum(x**2 for x in apart[1:]))))
     return found
-
-
-def _product(p: list[mpmath.mpf], q: list[mpmath.mpf]) -> list[mpmath.mpf]:
-    return [
-        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
-        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
-        p[0] * q[2] + p[2] * q[0] + p[3] * q[1] - p[1] * q[3],
-        p[0] * q[3] + p[3] * q[0] + p[1] * q[2] - p[2] * q[1],
-    ]
 
 
 @pytest.mark.parametrize("kind", SPINS)

@@ -129,10 +129,8 @@ def turned_off(found: Trajectory, size: float, along: bool = False) -> Trajector
 
 
 def _turned(attitude: Array, axes: Array, size: float) -> Array:
-    x, y, z = math.sin(0.5 * size) * axes.T
-    a, b, c, d = attitude.T
-    turn = np.full(len(attitude), math.cos(0.5 * size)), x, y, z
-    result: Array = np.array(product((a, b, c, d), turn)).T  # type: ignore[arg-type]
+    turn = np.full(len(attitude), math.cos(0.5 * size)), *math.sin(0.5 * size) * axes.T
+    result: Array = np.array(product(attitude.T, turn)).T
     return result
 
 

@@ -4,7 +4,6 @@ It draws N random bodies of each kind, with initial conditions and times up to 1
 are compared with the series in integer arithmetic of `tests.exact_attitude`.
 """
 
-import math
 import random
 import sys
 
@@ -13,54 +12,8 @@ import numpy as np
 
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
+from pyharness.scenes.free_motions import KINDS, Motion, draw
 from tests.exact_attitude import DIGITS, exact
-
-Motion = tuple[list[float], list[float], list[float], float]
-
-KINDS = (
-    "generic",
-    "near symmetry",
-    "near separatrix",
-    "middle axis",
-    "any axis",
-    "flat",
-    "needle",
-    "symmetric",
-    "steady",
-    "sphere",
-)
-
-
-def draw(source: random.Random, kind: str, longest: float = 6.0) -> Motion:
-    """Return moments, omega, attitude and a time up to 10**`longest` s, with axes in any order."""
-    moments = [10 ** source.uniform(-0.5, 0.5) for _ in range(3)]
-    omega = [source.choice((-1, 1)) * 10 ** source.uniform(-1, 1) for _ in range(3)]
-    low, middle, high = sorted(range(3), key=lambda axis: moments[axis])
-    extreme = source.choice((low, high))
-    if kind == "near symmetry":
-        moments[extreme] = moments[middle] * (
-            1.0 + source.choice((-1, 1)) * 10 ** source.uniform(-15, -2)
-        )
-    elif kind == "near separatrix":
-        ratio = moments[high] * (moments[high] - moments[middle])
-        ratio /= moments[low] * (moments[middle] - moments[low])
-        omega[low] = math.copysign(omega[high] * math.sqrt(ratio), omega[low])
-        omega[low] *= 1.0 + source.choice((-1, 1)) * 10 ** source.uniform(-15, -1)
-    elif kind in ("middle axis", "any axis", "steady"):
-        along = middle if kind == "middle axis" else source.randrange(3)
-        for axis in {0, 1, 2} - {along}:
-            size = 0.0 if kind == "steady" else 10 ** source.uniform(-12, -1)
-            omega[axis] = math.copysign(size, omega[axis])
-    elif kind == "flat":
-        moments[high] = (moments[low] + moments[middle]) * (1.0 - 10 ** source.uniform(-16, -1))
-    elif kind == "needle":
-        moments[low] *= 10 ** source.uniform(-10, -1)
-    elif kind == "symmetric":
-        moments[extreme] = moments[middle]
-    elif kind == "sphere":
-        moments = [moments[0]] * 3
-    attitude = [source.gauss(0.0, 1.0) for _ in range(4)]
-    return moments, omega, attitude, source.choice((-1, 1)) * 10 ** source.uniform(-3, longest)
 
 
 def errors(motion: Motion) -> tuple[float, float]:

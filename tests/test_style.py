@@ -46,7 +46,7 @@ def test_expressions_are_found_in_prose_alone(
             "from pyharness.bench.random_loads import _LENGTHS",
             ["pyharness.bench.random_loads._LENGTHS"],
         ),
-        ("def f():\n    from tests.random_scenes import _draw", ["tests.random_scenes._draw"]),
+        ("def f():\n    from tests.attitude_errors import _draw", ["tests.attitude_errors._draw"]),
         ("from pyharness.bench._own import name", ["pyharness.bench._own._own"]),
         ("from pyharness.checks.judge import _own", []),
         ("from pyharness import _kernels", []),

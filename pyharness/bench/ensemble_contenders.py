@@ -11,6 +11,7 @@ from pyharness.methods.solve import solve
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
+from pyharness.scenes.random_scenes import text_generator
 from pyharness.truth.reference import exact_coefficients
 
 MOMENTS: Triple = (40.0, 30.0, 20.0)  # kg m2
@@ -111,7 +112,7 @@ def draw(seed: str, n: int) -> list[EnsembleLoad]:
     A load is a set of bodies to be solved in a benchmark. The bodies have the same initial omegas
     in both loads. The text `seed` determines the random numbers.
     """
-    source = np.random.default_rng([ord(letter) for letter in f"ensemble/{seed}"])
+    source = text_generator(f"ensemble/{seed}")
     omega0 = source.uniform(-_FASTEST, _FASTEST, (n, 3))
     torque = source.uniform(-_HARDEST, _HARDEST, (n, 3)) * np.array(MOMENTS)
     return [

@@ -8,7 +8,8 @@ time.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import partial
 from time import perf_counter, process_time
 
 import numpy as np
@@ -19,7 +20,8 @@ from pyharness.bench.ensemble_contenders import (
     EnsembleLoad,
     EnsembleMaker,
 )
-from pyharness.compare.timing import Clock, batch_seconds, seconds, silenced
+from pyharness.bench.loop import Call, Say, timed
+from pyharness.compare.timing import Clock, batch_seconds, silenced
 from pyharness.methods.plan import FINEST
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
@@ -35,7 +37,6 @@ _CALL, _LONG_CALL = 0.03, 0.5
 SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
 _BATCH = 0.02  # s; duration of the calls in a round
 _MOST_STEPS = 1 << 14
-Say = Callable[[str], None]  # receives the current part of a task
 
 
 @dataclass(frozen=True)
@@ -158,44 +159,32 @@ def measure_ensembles(
     the result. A call solves at least `least` bodies, if the load has as many.
     """
     found = Rates(seed, loads[0].n)
-    n_tasks, done = len(loads) * len(TARGETS) + 1, 0
+    tasks: list[_Task] = []
     for load in loads:
         sample = load.part(slice(0, SAMPLE))
         ends = sample.ends()
-        for target in (*TARGETS, None) if load is loads[-1] else TARGETS:
-            task = _Task(load, target, sample, ends)
+        targets = (*TARGETS, None) if load is loads[-1] else TARGETS
+        tasks += [_Task(load, target, sample, ends) for target in targets]
 
-            def say(text: str, done: int = done, place: str = task.place) -> None:
-                progress(done, n_tasks, f"{place}: {text}")
+    def calls(task: _Task, say: Say) -> Iterator[Call[Rate]]:
+        for each in filter(task.takes, contenders):
+            say(each.name)
+            with silenced():
+                setting = task.setting(each)
+                if setting is None:
+                    found.refused.append((task.place, each.name, "no setting reaches it"))
+                    continue
+                shown = None if each.setting == "none" else setting
+                for threads in each.threads:
+                    load, run = _enough(each.prepare, task.load, setting, threads, least)
+                    row = partial(
+                        Rate, load.name, task.target, each.name, threads, shown, load.n,
+                        error=task.error(run()),
+                    )  # fmt: skip
+                    yield Call(run, clock_of(threads), row)
 
-            found.rows.extend(_rates(task, contenders, found, say, least))
-            done += 1
+    found.rows.extend(timed(tasks, calls, progress, _BATCH, ROUNDS, min, SLOW))
     return found
-
-
-def _rates(
-    task: _Task, contenders: Sequence[EnsembleContender], found: Rates, say: Say, least: int
-) -> Iterator[Rate]:
-    ready: list[tuple[Rate, Callable[[], Array]]] = []
-    for each in filter(task.takes, contenders):
-        say(each.name)
-        with silenced():
-            setting = task.setting(each)
-            if setting is None:
-                found.refused.append((task.place, each.name, "no setting reaches it"))
-                continue
-            shown = None if each.setting == "none" else setting
-            for threads in each.threads:
-                load, run = _enough(each.prepare, task.load, setting, threads, least)
-                rate = Rate(load.name, task.target, each.name, threads, shown, load.n, 0.0,
-                            task.error(run()))  # fmt: skip
-                ready.append((rate, run))
-    times = seconds(
-        [run for _, run in ready], _BATCH, ROUNDS, say, min,
-        [clock_of(rate.threads) for rate, _ in ready], SLOW,
-    )  # fmt: skip
-    for (rate, _), best in zip(ready, times, strict=True):
-        yield replace(rate, seconds=best)
 
 
 def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:

@@ -5,6 +5,7 @@ from typing import Any
 
 from pyharness.bench import compiled_peers as compiled
 from pyharness.dynamics.system import system_of
+from pyharness.model.attitude import quaternion_rates
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
@@ -56,13 +57,7 @@ def _by_formula(scene: Scene, formula: Formula, state: Sequence[Any]) -> list[An
         )
     ]  # fmt: skip
     if q:
-        a, b, c, d = q
-        found += [
-            -0.5 * (b * x + c * y + d * z),
-            0.5 * (a * x + c * z - d * y),
-            0.5 * (a * y + d * x - b * z),
-            0.5 * (a * z + b * y - c * x),
-        ]
+        found += quaternion_rates((x, y, z), q)
     return found
 
 

@@ -11,13 +11,15 @@ import math
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from time import perf_counter
 
 import numpy as np
 
 from pyharness.bench.contenders import Maker, SceneContender
+from pyharness.bench.loop import Call, Say, timed
 from pyharness.compare.candidates import End, Ready, not_finite
-from pyharness.compare.timing import Clock, ended_after, seconds, silenced
+from pyharness.compare.timing import Clock, ended_after, silenced
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
@@ -174,27 +176,24 @@ def measure(
     clock = clock or perf_counter
     found = Finding(list(loads), [], [], {}, {})
     makers: dict[tuple[int | str, str], Maker] = {}
-    for number, load in enumerate(loads, 1):
 
-        def tell(text: str, number: int = number, place: str = load.place) -> None:
-            progress(number - 1, len(loads), f"{place}: {text}")
-
-        tell("reference")
+    def calls(load: Workload, say: Say) -> Iterator[Call[Row]]:
+        say("reference")
         truth = load.truth or reference(load.scene, [load.horizon], precise=True)
         size = float(np.abs(truth.omega).max(initial=0.0)) or 1.0
         doubt = max(truth.estimate / size, truth.angle_estimate)
         found.doubt[load.label] = max(doubt, found.doubt.get(load.label, 0.0))
-        entries: list[tuple[Ready, Row]] = []
-        if load.kinds and load.label != loads[number - 2].label:
-            makers.clear()  # no such scene occurs again
+        place = load.scene.case or load.label
+        if load.kinds and not any(known == place for known, _ in makers):
+            makers.clear()  # the scenes before do not occur again
         for contender in contenders:
             if load.scene.attitude is not None and not contender.attitude:
                 found.refused.append(
                     Refusal(load, contender.name, None, "does not compute attitudes")
                 )
                 continue
-            tell(contender.name)
-            key = (load.scene.case or load.label, contender.name)
+            say(contender.name)
+            key = (place, contender.name)
             # The same compiled code is used for all end times of a scene.
             begin = clock()
             try:
@@ -206,13 +205,11 @@ def measure(
             spent = clock() - begin
             first, more = _first_calls(load, contender, makers[key], truth, found.refused, clock)
             found.preparation[key] = found.preparation.get(key, 0.0) + spent + more
-            entries += first
-        running = [ready.run for ready, row in entries if row.error is not None]
-        clocks = [clock] * len(running)
-        times = iter(seconds(running, _BATCH, _ROUNDS, tell, clocks=clocks))
-        for _, row in entries:
-            median = None if row.error is None else next(times)
-            found.rows.append(replace(row, seconds=median))
+            for ready, row in first:
+                run = None if row.error is None else ready.run
+                yield Call(run, clock, partial(replace, row))
+
+    found.rows.extend(timed(loads, calls, progress, _BATCH, _ROUNDS))
     return found
 
 

@@ -15,6 +15,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Triple
+from pyharness.scenes.random_scenes import text_generator
 from pyharness.truth.reference import reference
 
 HORIZONS = (10.0, 100.0)  # end times of a single body, s
@@ -124,7 +125,7 @@ def term_loads(scenes: Sequence[TermScene]) -> list[Workload]:
 
 def term_bodies(scenes: Sequence[TermScene], seed: str, n: int) -> list[TermBodies]:
     """Return the benchmark problems of `n` bodies; the text `seed` determines their omegas."""
-    source = np.random.default_rng([ord(letter) for letter in f"terms/{seed}"])
+    source = text_generator(f"terms/{seed}")
     omega0 = np.array(_OMEGA) + source.uniform(-_SPREAD, _SPREAD, (n, 3))
     return [TermBodies(each.scene.name, omega0, None, each.scene) for each in scenes]
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from pyharness.model.attitude import IDENTITY
+from pyharness.model.attitude import IDENTITY, quaternion_rates
 from pyharness.model.changing import Changing, ChangingMoments
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, of_law, replayed, torque_of
@@ -36,13 +36,7 @@ def system_of(scene: Scene, attitude: bool) -> Tape:
         )
     ]
     if attitude:
-        a, b, c, d = q
-        rates += [
-            -0.5 * (b * x + c * y + d * z),
-            0.5 * (a * x + c * z - d * y),
-            0.5 * (a * y + d * x - b * z),
-            0.5 * (a * z + b * y - c * x),
-        ]
+        rates += quaternion_rates((x, y, z), q)
     return recorder.tape(rates)
 
 
@@ -136,13 +130,7 @@ def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
         n1, n2, n3 = torque.at(float(time), (x, y, z), q)
         found = [n1 / first + a * y * z, n2 / second + b * x * z, n3 / third + c * x * y]
         if len(state) > 3:
-            w, i, j, k = q
-            found += [
-                -0.5 * (i * x + j * y + k * z),
-                0.5 * (w * x + j * z - k * y),
-                0.5 * (w * y + k * x - i * z),
-                0.5 * (w * z + i * y - j * x),
-            ]
+            found += quaternion_rates((x, y, z), q)
         return found
 
     return slopes

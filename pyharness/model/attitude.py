@@ -7,6 +7,8 @@ q' = q (0, omega)/2, and is integrated. Angles and matrices are only other forms
 """
 
 import math
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -65,16 +67,32 @@ def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
     return q
 
 
-def product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Return Hamilton's product p q of two quaternions, scalar first."""
-    a, b, c, d = p
-    e, f, g, h = q
+def product(p: Iterable[Any], q: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
+    """Return Hamilton's product p q of two quaternions, scalar first.
+
+    The components may be numbers of any kind, or arrays.
+    """
+    (a, b, c, d), (e, f, g, h) = p, q
     return (
         a * e - b * f - c * g - d * h,
         a * f + b * e + c * h - d * g,
         a * g - b * h + c * e + d * f,
         a * h + b * g - c * f + d * e,
     )
+
+
+def quaternion_rates(omega: Sequence[Any], q: Sequence[Any]) -> list[Any]:
+    """Return the rates of the attitude quaternion q, which satisfies q' = q (0, omega)/2.
+
+    `omega` (rad/s) and `q` are numbers, symbols of a recorded function, or other expressions.
+    """
+    (x, y, z), (a, b, c, d) = omega, q
+    return [
+        -0.5 * (b * x + c * y + d * z),
+        0.5 * (a * x + c * z - d * y),
+        0.5 * (a * y + d * x - b * z),
+        0.5 * (a * z + b * y - c * x),
+    ]
 
 
 def angles(attitude: Array, sequence: str) -> Array:

@@ -4,6 +4,8 @@ import datetime
 from dataclasses import dataclass, replace
 from random import Random
 
+import numpy as np
+
 from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
 from pyharness.model.scene import Scene
 from pyharness.scenes.kinds import KINDS, NASTY
@@ -88,6 +90,11 @@ def draw(seed: str, number: int) -> Draw:
     )
     later = [name for name in _LATER if name in switches(program) and source.random() < 0.5]
     return replace(found, listing=Listing(program, defects.union(later), readings))
+
+
+def text_generator(seed: str) -> np.random.Generator:
+    """Return the random generator of NumPy that a text determines."""
+    return np.random.default_rng([ord(letter) for letter in seed])
 
 
 def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:

@@ -10,6 +10,7 @@ import decimal
 from decimal import Decimal
 from fractions import Fraction
 
+from pyharness.model.attitude import product
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.truth.decimal_functions import pi, sine_cosine
 from pyharness.truth.decimal_series import Row, taylor_series
@@ -41,7 +42,7 @@ def free_attitude(scene: Scene, time: float) -> Row:
             speed = sum((w * w for w in omega), Decimal(0)).sqrt()
             sine, cosine = sine_cosine(speed * end / 2)
             across = [w * sine / speed for w in omega] if speed else omega
-            return product(begin, [cosine, *across])
+            return list(product(begin, [cosine, *across]))
         period = period_of(scene)
         if period is None or abs(end) <= period:
             return _followed(scene, [end])[0]
@@ -49,8 +50,8 @@ def free_attitude(scene: Scene, time: float) -> Row:
         period, rest = period.copy_sign(end), rest.copy_sign(end)
         after_rest, after_period = _followed(scene, [rest, period])
         # The rotation in space by which one period changes the attitude, whenever it begins.
-        turn = product(after_period, conjugate(begin))
-        return _unit(product(_power(turn, int(whole)), after_rest))
+        turn = list(product(after_period, conjugate(begin)))
+        return _unit(list(product(_power(turn, int(whole)), after_rest)))
 
 
 def period_of(scene: Scene) -> Decimal | None:
@@ -83,17 +84,6 @@ def is_steady(scene: Scene) -> bool:
     return all((i[a - 1] - i[a - 2]) * w[a - 1] * w[a - 2] == 0 for a in range(3))
 
 
-def product(p: Row, q: Row) -> Row:
-    """Return Hamilton's product p q of two quaternions, each with the scalar component first."""
-    (a, b, c, d), (e, f, g, h) = p, q
-    return [
-        a * e - b * f - c * g - d * h,
-        a * f + b * e + c * h - d * g,
-        a * g - b * h + c * e + d * f,
-        a * h + b * g - c * f + d * e,
-    ]
-
-
 def conjugate(q: Row) -> Row:
     """Return the conjugate of a quaternion whose scalar component comes first.
 
@@ -111,8 +101,8 @@ def _power(turn: Row, count: int) -> Row:
     found = [Decimal(1), Decimal(0), Decimal(0), Decimal(0)]
     while count:
         if count % 2:
-            found = product(found, turn)
-        turn, count = product(turn, turn), count // 2
+            found = list(product(found, turn))
+        turn, count = list(product(turn, turn)), count // 2
     return found
 
 

@@ -192,29 +192,3 @@ def test_verb_judges_both_and_says_who_carries_none(scene: str, capsys: Capture)
     assert "# Run time against error of omega and attitude\n" in page
     assert "--attitude --format markdown`" in page
     assert "the angle between the attitudes (rad)" in page
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (
-            "--attitude --methods rk4",
-            "--methods: rk4 does not compute attitudes; allowed: auto, taylor",
-        ),
-        (
-            "--attitude --peers numba",
-            "--peers: numba-rk4 does not compute attitudes; allowed: heyoka",
-        ),
-        (
-            "--peers orekit",
-            "--peers: orekit computes omega only together with the attitude; add --attitude",
-        ),
-        ("--attitude --plan", "--attitude has no meaning with --plan"),
-        ("--growth --attitude", "--attitude has no meaning with --growth"),
-    ],
-)
-def test_mistake_is_one_line(arguments: str, words: str, capsys: Capture) -> None:
-    assert main(["bench", *arguments.split()]) == 2
-    captured = capsys.readouterr()
-    assert (captured.out, captured.err.count("\n")) == ("", 1)
-    assert words in captured.err

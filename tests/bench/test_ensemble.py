@@ -131,27 +131,6 @@ def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) 
     assert "heyoka-batch, heyoka-ensemble, " in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ("--ensemble --bodies 0", "--bodies: 0; allowed: 1 to"),
-        ("--ensemble --bodies x", "--bodies: 'x' where a whole number belongs"),
-        ("--ensemble --case 4", "--case has no meaning with --ensemble"),
-        ("--ensemble --peers heyoca", "unknown peer 'heyoca'; did you mean 'heyoka'"),
-        (
-            "--ensemble --peers none --methods none",
-            "no method and no third-party package is chosen",
-        ),
-        ("--bodies 5", "--bodies has no meaning without --ensemble"),
-    ],
-)
-def test_mistake_is_one_line(arguments: str, words: str, capsys: Capture) -> None:
-    assert main(["bench", *arguments.split()]) == 2
-    captured = capsys.readouterr()
-    assert (captured.out, captured.err.count("\n")) == ("", 1)
-    assert words in captured.err
-
-
 LOOP = """\tvmovapd\t(%rdx), %zmm16
 \tvfmadd213pd\t2496(%rdx), %zmm15, %zmm26
 \tvaddpd\t%zmm26, %zmm14, %zmm3

@@ -367,6 +367,34 @@ MISTAKES = [
     ("--growth --seed 5", "--seed has no meaning with --growth"),
     ("--seed 5", "--seed has no meaning without --random"),
     ("--random 2 --seed \udcff", "--seed: contains characters that can't be printed"),
+    (
+        "--attitude --methods rk4",
+        "--methods: rk4 does not compute attitudes; allowed: auto, taylor",
+    ),
+    (
+        "--attitude --peers numba",
+        "--peers: numba-rk4 does not compute attitudes; allowed: heyoka",
+    ),
+    (
+        "--peers orekit",
+        "--peers: orekit computes omega only together with the attitude; add --attitude",
+    ),
+    ("--attitude --plan", "--attitude has no meaning with --plan"),
+    ("--growth --attitude", "--attitude has no meaning with --growth"),
+    ("--ensemble --bodies 0", "--bodies: 0; allowed: 1 to"),
+    ("--ensemble --bodies x", "--bodies: 'x' where a whole number belongs"),
+    ("--ensemble --case 4", "--case has no meaning with --ensemble"),
+    ("--ensemble --peers heyoca", "unknown peer 'heyoca'; did you mean 'heyoka'"),
+    (
+        "--ensemble --peers none --methods none",
+        "no method and no third-party package is chosen",
+    ),
+    ("--bodies 5", "--bodies has no meaning without --ensemble"),
+    ("--terms --case 3", "--case has no meaning with --terms"),
+    ("--terms --bodies 0", "--bodies: 0; allowed: 1 to"),
+    ("--terms --ensemble", "--terms has no meaning with --ensemble"),
+    ("--terms --peers numba", "unknown peer 'numba'"),
+    ("--terms --plot a.png", "--plot has no meaning with --terms"),
 ]
 
 

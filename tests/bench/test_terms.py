@@ -220,20 +220,3 @@ def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) 
     assert "heyoka needs heyoka, which is not installed" in capsys.readouterr().err
     assert main(COMMAND[:-1]) == 0
     assert "heyoka, solve_ivp-dop853: not installed" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ("--terms --case 3", "--case has no meaning with --terms"),
-        ("--terms --bodies 0", "--bodies: 0; allowed: 1 to"),
-        ("--terms --ensemble", "--terms has no meaning with --ensemble"),
-        ("--terms --peers numba", "unknown peer 'numba'"),
-        ("--terms --plot a.png", "--plot has no meaning with --terms"),
-    ],
-)
-def test_mistake_is_one_line(arguments: str, words: str, capsys: Capture) -> None:
-    assert main(["bench", *arguments.split()]) == 2
-    captured = capsys.readouterr()
-    assert (captured.out, captured.err.count("\n")) == ("", 1)
-    assert words in captured.err

@@ -18,9 +18,10 @@ from pyharness.cli.main import main
 from pyharness.edition.body import AGREEMENT, PROGRAM, SPEEDS, context, data, moments_of_box
 from pyharness.edition.bundle import bundle
 from pyharness.model.extension import extension
+from pyharness.scenes.free_motions import KINDS, Motion, draw
 from pyharness.theory.flips import flip_times
 from pyharness.truth.free_attitude import free_attitude, is_steady, period_of
-from tests.attitude_errors import KINDS, Motion, draw, largest_error
+from tests.attitude_errors import largest_error
 from tests.exact_attitude import exact
 from tests.ports import WEB, run_javascript
 

@@ -18,7 +18,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import STOP_VARIABLES
 from tests.ensembles.claims import CLAIMS
-from tests.ensembles.sweeps import PROGRAM, TILT, text, written
+from tests.ensembles.sweeps import BASE, PROGRAM, TILT, text, written
 
 SAMPLES = 400
 
@@ -86,17 +86,7 @@ def test_error_and_drift_are_those_of_the_method(tmp_path: Path) -> None:
     assert found[0]["error"][0, -1] == pytest.approx(expected, rel=0.2)
 
 
-_COARSE = """
-[scene.body]
-moments = [1.0, 2.0, 3.0]
-[scene.initial]
-omega = [0.0, 1.0, 0.0]
-[scene.run]
-step_size = 0.2
-steps = 50
-[solve]
-tolerance = 1e-10
-"""
+_COARSE = BASE.replace("0.1", "0.2").replace("100", "50") + "[solve]\ntolerance = 1e-10\n"
 
 
 def test_growth_is_that_of_the_middle_axis(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ attitude, a full inertia matrix, a torque about the axes of space, and times bef
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from random import Random
 
@@ -16,8 +15,8 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
 from pyharness.scenes.rotated import rotated
+from pyharness.scenes.timed_kinds import NASTY, timed_scenes, triple
 from tests.estimates.truth import Truth, truth_of
-from tests.random_scenes import NASTY, triple
 
 _MOST_TURNS = 330.0
 _SHORT = 0.3  # fraction of scenes that end within a revolution or a few
@@ -230,6 +229,5 @@ def _pushed(scene: Scene, factor: float) -> Scene:
 
 def _rough(source: Random) -> tuple[Scene, float, tuple[str, ...]]:
     name = source.choice(_ROUGH)
-    make: Callable[[np.random.Generator], tuple[Scene, float]] = NASTY[name]
-    scene, time = make(np.random.default_rng(source.getrandbits(64)))
+    scene, time = next(timed_scenes(name, source.getrandbits(64)))
     return scene, time, (f"rough: {name}",)

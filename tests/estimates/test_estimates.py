@@ -14,6 +14,7 @@ from pyharness.model.attitude import product
 from pyharness.model.report import short
 from pyharness.model.trajectory import Trajectory
 from pyharness.scenes.rotated import restarted_at
+from pyharness.scenes.timed_kinds import triple
 from pyharness.truth.free_attitude import free_attitude
 from pyharness.truth.reference import reference
 from pyharness.views.table import write
@@ -22,7 +23,6 @@ from tests.estimates.campaign import COLUMNS, ENTRANCES, SENSITIVE, Answer, answ
 from tests.estimates.report import report
 from tests.estimates.scenes import COARSEST, FINEST, KINDS, Draw, drawn
 from tests.estimates.truth import Truth, compiler_here, truth_of
-from tests.random_scenes import triple
 
 pytestmark = [
     pytest.mark.external,

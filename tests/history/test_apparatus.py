@@ -83,10 +83,6 @@ def test_torque_of_case_7_falls_and_is_sampled_once_a_radian() -> None:
     assert gained < 0.05
 
 
-def _texts(program: str, *numbers_: int) -> str:
-    return "\n".join(deck(program).cards[n].text for n in numbers_)
-
-
 def test_what_is_redundant_or_unread_is_so_on_the_cards() -> None:
     four, kutta = (
         {n: card.text for n, card in deck(name).cards.items() if not card.is_comment}

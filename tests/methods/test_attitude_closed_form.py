@@ -18,10 +18,11 @@ from pyharness.model.errors import TimedError
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
 from pyharness.scenes.extreme import quarter
+from pyharness.scenes.free_motions import KINDS, Motion, draw
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude
-from tests.attitude_errors import KINDS, Motion, draw, errors, largest_error
-from tests.exact_attitude import exact, joint
+from tests.attitude_errors import errors, largest_error
+from tests.exact_attitude import exact, joint, times
 
 _BOUND = 2e-15
 _OMEGA_BOUND = 2e-14
@@ -41,11 +42,7 @@ def closed_form_attitude(
 
 
 def _product(p: Array, q: Array) -> Array:
-    (a, b, c, d), (e, f, g, h) = p.T, q.T
-    return np.array([
-        a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
-        a * g + c * e + d * f - b * h, a * h + d * e + b * g - c * f,
-    ]).T  # fmt: skip
+    return np.array(times([*p.T], [*q.T])).T
 
 
 def _in_space(q: Array, v: Array) -> Array:

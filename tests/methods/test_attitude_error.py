@@ -5,53 +5,22 @@ to many digits. The scenes are drawn at random.
 """
 
 import math
+from itertools import islice
 
 import mpmath
 import numpy as np
 import pytest
 
-from pyharness import Scene, TorqueLaw, prepare, solve
-from pyharness.model.scene import Triple
+from pyharness import Scene, prepare, solve
 from pyharness.model.trajectory import Array
-from tests.random_scenes import moments, triple
+from pyharness.scenes.timed_kinds import SPINS, timed_scenes
+from tests.exact_attitude import times as hamilton
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 ROUNDING = 2.0**-53
 # Relative to the angle of rotation (rad): a smaller error is the rounding of a double, not an error
 # of the method.
 _DOUBT = 1e-15
-KINDS = ("steady", "constant", "ramp", "wave", "ramp from rest", "slow")
-
-
-def _drawn(kind: str, generator: np.random.Generator) -> tuple[Scene, float]:
-    axis = int(generator.integers(3))
-    along = np.zeros(3)
-    along[axis] = 1.0
-    spin = generator.choice([-1.0, 1.0]) * 10.0 ** generator.uniform(-2.0, 1.0)
-    push = generator.normal() * 10.0 ** generator.uniform(-2.0, 0.0)
-    time = 10.0 ** generator.uniform(0.0, 2.0) / abs(spin)
-    none: Triple = (0.0, 0.0, 0.0)
-    law = TorqueLaw()
-    if kind == "constant":
-        law = TorqueLaw(triple(push * along))
-    elif kind in ("ramp", "ramp from rest"):
-        law = TorqueLaw(none, triple(push * along))
-    elif kind == "wave":
-        law = TorqueLaw(sines=[(triple(push * along), float(10.0 ** generator.uniform(-1.0, 1.0)))])
-    if kind == "ramp from rest":
-        spin = 0.0
-        time = float(generator.uniform(0.5, 4.0) / abs(push) ** (1.0 / 3.0))
-    elif kind == "slow":
-        spin, time = spin * 1e-4, time * generator.uniform(0.0, 0.1) * 1e4
-    time = float(min(time, 60.0) if kind not in ("steady", "slow") else time)
-    attitude = generator.normal(size=4)
-    attitude /= np.linalg.norm(attitude)
-    first, second, third, fourth = attitude.tolist()
-    scene = Scene(
-        "", triple(spin * along), triple(moments(generator)), torque=law,
-        attitude=(first, second, third, fourth),
-    )  # fmt: skip
-    return scene, float(generator.choice([-1.0, 1.0])) * time
 
 
 def _angle_errors(scene: Scene, times: Array | list[float], attitudes: Array) -> list[float]:
@@ -74,28 +43,18 @@ def _angle_errors(scene: Scene, times: Array | list[float], attitudes: Array) ->
             spun = [mpmath.cos(half), 0, 0, 0]
             spun[1 + axis] = mpmath.sin(half)
             length = mpmath.sqrt(sum(mpmath.mpf(x) ** 2 for x in scene.attitude))
-            true = _product([mpmath.mpf(x) / length for x in scene.attitude], spun)
+            true = hamilton([mpmath.mpf(x) / length for x in scene.attitude], spun)
             back = [true[0], -true[1], -true[2], -true[3]]
-            apart = _product(back, [mpmath.mpf(float(x)) for x in attitude])
+            apart = hamilton(back, [mpmath.mpf(float(x)) for x in attitude])
             found.append(float(2 * mpmath.sqrt(sum(x**2 for x in apart[1:]))))
     return found
 
 
-def _product(p: list[mpmath.mpf], q: list[mpmath.mpf]) -> list[mpmath.mpf]:
-    return [
-        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
-        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
-        p[0] * q[2] + p[2] * q[0] + p[3] * q[1] - p[1] * q[3],
-        p[0] * q[3] + p[3] * q[0] + p[1] * q[2] - p[2] * q[1],
-    ]
-
-
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SPINS)
 def test_reported_error_is_no_less_than_a_tenth_of_the_true_one(kind: str) -> None:
-    generator = np.random.default_rng([25, KINDS.index(kind)])
+    scenes = timed_scenes(f"spin: {kind}", [25, SPINS.index(kind)])
     judged = 0
-    for number in range(60):
-        scene, time = _drawn(kind, generator)
+    for number, (scene, time) in enumerate(islice(scenes, 60)):
         tolerance = TOLERANCES[number % len(TOLERANCES)]
         times = [time] if number % 2 else [0.3 * time, 0.7 * time, time]
         found = solve(scene, times, "taylor", tolerance, attitude=True)
@@ -111,10 +70,8 @@ def test_reported_error_is_no_less_than_a_tenth_of_the_true_one(kind: str) -> No
 
 
 def test_prepared_solver_reports_it_too() -> None:
-    generator = np.random.default_rng(2501)
     judged = 0
-    for _ in range(40):
-        scene, time = _drawn("constant", generator)
+    for scene, time in islice(timed_scenes("spin: constant", 2501), 40):
         solver = prepare(scene, "auto", 1e-3, attitude=True)
         _, attitude = solver(scene.omega, time)
         (error,) = _angle_errors(scene, [time], np.array([attitude]))
@@ -151,9 +108,7 @@ def test_error_is_accumulated_from_step_to_step() -> None:
 
 def test_intermediate_rows_have_the_error_of_their_own_times() -> None:
     """Within the first step the error is far smaller than at its end, or at the last time."""
-    generator = np.random.default_rng(2502)
-    for _ in range(20):
-        scene, _ = _drawn("steady", generator)
+    for scene, _ in islice(timed_scenes("spin: steady", 2502), 20):
         period = 2.0 * math.pi / max(map(abs, scene.omega))
         times = [0.2 * period, 0.3 * period, 20.0 * period]
         found = solve(scene, times, "taylor", 1e-3, attitude=True)

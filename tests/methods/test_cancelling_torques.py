@@ -4,7 +4,6 @@ Each term, divided by a moment, is rounded by itself. Waves of one frequency are
 rounding of the other terms is in the error estimate, at every entry point.
 """
 
-import math
 import random
 from dataclasses import replace
 
@@ -15,6 +14,7 @@ from pyharness import Scene, TorqueLaw, prepare, solve, solve_many
 from pyharness.methods.sensitivity import torque_noise
 from pyharness.model.scene import Triple
 from pyharness.model.torque_law import Wave
+from pyharness.scenes.cancelling import LEFT, MERGED, cancelling
 from pyharness.truth.reference import reference
 
 _ROUNDING = 2.0**-53
@@ -24,41 +24,6 @@ def _triple(source: random.Random, size: float) -> Triple:
     return source.gauss(0.0, size), source.gauss(0.0, size), source.gauss(0.0, size)
 
 
-def _times(values: Triple, factor: float) -> Triple:
-    return values[0] * factor, values[1] * factor, values[2] * factor
-
-
-def _scene(kind: str, number: int) -> Scene:
-    """Return a body at rest or nearly, whose torques cancel to 1e-2 to 1e-11 of their size."""
-    source = random.Random(f"cancelling/{kind}/{number}")
-    frequency, left = source.uniform(0.5, 4.0), 10.0 ** -source.uniform(2.0, 11.0)
-    amplitude = _triple(source, source.uniform(0.3, 1.0) / left)
-    sines: list[Wave] = [(amplitude, frequency)]
-    cosines: list[Wave] = []
-    constant: Triple = (0.0, 0.0, 0.0)
-    if kind == "one frequency":
-        sines += [(_times(amplitude, left - 1.0), frequency)]
-    elif kind == "opposite frequencies":
-        sines += [(_times(amplitude, 1.0 - left), -frequency)]
-    elif kind == "three cosines":
-        sines, cosines = [], [(amplitude, frequency), (_times(amplitude, -0.3), -frequency)]
-        cosines += [(_times(amplitude, left - 0.7), frequency)]
-    elif kind == "no frequency":
-        sines, cosines = [], [(amplitude, 0.0)]
-        constant = _times(amplitude, left - 1.0)
-    elif kind == "near frequencies":
-        sines += [(_times(amplitude, -1.0), frequency * (1.0 + left))]
-    elif kind == "constant and cosine":
-        sines, cosines = [], [(amplitude, math.sqrt(left))]
-        constant = _times(amplitude, -1.0)
-    omega = _triple(source, source.choice((0.0, 0.5)))
-    moments = (source.uniform(1.0, 1.5), source.uniform(1.5, 2.0), source.uniform(2.0, 2.5))
-    law = TorqueLaw(constant, sines=sines, cosines=cosines)
-    return Scene(kind, omega, moments=moments, torque=law)
-
-
-_MERGED = ("one frequency", "opposite frequencies", "three cosines", "no frequency")
-_LEFT = ("near frequencies", "constant and cosine")
 _TIME = 1.5
 
 
@@ -69,10 +34,10 @@ def _truth(scene: Scene) -> tuple[np.ndarray, float]:
     return found.omega[-1], largest
 
 
-@pytest.mark.parametrize("kind", [*_MERGED, *_LEFT])
+@pytest.mark.parametrize("kind", [*MERGED, *LEFT])
 @pytest.mark.parametrize("number", range(5))
 def test_every_entry_point_is_right_or_says_that_it_is_not(kind: str, number: int) -> None:
-    scene = _scene(kind, number)
+    scene = cancelling(kind, number)
     truth, largest = _truth(scene)
     law = scene.law
 
@@ -101,7 +66,7 @@ def test_every_entry_point_is_right_or_says_that_it_is_not(kind: str, number: in
             error = float(np.abs(omega - truth).max()) / largest
             where = f"{name} to {tolerance:g}: error {error:g}, estimate {estimate}"
             assert ended in ("complete", "sensitive"), where
-            if kind in _MERGED:
+            if kind in MERGED:
                 assert ended == "complete", where
             if ended == "complete":
                 assert error <= 2.0 * tolerance + 4e-14, where
@@ -112,7 +77,7 @@ def test_every_entry_point_is_right_or_says_that_it_is_not(kind: str, number: in
 
 def test_a_sphere_knows_what_rounding_leaves() -> None:
     for number in range(8):
-        scene = replace(_scene("near frequencies", number), moments=(1.5, 1.5, 1.5))
+        scene = replace(cancelling("near frequencies", number), moments=(1.5, 1.5, 1.5))
         truth, largest = _truth(scene)
         found = solve(scene, [_TIME], "closed-form", 1e-13)
         error = float(np.abs(found.omega[0] - truth).max()) / largest
@@ -127,7 +92,7 @@ def test_a_sphere_knows_what_rounding_leaves() -> None:
 def test_quick_says_what_rounding_leaves() -> None:
     seen = set()
     for number in range(12):
-        scene = replace(_scene("near frequencies", number), omega=(0.3, -0.2, 0.5))
+        scene = replace(cancelling("near frequencies", number), omega=(0.3, -0.2, 0.5))
         truth, largest = _truth(scene)
         solver = prepare(scene, "quick", 1e-11)
         omega = solver(scene.omega, _TIME)
@@ -143,8 +108,8 @@ def test_quick_says_what_rounding_leaves() -> None:
 def test_gauss_sees_soon_that_no_step_will_do() -> None:
     seen = 0
     for number in range(8):
-        for kind in _LEFT:
-            found = solve(_scene(kind, number), [_TIME], "gauss-4", 1e-12)
+        for kind in LEFT:
+            found = solve(cancelling(kind, number), [_TIME], "gauss-4", 1e-12)
             seen += found.ended == "sensitive"
             assert found.evaluations < 20_000
     assert seen >= 8
@@ -184,7 +149,7 @@ def test_noise_is_what_the_terms_give_over_what_they_give_together() -> None:
 
 def test_a_torque_in_space_that_cancels_is_told_of() -> None:
     amplitude = (1e9, -2e9, 1e9)
-    waves = [(amplitude, 1.0), (_times(amplitude, -1.0), 1.0 + 1e-9)]
+    waves = [(amplitude, 1.0), ((-1e9, 2e9, -1e9), 1.0 + 1e-9)]
     law = TorqueLaw(sines=waves, frame="space")
     scene = Scene("", (0.3, 0.2, 0.1), moments=(1.0, 1.5, 2.0), torque=law)
     found = solve(scene, [1.0], "auto", 1e-12, attitude=True)
@@ -200,7 +165,7 @@ def test_a_torque_in_space_that_cancels_is_told_of() -> None:
 def test_scipy_says_so_too() -> None:
     seen = set()
     for number in range(4):
-        scene = _scene("near frequencies", number)
+        scene = cancelling("near frequencies", number)
         ours = solve(scene, [_TIME], "taylor", 1e-11)
         found = solve(scene, [_TIME], "dop853", 1e-11)
         seen.add(found.ended)

@@ -18,9 +18,9 @@ from pyharness.model.errors import TimedError
 from pyharness.model.extension import extension
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
+from pyharness.scenes.free_motions import draw, draw_top
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
-from tests.attitude_errors import draw
 from tests.exact_tops import DIGITS, exact_top
 
 _UNIT = 2.0**-53
@@ -40,26 +40,6 @@ def _error(found: Array, exact: list[mpmath.mpf], omega: Triple) -> float:
     return float(max(abs(float(x) - y) for x, y in zip(found, exact, strict=True)) / largest)
 
 
-def _random_top(source: random.Random, kind: str) -> tuple[Triple, Triple, float]:
-    """Return coefficients, omega and a time up to 1e4 radians, axes and signs in any order."""
-    width = 3.0 if kind == "wild" else 0.5
-    sign = source.choice((1.0, -1.0))
-    a = [s * sign * 10 ** source.uniform(-width, width) for s in (1.0, -1.0, 1.0)]
-    w = [source.choice((-1.0, 1.0)) * 10 ** source.uniform(-1, 1) for _ in range(3)]
-    if kind == "middle axis":
-        w[0] = math.copysign(10 ** source.uniform(-15, -1), w[0])
-        w[2] = math.copysign(10 ** source.uniform(-15, -1), w[2])
-    elif kind == "near symmetry":
-        a[2] *= 10 ** source.uniform(-16, -1)
-    elif kind == "near separatrix":
-        w[2] = w[0] * math.sqrt(a[2] / a[0]) * (1.0 + 10 ** source.uniform(-15, -1))
-    turn = source.randrange(3)
-    a, w = a[turn:] + a[:turn], w[turn:] + w[:turn]
-    rate = max(map(abs, a)) * max(map(abs, w))
-    time = source.choice((-1.0, 1.0)) * 10 ** source.uniform(-2, 4) / rate
-    return (a[0], a[1], a[2]), (w[0], w[1], w[2]), time
-
-
 @pytest.mark.property
 @pytest.mark.parametrize(
     "kind", ["plain", "middle axis", "near symmetry", "near separatrix", "wild"]
@@ -67,7 +47,7 @@ def _random_top(source: random.Random, kind: str) -> tuple[Triple, Triple, float
 def test_any_top_at_any_time(kind: str) -> None:
     source = random.Random(kind)
     for _ in range(60):
-        coefficients, omega, time = _random_top(source, kind)
+        coefficients, omega, time = draw_top(source, kind)
         exact = exact_top(coefficients, omega, time)
         assert _error(_at(coefficients, omega, time), exact, omega) <= _BOUND, (
             coefficients, omega, time,
@@ -218,7 +198,7 @@ def test_sphere_overflows_with_a_status() -> None:
 
 def test_end_alone_and_rows_give_the_same_bits_in_any_thread() -> None:
     source = random.Random(2)
-    tops = [_random_top(source, kind) for kind in ("plain", "middle axis") * 100]
+    tops = [draw_top(source, kind) for kind in ("plain", "middle axis") * 100]
     rows = [_at(*top).tobytes() for top in tops]
     with ThreadPoolExecutor(8) as pool:
         found = pool.map(lambda top: _packed_end(*top), [*tops, *tops])

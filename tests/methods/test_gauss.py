@@ -5,6 +5,7 @@ import runpy
 from dataclasses import replace
 from decimal import Decimal, localcontext
 from functools import cache
+from itertools import islice
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,8 +20,8 @@ from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
+from pyharness.scenes.timed_kinds import timed_scenes
 from pyharness.truth.reference import Reference, reference
-from tests.random_scenes import NASTY
 
 _MAKER = Path(__file__).parent.parent.parent / "fortran/make_gauss.py"
 _STAGES = range(1, 9)
@@ -121,9 +122,7 @@ def test_body_at_rest_is_driven_to_a_relative_error() -> None:
 )
 def test_long_steps_of_high_order_are_not_trusted(kind: str, seed: int) -> None:
     """If both steps are too long to show the order, their difference is too small an estimate."""
-    generator = np.random.default_rng(seed)
-    for _ in range(25):
-        scene, t_end = NASTY[kind](generator)
+    for scene, t_end in islice(timed_scenes(kind, seed), 25):
         truth = solve(scene, [t_end], "taylor", 1e-14).omega[0]
         found = solve(scene, [t_end], "gauss-8", 1e-10).omega[0]
         scale = max(np.abs(truth).max(), *map(abs, scene.omega))

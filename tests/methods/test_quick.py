@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ from pyharness import Scene, TorqueLaw, case_scene, prepare, solve
 from pyharness.methods.problem import normalized
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
+from pyharness.scenes.timed_kinds import NASTY, timed_scenes
 from pyharness.truth.reference import reference
-from tests.random_scenes import NASTY, plain
 
 
 @cache
@@ -34,10 +35,8 @@ def _ratios(
 
 def test_tolerance_holds_on_random_scenes() -> None:
     """Compare with the series at 1e-14, which is an independent method."""
-    generator = np.random.default_rng(1982)
     ratios = []
-    for _ in range(45):
-        scene, t_end = plain(generator)
+    for scene, t_end in islice(timed_scenes("plain", 1982), 45):
         truth = solve(scene, [t_end * k / 10.0 for k in range(1, 11)], "taylor", 1e-14).omega
         for tolerance in (1e-2, 1e-3, 1e-4, 1e-6):
             for ratio, status in _ratios(scene, t_end, tolerance, truth).values():
@@ -51,10 +50,9 @@ def test_tolerance_holds_on_random_scenes() -> None:
 @pytest.mark.parametrize("kind", NASTY)
 def test_tolerance_holds_on_nasty_scenes(kind: str) -> None:
     """Compare with the series at 1e-14, which is an independent method."""
-    generator = np.random.default_rng([1982, list(NASTY).index(kind)])
+    scenes = timed_scenes(kind, [1982, list(NASTY).index(kind)])
     complete = runs = 0
-    for number in range(40):
-        scene, t_end = NASTY[kind](generator)
+    for number, (scene, t_end) in enumerate(islice(scenes, 40)):
         times = np.linspace(0.0, t_end, 33)[1:]
         rows, n_rows, _, _ = extension().taylor_rows(*normalized(scene), scene.omega, times, 1e-14)
         if n_rows < len(times):
@@ -88,8 +86,8 @@ def test_gaps_that_are_small_by_chance_are_not_believed(
     A gap is the difference of results with steps of h and 2 h. It may be a third of the tolerance,
     and extrapolation makes the result better than the gap: a fifth of the tolerance is much.
     """
-    generator = np.random.default_rng([7, list(NASTY).index(kind)])
-    scene, t_end = [NASTY[kind](generator) for _ in range(number + 1)][-1]
+    scenes = timed_scenes(kind, [7, list(NASTY).index(kind)])
+    scene, t_end = next(islice(scenes, number, None))
     times = np.linspace(0.0, t_end, 33)[1:].tolist()
     truth = solve(scene, times, "taylor", 1e-13).omega
     ratio, status = _ratios(scene, t_end, tolerance, truth)["quick"]

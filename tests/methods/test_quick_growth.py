@@ -6,36 +6,17 @@ all three lengths of `quick` agree. The scenes are drawn at random.
 
 import math
 from collections import Counter
+from itertools import islice
 
 import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, prepare
 from pyharness.methods.solver import Solver
-from tests.random_scenes import NASTY, moments, plain, triple
+from pyharness.scenes.timed_kinds import KINDS, NASTY, timed_scenes
 
 ROUNDING = 2.0**-53
 _UNSURE = 0.3  # rounding times growth, in tolerances, above which the series reports sensitive
-
-
-def _unstable(generator: np.random.Generator) -> tuple[Scene, float]:
-    """Return a steady rotation under torque, and a time for a growth of perturbations to 1e18."""
-    while True:
-        body = moments(generator)
-        middle = int(np.argsort(body)[1])
-        omega = 10.0 ** generator.uniform(-8.0, -0.3, 3) * generator.choice([-1.0, 1.0], 3)
-        omega[middle] = generator.choice([-1.0, 1.0]) * 10.0 ** generator.uniform(-0.5, 0.5)
-        # The torque makes I omega' = N - omega x I omega zero, except for rounding.
-        torque = TorqueLaw(triple(np.cross(omega, body * omega)))
-        scene = Scene("", triple(omega), triple(body), torque=torque)
-        x, y, z = omega
-        a, b, c = scene.euler_coefficients
-        jacobian = np.array([[0.0, a * z, a * y], [b * z, 0.0, b * x], [c * y, c * x, 0.0]])
-        rate = float(np.linalg.eigvals(jacobian).real.max())
-        if rate > 1e-3:
-            break
-    time = math.log(10.0) * float(generator.uniform(0.0, 18.0)) / rate
-    return scene, float(generator.choice([-1.0, 1.0])) * time
 
 
 def _called(scene: Scene, method: str, tolerance: float, time: float) -> tuple[Solver, np.ndarray]:
@@ -48,10 +29,9 @@ def _called(scene: Scene, method: str, tolerance: float, time: float) -> tuple[S
 def test_complete_is_not_said_where_the_series_says_sensitive(
     method: str, tolerance: float
 ) -> None:
-    generator = np.random.default_rng([25, round(-math.log10(tolerance))])
+    scenes = timed_scenes("unstable", [25, round(-math.log10(tolerance))])
     seen: Counter[str] = Counter()
-    for number in range(150):
-        scene, time = _unstable(generator)
+    for number, (scene, time) in enumerate(islice(scenes, 150)):
         series, _ = _called(scene, "taylor", tolerance, time)
         solver, found = _called(scene, method, tolerance, time)
         seen[f"{solver.method} {solver.status}"] += 1
@@ -78,9 +58,7 @@ def test_complete_is_not_said_where_the_series_says_sensitive(
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-12])
 def test_rounding_of_many_steps_is_seen(tolerance: float) -> None:
     """Request more digits from `quick` than it is made for."""
-    generator = np.random.default_rng(252)
-    for number in range(60):
-        scene, time = _unstable(generator)
+    for number, (scene, time) in enumerate(islice(timed_scenes("unstable", 252), 60)):
         solver, found = _called(scene, "quick", tolerance, time)
         series, truth = _called(scene, "taylor", tolerance, time)
         if solver.status != "complete":
@@ -113,7 +91,7 @@ def test_bound_of_the_amplification_is_one() -> None:
     """In calm and rough motions the reported error includes rounding times the series' growth."""
     generator = np.random.default_rng(253)
     seen = 0
-    for make in (plain, *NASTY.values()):
+    for make in (KINDS["plain"], *NASTY.values()):
         for _ in range(40):
             scene, time = make(generator)
             solver, _ = _called(scene, "quick", 1e-3, time)
@@ -129,7 +107,7 @@ def test_bound_of_the_amplification_is_one() -> None:
 
 
 def test_nothing_errs_where_no_time_passes() -> None:
-    scene, _ = _unstable(np.random.default_rng(254))
+    scene, _ = next(timed_scenes("unstable", 254))
     solver, found = _called(scene, "quick", 1e-6, 0.0)
     assert (solver.status, solver.error) == ("complete", 0.0)
     assert found.tolist() == list(scene.omega)

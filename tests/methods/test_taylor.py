@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,11 @@ from pyharness.model.build import build
 from pyharness.model.extension import extension
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
+from pyharness.scenes.timed_kinds import NASTY, timed_scenes
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
 from tests.as_written import as_written, compiler_here
 from tests.instruction_sets import BEST, level_here
-from tests.random_scenes import NASTY
 
 RUNS = [(case, 3.0) for case in range(1, 8)] + [(3, 100.0), (4, 100.0)]
 REST = Scene("", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0))
@@ -126,9 +127,8 @@ def _held_to_fine_rows(
 @pytest.mark.parametrize("kind", NASTY)
 def test_tolerance_holds_on_nasty_scenes(kind: str) -> None:
     """Where a perturbation grows, the series takes smaller local errors by itself."""
-    generator = np.random.default_rng([3, list(NASTY).index(kind)])
-    for _ in range(60):
-        _held_to_fine_rows(*NASTY[kind](generator), (1e-3, 1e-6, 1e-9), 1.0)
+    for scene, time in islice(timed_scenes(kind, [3, list(NASTY).index(kind)]), 60):
+        _held_to_fine_rows(scene, time, (1e-3, 1e-6, 1e-9), 1.0)
 
 
 def test_many_rows_within_one_step() -> None:
@@ -210,8 +210,8 @@ def test_row_that_overflows_within_a_step_ends_the_rows() -> None:
 )
 def test_growth_of_small_differences_is_followed_the_right_way(kind: str, number: int) -> None:
     """Test the draws, of 1500, that a wrongly propagated perturbation would affect most."""
-    generator = np.random.default_rng([11, list(NASTY).index(kind)])
-    scene, time = [NASTY[kind](generator) for _ in range(number + 1)][-1]
+    scenes = timed_scenes(kind, [11, list(NASTY).index(kind)])
+    scene, time = next(islice(scenes, number, None))
     _held_to_fine_rows(scene, time, [1e-3], 0.4)
 
 

@@ -1,6 +1,5 @@
 """Expressions in scene files: read, written, refused, and shown in records and headings."""
 
-import json
 import re
 import tomllib
 from collections.abc import Callable
@@ -8,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from jsonschema import Draft202012Validator
 
 from pyharness import InputError, Scene, StateTorque, TorqueLaw, case_scene, opaque, read_scene
 from pyharness.dynamics.scene_reader import scene_of
@@ -16,7 +14,7 @@ from pyharness.model.expressions import FUNCTIONS, INPUTS
 from pyharness.model.records import scene_record
 from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading
-from tests.json_reference import SCHEMA
+from tests.dynamics.test_term_file import is_documented, restored
 
 ROOT = Path(__file__).parent.parent.parent
 BODY: dict[str, Any] = {
@@ -43,17 +41,6 @@ MISTAKES = [
 ]  # fmt: skip
 
 
-def _restored(scene: Scene, folder: Path) -> Scene:
-    path = folder / "again.toml"
-    path.write_text(scene_text(scene))
-    return read_scene(path)
-
-
-def _is_documented(record: dict[str, Any]) -> bool:
-    schema = {"$ref": "#/$defs/scene", "$defs": SCHEMA["$defs"]}
-    return bool(Draft202012Validator(schema).is_valid(json.loads(json.dumps(record))))
-
-
 @pytest.mark.parametrize(
     "constants", [{"k": 0.1}, {"k": -0.0, "unused": 5e-324}, {"k": 1 / 3, "_A9": 1e300}]
 )
@@ -63,7 +50,7 @@ def test_scene_with_expressions_is_restored_from_its_text(
     table = {"expression": TEXTS, "constants": constants}
     scene = scene_of(BODY | {"torque": table}, "damped")
     assert isinstance(scene.torque, StateTorque)
-    again = _restored(scene, tmp_path)
+    again = restored(scene, tmp_path)
     assert again == scene
     assert repr(again) == repr(scene)
     state = 0.5, (1.0, 2.0, 3.0), (0.8, 0.0, 0.6, 0.0)
@@ -76,7 +63,7 @@ def test_expressions_that_form_a_law_are_that_law(tmp_path: Path) -> None:
     table = {"expression": ["1 - t", "a*sin(2*t)", "0"], "constants": {"a": 4.0}}
     scene = scene_of(BODY | {"torque": table}, "law")
     assert scene.torque == TorqueLaw((1, 0, 0), (-1, 0, 0), [((0, 4, 0), 2)])
-    assert _restored(scene, tmp_path) == scene
+    assert restored(scene, tmp_path) == scene
     assert "constant" in scene_record(scene)["torque"]
 
 
@@ -90,7 +77,7 @@ def test_expression_may_have_several_lines(tmp_path: Path) -> None:
     assert isinstance(scene.torque, StateTorque)
     assert scene.torque.expression == ("-0.5*w1 - 0.25*w1**3", "0", "0")
     assert scene.torque.at(0.0, (2.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)) == (-3.0, 0.0, 0.0)
-    assert _restored(scene, tmp_path) == scene
+    assert restored(scene, tmp_path) == scene
     assert "N = (-0.5*w1 - 0.25*w1**3, 0, 0) 1/s2; omega(0)" in heading(scene)[1]
 
 
@@ -129,7 +116,7 @@ def test_torque_that_is_a_function_is_shown_and_not_written(
 ) -> None:
     scene = Scene("function", (1, 2, 3), moments=(1, 2, 3), torque=torque)
     assert scene_record(scene)["torque"] == record
-    assert _is_documented(scene_record(scene))
+    assert is_documented(scene_record(scene))
     assert shown in heading(scene)[1]
     with pytest.raises(InputError) as raised:
         scene_text(scene)
@@ -150,7 +137,7 @@ def test_record_and_heading_have_the_expressions() -> None:
 
 def test_schema_of_the_record_has_one_form_of_torque() -> None:
     record = scene_record(case_scene(1))
-    assert _is_documented(record)
+    assert is_documented(record)
     for torque in (
         {"expression": TEXTS},
         {"expression": TEXTS, "constants": {}, "recorded": 3},
@@ -158,7 +145,7 @@ def test_schema_of_the_record_has_one_form_of_torque() -> None:
         {**record["torque"], "expression": TEXTS, "constants": {}},
         {},
     ):
-        assert not _is_documented(record | {"torque": torque})
+        assert not is_documented(record | {"torque": torque})
 
 
 def test_expressions_in_the_documents_are_read() -> None:

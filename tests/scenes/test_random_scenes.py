@@ -1,13 +1,17 @@
 """Random scenes: a seed gives the same scenes as when it was first used."""
 
 import hashlib
+from itertools import islice
 from random import Random
 
 import pytest
 
+from pyharness.scenes import free_motions, timed_kinds
 from pyharness.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
+from pyharness.scenes.cancelling import LEFT, MERGED, cancelling
 from pyharness.scenes.kinds import KINDS, NASTY
-from pyharness.scenes.random_scenes import draw, random_scene
+from pyharness.scenes.random_scenes import draw, random_scene, text_generator
+from pyharness.scenes.timed_kinds import timed_scenes
 
 
 def digest(*found: object) -> str:
@@ -39,6 +43,22 @@ def test_scenes_by_torque_are_as_they_were() -> None:
 def test_scenes_of_trials_are_as_they_were(kind: str, recorded: str) -> None:
     seeds = [f"attitude {k}" if kind == "pointing" else k for k in range(8)]
     assert digest([random_scene(kind, seed, "name") for seed in seeds]) == recorded
+
+
+def test_scenes_with_times_are_as_they_were() -> None:
+    found = [list(islice(timed_scenes(kind, [1982, 3]), 40)) for kind in timed_kinds.KINDS]
+    assert digest(found) == "58852fc320a89988"
+
+
+def test_other_motions_are_as_they_were() -> None:
+    tops = ("plain", "middle axis", "near symmetry", "near separatrix", "wild")
+    recorded = {
+        "60d95c9de4712645": [cancelling(kind, k) for kind in (*MERGED, *LEFT) for k in range(20)],
+        "0072db722665f989": [free_motions.draw(Random(k), k) for k in free_motions.KINDS],
+        "a1b68adb3412768f": [free_motions.draw_top(Random(kind), kind) for kind in tops],
+    }
+    assert list(map(digest, recorded.values())) == list(recorded)
+    assert text_generator("ensemble/a").random() == 0.011321796958609465
 
 
 def test_every_kind_gives_a_scene_with_its_name() -> None:

@@ -8,7 +8,7 @@ within it.
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from types import SimpleNamespace
@@ -17,7 +17,20 @@ from unittest.mock import patch
 
 import numpy as np
 
-from pyharness.checks.plants.plants import changed, instead
+from pyharness.checks.plants.faults import (
+    COMPILED,
+    PROGRAM,
+    Change,
+    Fault,
+    beside,
+    bit_off,
+    instead,
+    of,
+    off,
+    on,
+    plus,
+)
+from pyharness.checks.plants.plants import PLANTS
 from pyharness.checks.port_process import PortError
 from pyharness.checks.scene_trials import scene_trials
 from pyharness.checks.stress import TRIALS, Trial, trial
@@ -40,8 +53,6 @@ from pyharness.truth.reference import Reference, reference
 U = 2.0**-53
 ULP = 2.0 * U
 
-_RUN = "pyharness.original.programs.Program.run"
-_COMPILED = "pyharness.original.compiled.run"
 _IN_WORD = "pyharness.original.in_word.run"
 _ANSWER = "pyharness.checks.port.read_answer"
 _DECK = "pyharness.checks.decks.run_deck"
@@ -62,8 +73,6 @@ _MATRICES = "pyharness.checks.trials.matrices"
 for _name in TRIALS:
     trial(_name)
 
-Plant = Callable[[float], AbstractContextManager[Any]]
-
 
 @dataclass(frozen=True)
 class Slack:
@@ -74,7 +83,7 @@ class Slack:
     """
 
     check: str
-    planted: Plant
+    planted: Fault
     beyond: float
     within: float
     failing: str = ""
@@ -82,24 +91,17 @@ class Slack:
     trials: Callable[[], Mapping[str, Trial]] | None = None
 
 
-def near(check: str, planted: Plant, due: float) -> Slack:
+def near(check: str, planted: Fault, due: float) -> Slack:
     """Return a limit of size `due`, on an error that adds to the existing one."""
     return Slack(check, planted, 1.5 * due, 0.75 * due)
 
 
-def exact(check: str, planted: Plant, least: float = 1.0, failing: str = "") -> Slack:
+def exact(check: str, planted: Fault, least: float = 1.0, failing: str = "") -> Slack:
     """Return a limit of zero: the smallest possible error fails."""
     return Slack(check, planted, least, 0.0, failing)
 
 
 # The planted changes: `change(found, size)`.
-
-
-def off(found: Any, size: float) -> Any:
-    """Increase every component of omega by `size` times the largest."""
-    if not isinstance(found, np.ndarray):
-        return replace(found, omega=off(found.omega, size))
-    return found + size * np.abs(found).max(initial=0.0) * np.sign(found)
 
 
 @dataclass
@@ -127,10 +129,8 @@ def turned_off(found: Trajectory, size: float, along: bool = False) -> Trajector
 
 
 def _turned(attitude: Array, axes: Array, size: float) -> Array:
-    x, y, z = math.sin(0.5 * size) * axes.T
-    a, b, c, d = attitude.T
-    turn = np.full(len(attitude), math.cos(0.5 * size)), x, y, z
-    result: Array = np.array(product((a, b, c, d), turn)).T  # type: ignore[arg-type]
+    turn = np.full(len(attitude), math.cos(0.5 * size)), *math.sin(0.5 * size) * axes.T
+    result: Array = np.array(product(attitude.T, turn)).T
     return result
 
 
@@ -138,24 +138,9 @@ def unturned(found: Trajectory, size: float) -> Trajectory:
     return replace(found, attitude=None) if size else found
 
 
-def longer(found: Trajectory, size: float) -> Trajectory:
-    """Multiply every quaternion by 1 + `size`."""
-    assert found.attitude is not None
-    return replace(found, attitude=found.attitude * (1.0 + size))
-
-
-def last_off(found: Trajectory, size: float) -> Trajectory:
+def last_off(found: Array, size: float) -> Array:
     """Apply `off` to the last row only."""
-    return replace(found, omega=np.vstack([found.omega[:-1], off(found.omega[-1:], size)]))
-
-
-def bit_off(found: Any, size: float, name: str = "omega") -> Any:
-    """Multiply the largest element of an array by 1 + `size`, and change nothing else."""
-    if not isinstance(found, np.ndarray):
-        return replace(found, **{name: bit_off(getattr(found, name), size)})
-    changed = found.copy()
-    changed[np.unravel_index(np.abs(found).argmax(), found.shape)] *= 1.0 + size
-    return changed
+    return np.vstack([found[:-1], off(found[-1:], size)])
 
 
 def without_answer(found: list[Answer], size: float) -> list[Answer]:
@@ -169,59 +154,38 @@ def degrees_off(found: Array, size: float) -> Array:
     return wrong
 
 
-def counted_off(name: str) -> Callable[[Any, float], Any]:
-    return lambda found, size: replace(found, **{name: getattr(found, name) + int(size)})
-
-
 def value_off(found: Any, size: float) -> Any:
     """Multiply a number, or each number of an array, by 1 + `size`."""
     return found * (1.0 + size)
 
 
-def quotient_off(found: Trajectory, size: float) -> Trajectory:
-    if found.stop is None:
-        return found
-    return replace(found, stop=replace(found.stop, quotient=found.stop.quotient * (1.0 + size)))
-
-
-def cut(found: Trajectory, size: float) -> Trajectory:
-    """Leave out the last `size` rows."""
-    return replace(found, omega=found.omega[: len(found.omega) - int(size)])
-
-
-def singular(found: Trajectory, size: float) -> Trajectory:
+def singular(ier: Array, size: float) -> Array:
     """Report singular matrices for the last `size` steps."""
-    if found.ier is None or not size:
-        return found
-    ier = found.ier.copy()
-    ier[-int(size) :] = SINGULAR
-    return replace(found, ier=ier)
+    wrong = ier.copy()
+    wrong[len(ier) - int(size) :] = SINGULAR
+    return wrong
 
 
 def ended(found: Any, size: float, why: str = "overflow") -> Any:
     return replace(found, ended=why) if size else found
 
 
-def probe_off(found: Any, size: float) -> Any:
-    return replace(found, found=found.found + size)
+VALUE, IER = of("found", plus), of("ier", singular)
+TIME, LAST = of("time", bit_off), of("omega", last_off)
+QUOTIENT = of("stop", of("quotient", value_off))
+SHORT = of("omega", lambda found, size: found[: len(found) - int(size)])
+LONG = of("attitude", value_off)
 
 
 # The places of plants.
 
 
-def on(target: str, change: Callable[..., Any], call: int | None = None) -> Plant:
-    """Return a plant that changes what `target` (a dotted name) returns, in all calls or in one."""
-
-    def planted(size: float) -> AbstractContextManager[Any]:
-        calls = itertools.count(1)
-        return changed(
-            target, lambda found: found if call and next(calls) != call else change(found, size)
-        )
-
-    return planted
+def named(plant: str) -> Fault:
+    """Return a fault of the self-test of `verify` by its name."""
+    return next(each.planted for each in PLANTS if each.name == plant)
 
 
-def refuses(target: str, error: type[Exception] = InputError) -> Plant:
+def refuses(target: str, error: type[Exception] = InputError) -> Fault:
     """Return a plant that refuses every call, if the size is not 0."""
 
     def faulty(size: float, right: Callable[..., Any], *rest: Any, **named: Any) -> Any:
@@ -229,10 +193,10 @@ def refuses(target: str, error: type[Exception] = InputError) -> Plant:
             raise error("no")
         return right(*rest, **named)
 
-    return lambda size: instead(target, partial(faulty, size))
+    return instead(target, faulty)
 
 
-def made_by(target: str, stand_in: Callable[..., Any]) -> Plant:
+def made_by(target: str, stand_in: Callable[..., Any]) -> Fault:
     """Return a plant that replaces a function; the size comes before its arguments."""
     return lambda size: patch(target, partial(stand_in, size))
 
@@ -242,7 +206,7 @@ def _truth() -> Reference:
     return reference(case_scene(5), case_scene(5).times(), velocity=True)
 
 
-def graded(target: str, error: Callable[[Scene, float], float]) -> Plant:
+def graded(target: str, error: Callable[[Scene, float], float]) -> Fault:
     """Return a plant of results with a known error, relative to the largest omega of Case 5."""
 
     def faulty(size: float, right: Callable[..., Any], *rest: Any, **named: Any) -> Trajectory:
@@ -259,7 +223,7 @@ def graded(target: str, error: Callable[[Scene, float], float]) -> Plant:
         omega = rows(_truth().omega)
         return replace(known, ier=None, steps=scene.steps, omega=omega, velocity=velocity)
 
-    return lambda size: instead(target, partial(faulty, size))
+    return instead(target, faulty)
 
 
 def solved(size: float, scene: Scene, times: Sequence[float], *_: Any, **__: Any) -> Trajectory:
@@ -278,15 +242,11 @@ def roundings(more: float) -> Callable[[Scene, float], float]:
     return lambda scene, size: size * (8.0 * U * scene.steps + more)
 
 
-def stop_test(size: float) -> AbstractContextManager[Any]:
-    """Multiply the constant of the stop test by 1 + `size`."""
-
-    def faulty(right: Callable[..., Any], *rest: Any, **named: Any) -> Any:
-        if "lipschitz" in named:
-            named["lipschitz"] *= 1.0 + size
-        return right(*rest, **named)
-
-    return instead(_RUN, faulty)
+def _tighter(size: float, right: Callable[..., Any], *rest: Any, **named: Any) -> Any:
+    """Run a program with the constant of the stop test multiplied by 1 + `size`."""
+    if "lipschitz" in named:
+        named["lipschitz"] *= 1.0 + size
+    return right(*rest, **named)
 
 
 def kept(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -315,24 +275,13 @@ def shorter() -> AbstractContextManager[Any]:
     return patch.multiple(length, INTEGRATORS=_contenders(), STARTS=2)
 
 
-def watched(error: Callable[[float, float], float]) -> Plant:
+def watched(error: Callable[[float, float], float]) -> Fault:
     """Let the error of energy, momentum and phase be `error(size, time)`."""
 
     def faulty(size: float, scene: Scene, body: Any, time: float, *_: Any) -> dict[str, float]:
         return dict.fromkeys(brouwer.LAWS, error(size, time))
 
     return beside(shorter, made_by("pyharness.theory.brouwer.errors", faulty))
-
-
-def beside(around: Callable[[], AbstractContextManager[Any]], planted: Plant) -> Plant:
-    """Return a plant inside another context."""
-
-    @contextmanager
-    def both(size: float) -> Iterator[None]:
-        with around(), planted(size):
-            yield
-
-    return both
 
 
 def form_for_all(
@@ -358,17 +307,17 @@ def without(found: Iterator[Any] | dict[str, Any], size: float) -> Any:
     return {**found, "taylor": {**found["taylor"], "trajectory": rest}}
 
 
-def linear(change: Callable[[Any, float], Any]) -> Plant:
+def linear(change: Change) -> Fault:
     """Change what the compiled solver of linear equations returns."""
 
-    def room(kernels: Any, size: float) -> SimpleNamespace:
+    def altered(kernels: Any, size: float) -> SimpleNamespace:
         def faulty(a: Array, b: Array) -> tuple[Array, Array, int]:
             factors, x, ier = kernels.solve_linear(a, b)
             return factors, change(x, size), ier
 
         return SimpleNamespace(solve_linear=faulty)
 
-    return on("pyharness.model.extension.extension", room)
+    return on("pyharness.model.extension.extension", altered)
 
 
 def crossing_off(size: float) -> AbstractContextManager[Any]:
@@ -390,7 +339,6 @@ def some_bits(size: float) -> AbstractContextManager[Any]:
     )
 
 
-_TIME = partial(bit_off, name="time")
 _BITS = "cells/runge-kutta/case-3/original"
 _ORDERS = {"two-term": 2, "four-term": 2, "runge-kutta": 4}
 _TEXTBOOKS = {"improved-euler": 2, "taylor-3": 2, "rk4": 4}
@@ -405,22 +353,22 @@ def _with_form(name: str) -> int:
 
 VERIFY = (
     # Every bit, counter and label, in one language and in both alike.
-    exact("cells/two-term/case-3/corrected", on(_COMPILED, bit_off), ULP),
-    exact("random/0/program", on(_COMPILED, bit_off), ULP),
+    exact("cells/two-term/case-3/corrected", named("ulp-in-fortran"), ULP),
+    exact("random/0/program", on(COMPILED, bit_off), ULP),
     exact("words/two-term/case-3/corrected", on(_IN_WORD, bit_off), ULP),
     exact("words/vectors", on("pyharness.checks.words.answers", without_answer)),
-    exact("port/two-term/case-3/original", on(_ANSWER, partial(bit_off, name="rows")), ULP),
+    exact("port/two-term/case-3/original", on(_ANSWER, of("rows", bit_off)), ULP),
     exact("port/runge-kutta/case-2/original", refuses(_ANSWER, PortError)),
-    exact("decks/two-term/case-3/original", on(_COMPILED, bit_off), ULP),
+    exact("decks/two-term/case-3/original", on(COMPILED, bit_off), ULP),
     exact("decks/runge-kutta/case-2/original", refuses(_DECK, RuntimeError)),
-    exact(_BITS, on(_COMPILED, partial(bit_off, name="velocity")), ULP),
-    exact(_BITS, on(_COMPILED, partial(bit_off, name="recorded_time")), ULP),
-    exact(_BITS, on(_COMPILED, _TIME), ULP),
-    exact(_BITS, on(_RUN, _TIME), ULP),
-    exact(_BITS, on(_COMPILED, ended)),
-    exact(_BITS, on(_COMPILED, counted_off("evaluations"))),
-    exact(_BITS, on(_RUN, counted_off("evaluations"))),
-    exact("cells/four-term/case-3/corrected", on(_COMPILED, singular)),
+    exact(_BITS, named("velocity-in-fortran"), ULP),
+    exact(_BITS, named("label-in-fortran"), ULP),
+    exact(_BITS, on(COMPILED, TIME), ULP),
+    exact(_BITS, named("label-in-both"), ULP),
+    exact(_BITS, on(COMPILED, ended)),
+    exact(_BITS, named("count-in-fortran")),
+    exact(_BITS, named("count-in-both")),
+    exact("cells/four-term/case-3/corrected", on(COMPILED, IER)),
     exact("random/0/solve-taylor", refuses(f"{_DRAWN}.truth_of"), failing="random/0/no-truth"),
     # .298 of the digits from 1e-3 to the finest tolerance that each claims: 1e-15, 1e-14, 7e-13,
     # 2.1e-12, 2.2e-16, and 1e-12.
@@ -445,7 +393,7 @@ VERIFY = (
     # Under a torque that depends on the state.
     near("random/40/torque-solve-taylor/omega", on(_SOLVE, off), 3.83e-6),
     exact("random/40/torque-solve-taylor/omega", refuses(_SOLVE)),
-    exact("random/0/solve-taylor", on(_SOLVE, _TIME), ULP),
+    exact("random/0/solve-taylor", on(_SOLVE, TIME), ULP),
     exact("random/0/solve-taylor", on(_SOLVE, ended)),
     exact("random/0/solve-taylor", refuses(_SOLVE)),
     exact("cells/two-term/case-3/corrected", refuses("pyharness.checks.cells.case_scene"),
@@ -453,16 +401,16 @@ VERIFY = (
     # The last step of Case 7 ends at (.25, .91, 1.08). The limit is 4 roundings at either end, and
     # h times 32 roundings of the sum of the sizes of a rate's terms, 2.8, .3 and .16. For
     # collocation it is multiplied by the condition of the matrix, 7 and 547.
-    near("schemes/two-term/case-7", on(_RUN, last_off), 8.2 * U / 1.08),
-    near("schemes/four-term/case-7", on(_RUN, last_off), 37.0 * U / 1.08),
-    near("schemes/runge-kutta/case-7", on(_RUN, last_off), 2.9 * U / 1.08),
-    exact("schemes/runge-kutta/case-7", on(_RUN, cut)),
-    exact("stops/case-3/corrected", on(_RUN, cut)),
+    near("schemes/two-term/case-7", on(PROGRAM, LAST), 8.2 * U / 1.08),
+    near("schemes/four-term/case-7", on(PROGRAM, LAST), 37.0 * U / 1.08),
+    near("schemes/runge-kutta/case-7", on(PROGRAM, LAST), 2.9 * U / 1.08),
+    exact("schemes/runge-kutta/case-7", on(PROGRAM, SHORT)),
+    exact("stops/case-3/corrected", on(PROGRAM, SHORT)),
     # In a step of Case 3 the rates, 5 rad/s**2 with 32 roundings each, change by .27. Omega, 10
     # rad/s with 2 roundings at either end and those of the rates, changes by .05.
-    near("stops/case-3/corrected", on(_RUN, quotient_off), 2.3e-13),
+    near("stops/case-3/corrected", on(PROGRAM, QUOTIENT), 2.3e-13),
     # The constants differ from a quotient by twice the rounding.
-    near("stops/case-3/corrected", stop_test, 4.6e-13),
+    near("stops/case-3/corrected", instead(PROGRAM, _tighter), 4.6e-13),
     # A tolerance, relative to the largest omega.
     *(
         near(f"methods/{name}/case-{_with_form(name)}/1.0e-06",
@@ -474,7 +422,7 @@ VERIFY = (
     near("methods/taylor/case-1/1.0e-15", on(_SOLVE, off), 1e-15 + 17.0 * U),
     exact("methods/taylor/case-5/1.0e-06", refuses(_SOLVE)),
     exact("methods/closed-form/case-5/1.0e-06", made_by(_SOLVE, form_for_all)),
-    exact("methods/taylor/case-5/1.0e-06", on(_SOLVE, _TIME), ULP),
+    exact("methods/taylor/case-5/1.0e-06", on(_SOLVE, TIME), ULP),
     exact("methods/taylor/case-5/1.0e-06", on(_SOLVE, ended)),
     *(
         near(f"prepared/{name}/case-{_with_form(name)}/{end}/1.0e-06",
@@ -502,7 +450,7 @@ VERIFY = (
     ),
     # A fifth of an order.
     *(
-        near(f"orders/{name}/case-5{what}", graded(_RUN, of_order(_ORDERS[name])), 0.2)
+        near(f"orders/{name}/case-5{what}", graded(PROGRAM, of_order(_ORDERS[name])), 0.2)
         for name in PROGRAMS
         for what in ("", "/velocity")
     ),
@@ -512,8 +460,8 @@ VERIFY = (
     ),
     # An error counts as rounding up to 8 roundings of every step, and the error of the truth, which
     # is 7e-13 if `solve_ivp` computed it.
-    near("orders/two-term/case-5", graded(_RUN, roundings(7e-13)), 1.0),
-    near("orders/two-term/case-5/velocity", graded(_RUN, roundings(0.0)), 1.0),
+    near("orders/two-term/case-5", graded(PROGRAM, roundings(7e-13)), 1.0),
+    near("orders/two-term/case-5/velocity", graded(PROGRAM, roundings(0.0)), 1.0),
     # A method compared with print: half a unit of the last digit or the error that the source
     # admits (5e-15 here), the finest tolerance, and two roundings of each number of the problem,
     # which change the least sensitive omega by 4e-15.
@@ -528,21 +476,21 @@ VERIFY = (
     exact("external/nasa-brick-attitude/1/taylor/attitude", on(_SOLVE, unturned)),
     near("external/nasa-brick/30/taylor", on(_SOLVE, off), 2e-8 / 34.3),
     # A program's halved steps have half a unit in the last place for each of 16 384 steps.
-    near("external/detest-b5/20/runge-kutta", on(_RUN, off), 2.0e-12),
+    near("external/detest-b5/20/runge-kutta", on(PROGRAM, off), 2.0e-12),
     # Half a unit of three digits, of which 3.9e-4 is used, and the error of the halved steps.
-    Slack("external/hairer-rigid-body/20/runge-kutta", on(_RUN, off), 4e-4, 1e-4),
+    Slack("external/hairer-rigid-body/20/runge-kutta", on(PROGRAM, off), 4e-4, 1e-4),
     exact("external/detest-b5/20/auto", refuses(_SOLVE)),
-    exact("external/detest-b5/20/two-term", on(_RUN, singular)),
+    exact("external/detest-b5/20/two-term", on(PROGRAM, IER)),
     # The record and the result may each have an error of 1e-9; where every bit counts, none.
     near("golden/taylor/case-5", on(_SOLVE, off), 2e-9),
-    exact("golden/taylor/case-5", on(_SOLVE, _TIME), ULP),
+    exact("golden/taylor/case-5", on(_SOLVE, TIME), ULP),
     exact("golden/taylor/case-5", on("pyharness.checks.golden.read_record", without)),
     exact("golden/taylor", on("pyharness.checks.golden.recorded", without),
           failing="golden/taylor/case-5-method-taylor-tolerance-1e-09"),
     # With another library's sine and cosine, results may differ by the rounding of a wave.
     near("golden/rk4/case-7", beside(other_library, on(_SOLVE, off)), 3.4e-15),
     exact("golden/rk4/case-5", on(_SOLVE, bit_off), ULP),
-    exact("golden/two-term/case-5/corrected", on(_RUN, bit_off), ULP),
+    exact("golden/two-term/case-5/corrected", on(PROGRAM, bit_off), ULP),
 )  # fmt: skip
 
 _SCALED = "pyharness.checks.trials.scales.run_method"
@@ -634,7 +582,7 @@ STRESS = (
     exact("length/taylor/tumbling/prepared",
           beside(shorter, on(_ANSWERED, bit_off)), ULP),
     exact("invariance/taylor/signs-12/free/1e-06", on(_FREE, bit_off, call=2), ULP),
-    exact("invariance/runge-kutta/cyclic/free/corrected", on(_RUN, bit_off, call=2), ULP),
+    exact("invariance/runge-kutta/cyclic/free/corrected", on(PROGRAM, bit_off, call=2), ULP),
     exact("invariance/taylor/signs-12/free/1e-06", refuses(_FREE)),
     # Either solution may have an error of the tolerance, amplified 2.7 times.
     near("invariance/taylor/cyclic/free/1e-06", on(_FREE, off, call=2), 5.4e-6),
@@ -648,7 +596,7 @@ STRESS = (
     near("attitude/closed-form/plate/1e-14/angle", on(_SOLVE, turned_off), 40.0 * U),
     near("attitude/closed-form/revolutions-1000000/tumbling/angle",
          on(_SOLVE, turned_off), 40.0 * U),
-    near("attitude/closed-form/plate/1e-14/length", on(_SOLVE, longer), 8.0 * U),
+    near("attitude/closed-form/plate/1e-14/length", on(_SOLVE, LONG), 8.0 * U),
     near("attitude/closed-form/plate/1e-14/momentum", on(_SOLVE, turned_off), 78.0 * U),
     near("attitude/taylor/plate/1e-06/angle", on(_SOLVE, turned_off), 1e-6),
     near("attitude/dop853/needle/1e-06/angle", on(_SOLVE, turned_off), 1e-6),
@@ -666,7 +614,7 @@ STRESS = (
          64.0 * U),
     near("attitude/angles/3-2-1/pole", on("pyharness.checks.trials.attitude.angles", degrees_off),
          64.0 * U),
-    exact("matrices/two-term/1e-02/ier", on(f"{_MATRICES}.solved", counted_off("ier"))),
+    exact("matrices/two-term/1e-02/ier", on(f"{_MATRICES}.solved", of("ier", plus))),
     exact("matrices/two-term/1e-02/bits", linear(bit_off), ULP),
     # 3n roundings of a sum, propagated by the inverse.
     near("matrices/two-term/1e-02/residual", linear(value_off), 6.0 * U),
@@ -678,10 +626,10 @@ STRESS = (
          lambda found, size: replace(found, pivoting=(size, found.pivoting[1]))), 16.0 * U),
     near("matrices/four-term/threshold",
          on(f"{_MATRICES}.declared_singular_below", value_off), 1.3e-14),
-    exact("matrices/four-term/original/ier-1e-04", on(_COMPILED, singular)),
+    exact("matrices/four-term/original/ier-1e-04", on(COMPILED, IER)),
     # Roundings of a step, amplified by the difference quotient that gives its derivative.
     *(
-        near(f"regions/{program}/corrected/{check}", on(f"{_REGIONS}.{probe}", probe_off), due)
+        near(f"regions/{program}/corrected/{check}", on(f"{_REGIONS}.{probe}", VALUE), due)
         for program, check, probe, due in (
             ("two-term", "first-step-spin-0.25", "first_step", 7.0e-14),
             ("four-term", "first-step-spin-0.25", "first_step", 9.5e-11),

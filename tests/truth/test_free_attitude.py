@@ -8,8 +8,8 @@ import pytest
 
 from pyharness import Scene
 from pyharness.model.scene import Triple
+from pyharness.scenes.free_motions import KINDS, draw
 from pyharness.truth.free_attitude import free_attitude, is_steady, period_of
-from tests.attitude_errors import KINDS, draw
 from tests.exact_attitude import DIGITS, exact
 
 

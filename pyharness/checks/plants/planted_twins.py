@@ -4,16 +4,40 @@ import importlib
 import itertools
 import shutil
 import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
+from unittest.mock import patch
 
 from pyharness import original
+from pyharness.checks.plants.faults import Fault
+from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.programs import PROGRAM_REGISTRY, Program
+
+
+class TwinFault(NamedTuple):
+    """A fault in the Python version (the twin) of programs: a piece of its source, and another.
+
+    The fields are the columns of the table `data/plants.toml`.
+    """
+
+    file: str
+    right: str
+    wrong: str
+    size: float
+    programs: str
+    shows: str
+
+
+TWIN_FAULTS = {name: TwinFault(*row) for name, *row in facts("plants")["twin"]}
+"""The faults of the twins, by name."""
 
 _COUNT = itertools.count()
 
@@ -44,14 +68,33 @@ class PlantedTwin(Program):
         return super()._computed(scene, listing, implementation, *options)
 
 
-def plant_in_twin(
-    program: str, file: str, old: str, new: str, folder: Path, both: bool = True
-) -> PlantedTwin:
-    """Return the program named `program`, with one fault in its Python version (its twin).
+def twin(program: str, name: str, both: bool = True) -> Fault:
+    """Return the fault named `name` in the Python version (its twin) of the program `program`.
 
-    The source of the twins is copied into `folder`, the text `old` is replaced by `new` in the copy
-    of `file`, and the copy is imported. If `both`, the faulty twin also runs in place of the
-    compiled program.
+    Within the context, the program in the registry is a `PlantedTwin`, which the context yields.
+    The fault has the key `name` in `TWIN_FAULTS`. If `both`, the faulty twin also runs in place of
+    the compiled program.
+    """
+    fault = TWIN_FAULTS[name]
+
+    @contextmanager
+    def planted(size: float) -> Iterator[PlantedTwin]:
+        wrong = fault.wrong.replace("SIZE", repr(size)) if size else fault.right
+        with tempfile.TemporaryDirectory() as folder:
+            module = _altered(program, fault.file, fault.right, wrong, Path(folder))
+            known = PROGRAM_REGISTRY[program]
+            faulty = PlantedTwin(known.name, known.order, known.source, module, both)
+            with patch.dict(PROGRAM_REGISTRY, {program: faulty}):
+                yield faulty
+
+    return planted
+
+
+def _altered(program: str, file: str, right: str, wrong: str, folder: Path) -> ModuleType:
+    """Return the twin of a program from a copy of the source of the twins.
+
+    The source is copied into `folder`, and the text `right` in the copy of `file` is replaced by
+    `wrong`.
     """
     package = f"planted_{next(_COUNT)}"
     target = folder / package
@@ -61,14 +104,12 @@ def plant_in_twin(
     for path in target.glob("*.py"):
         text = path.read_text().replace("pyharness.original", package)
         if path.name == file:
-            assert text.count(old) == 1, f"{old!r} stands {text.count(old)} times in {file}"
-            text = text.replace(old, new)
+            assert text.count(right) == 1, f"{right!r} stands {text.count(right)} times in {file}"
+            text = text.replace(right, wrong)
         path.write_text(text)
     sys.path.insert(0, str(folder))
     try:
         importlib.invalidate_caches()
-        module = importlib.import_module(f"{package}.{program.replace('-', '_')}")
+        return importlib.import_module(f"{package}.{program.replace('-', '_')}")
     finally:
         sys.path.remove(str(folder))
-    known = PROGRAM_REGISTRY[program]
-    return PlantedTwin(known.name, known.order, known.source, module, both)

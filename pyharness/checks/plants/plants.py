@@ -1,18 +1,14 @@
 """Planted faults: one fault at a time, planted to test which check detects it.
 
-A fault is planted in the running process and removed when its context ends. The compiled programs
-are altered at their entry point, and the Python twins in a copy of their source.
+The compiled programs are altered at their entry point, and the Python twins in a copy of their
+source.
 """
 
 import itertools
-import pkgutil
-import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from functools import partial
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 from unittest.mock import patch
@@ -20,109 +16,59 @@ from unittest.mock import patch
 import numpy as np
 
 from pyharness.checks.external_file import Problem
-from pyharness.checks.plants.planted_twins import plant_in_twin
-from pyharness.methods.registry import METHODS
+from pyharness.checks.plants.faults import (
+    COMPILED,
+    PROGRAM,
+    Change,
+    Fault,
+    bit_off,
+    changing,
+    in_method,
+    instead,
+    of,
+    off,
+    on,
+    plus,
+    swapped,
+    third_off,
+)
+from pyharness.checks.plants.planted_twins import twin
 from pyharness.methods.solver import CODES as _CODES
 from pyharness.model import extension
 from pyharness.model.codes import Methods, Places
 from pyharness.model.listing import Listing, flagged
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.original.programs import PROGRAM_REGISTRY, Program
-
-_COMPILED = "pyharness.original.compiled.run"
-_BOTH = "pyharness.original.programs.Program.run"  # in either language
+from pyharness.original.programs import Program
 
 
 @dataclass(frozen=True)
 class Plant:
     """A fault that is planted to test the checks: its name, its description, and how to plant it.
 
-    `planted` returns a context manager within which the fault is present. `kinds` are the kinds of
-    checks that can detect the fault, besides the comparison with stored results. The self-test runs
-    these kinds.
+    `planted` takes the size of the fault, and returns a context manager within which the fault is
+    present. A fault of size 0 changes nothing. `size` is the size in the self-test. `kinds` are the
+    kinds of checks that can detect the fault, besides the comparison with stored results. The
+    self-test runs these kinds.
     """
 
     name: str
     fault: str
-    planted: Callable[[], AbstractContextManager[Any]]
+    planted: Fault
+    size: float
     kinds: tuple[str, ...]
 
 
-def instead(target: str, faulty: Callable[..., Any]) -> AbstractContextManager[Any]:
-    """Return a context manager that replaces the function with the dotted name `target`.
+def _stale() -> Change:
+    """Return a change that replaces a run's trajectory by that of an earlier run.
 
-    A call then becomes ``faulty(right, ...)``, where `right` is the original function.
-    """
-    right = pkgutil.resolve_name(target)
-    return patch(target, lambda *rest, **named: faulty(right, *rest, **named))
-
-
-def changed(target: str, change: Callable[[Any], Any]) -> AbstractContextManager[Any]:
-    """Return a context manager that applies `change` to every result of a function.
-
-    `target` is the dotted name of the function.
-    """
-    return instead(target, lambda right, *rest, **named: change(right(*rest, **named)))
-
-
-@contextmanager
-def _twin(program: str, file: str, old: str, new: str, both: bool) -> Iterator[None]:
-    with tempfile.TemporaryDirectory() as folder:
-        faulty = plant_in_twin(program, file, old, new, Path(folder), both)
-        with patch.dict(PROGRAM_REGISTRY, {program: faulty}):
-            yield
-
-
-def _method(name: str, faulty: Callable[..., Trajectory]) -> AbstractContextManager[Any]:
-    """Return a context manager that replaces the function `solve` of the method named `name`.
-
-    A call then becomes ``faulty(right, scene, times, ...)``, where `right` is the original
-    function.
-    """
-    known = METHODS[name]
-    return patch.dict(METHODS, {name: replace(known, solve=partial(faulty, known.solve))})
-
-
-def _method_changed(
-    name: str, change: Callable[[Trajectory], Trajectory]
-) -> AbstractContextManager[Any]:
-    return _method(name, lambda right, *rest, **named: change(right(*rest, **named)))
-
-
-def _swapped(run: Trajectory) -> Trajectory:
-    return replace(run, omega=run.omega[:, [1, 0, 2]])
-
-
-def _one_ulp(run: Trajectory) -> Trajectory:
-    if len(run.omega) < 20:
-        return run
-    omega = run.omega.copy()
-    omega[17, 1] = np.nextafter(omega[17, 1], np.inf)
-    return replace(run, omega=omega)
-
-
-def _velocity_sign(run: Trajectory) -> Trajectory:
-    return run if run.velocity is None else replace(run, velocity=run.velocity * [1.0, 1.0, -1.0])
-
-
-def _half_step_label(run: Trajectory) -> Trajectory:
-    n = len(run.recorded_time)
-    half = 0.5 * float(run.recorded_time[0]) if n else 0.0
-    return replace(run, recorded_time=run.recorded_time - half)
-
-
-def _stale() -> Callable[[Trajectory], Trajectory]:
-    """Return a function that replaces a run's trajectory by that of an earlier run.
-
-    This is a planted fault. The function takes a trajectory, and returns the trajectory of the last
-    run before it with as many rows. The first trajectory of each number of rows is returned
-    unchanged.
+    This is a planted fault. The result is the trajectory of the last run before with as many rows.
+    The first trajectory of each number of rows is returned unchanged.
     """
     before: dict[int, Trajectory] = {}
 
-    def change(run: Trajectory) -> Trajectory:
-        old = before.get(len(run.omega), run)
+    def change(run: Trajectory, size: float) -> Trajectory:
+        old = before.get(len(run.omega), run) if size else run
         before[len(run.omega)] = run
         return old
 
@@ -134,20 +80,24 @@ def _stale() -> Callable[[Trajectory], Trajectory]:
 _Answer = tuple[Array, int, int, Array]
 
 
-def _prepared(change: Callable[[Array, _Answer], _Answer]) -> AbstractContextManager[Any]:
-    """Return a context manager that changes the results of the compiled kernel of prepared solvers.
+def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
+    """Return a fault that changes the results of the compiled kernel of prepared solvers.
 
-    Each result becomes ``change(packed, result)``, where `packed` is the input of the kernel. A
-    prepared solver is one that `prepare` has set up for one scene.
+    Each result becomes ``change(packed, result, size)``, where `packed` is the input of the kernel.
+    A prepared solver is one that `prepare` has set up for one scene.
     """
-    entry = extension.extension().solve_packed
-    kernel = SimpleNamespace(
-        solve_packed=lambda packed, *rest: change(packed, entry(packed, *rest))
-    )
-    return patch("pyharness.methods.solver.extension", lambda: kernel)
+
+    def planted(size: float) -> AbstractContextManager[Any]:
+        entry = extension.extension().solve_packed
+        kernel = SimpleNamespace(
+            solve_packed=lambda packed, *rest: change(packed, entry(packed, *rest), size)
+        )
+        return patch("pyharness.methods.solver.extension", lambda: kernel)
+
+    return planted
 
 
-def _stale_solver() -> AbstractContextManager[Any]:
+def _stale_solver(size: float) -> AbstractContextManager[Any]:
     """Return a context manager by which prepared solvers give a stale result in every second call.
 
     The stale result is the result of the call before. This is a planted fault, which checks must
@@ -156,79 +106,90 @@ def _stale_solver() -> AbstractContextManager[Any]:
     calls = itertools.count()
     before: list[_Answer] = []
 
-    def change(packed: Array, answer: _Answer) -> _Answer:
-        if next(calls) % 2 == 0:
+    def change(packed: Array, answer: _Answer, size: float) -> _Answer:
+        if not size or next(calls) % 2 == 0:
             before[:] = [answer]
         return before[0]
 
-    return _prepared(change)
+    return _prepared(change)(size)
 
 
-def _refuses(packed: Array, answer: _Answer) -> _Answer:
+def _refuses(packed: Array, answer: _Answer, size: float) -> _Answer:
     omega, _, steps, found = answer
     refused = omega * np.nan, extension.REFUSED, steps, found
-    return refused if packed[Places.METHOD] == Methods.QUICK else answer
+    return refused if size and packed[Places.METHOD] == Methods.QUICK else answer
 
 
 _FIXED = [code for name, code in _CODES.items() if name.startswith(("gauss", "rk", "impr"))]
 
 
-def _too_large(packed: Array, answer: _Answer) -> _Answer:
-    """Return the results of a prepared solver's kernel, with omega 1 % too large for some methods.
+def _too_large(packed: Array, answer: _Answer, size: float) -> _Answer:
+    """Return the results of a prepared solver's kernel, with too large an omega for some methods.
 
     These are the methods with a fixed step and Gauss collocation. `packed` is the input of the
-    kernel, which contains the method. A prepared solver is one that `prepare` has set up for one
-    scene. This is a planted fault, which checks must detect.
+    kernel, which contains the method, and `size` the relative error. A prepared solver is one that
+    `prepare` has set up for one scene. This is a planted fault, which checks must detect.
     """
     omega, status, steps, found = answer
-    return (omega * 1.01 if packed[Places.METHOD] in _FIXED else omega, status, steps, found)
+    wrong = omega * (1.0 + size)
+    return (wrong if packed[Places.METHOD] in _FIXED else omega, status, steps, found)
 
 
-def _half_step(scene: Scene) -> Scene:
-    return replace(scene, step_size=0.5 * scene.step_size)
+def _shorter(scene: Scene, size: float) -> Scene:
+    return replace(scene, step_size=(1.0 - size) * scene.step_size)
 
 
-def _half_step_compiled(run: Callable[..., Trajectory], scene: Scene, *rest: Any) -> Trajectory:
-    """Call `run`, a compiled program, with half the step size, but return the times of whole steps.
+def _shorter_compiled(
+    size: float, run: Callable[..., Trajectory], scene: Scene, *rest: Any
+) -> Trajectory:
+    """Call `run`, a compiled program, with a smaller step size, but return the times of its own.
 
-    This is a planted fault. The rows of the result have the omegas after half steps and the times
-    of whole steps.
+    This is a planted fault. The rows of the result have the omegas after the smaller steps and the
+    times of whole steps.
     """
-    found, labels = run(_half_step(scene), *rest), run(scene, *rest)
+    found, labels = run(_shorter(scene, size), *rest), run(scene, *rest)
     if found.steps != labels.steps:
         return found
     return replace(found, time=labels.time, recorded_time=labels.recorded_time)
 
 
-def _half_step_both(
-    run: Callable[..., Trajectory], program: Program, scene: Scene, *rest: Any, **named: Any
-) -> Trajectory:
-    found = run(program, _half_step(scene), *rest, **named)
-    return replace(found, time=2.0 * found.time, recorded_time=2.0 * found.recorded_time)
+def _shorter_both(
+    size: float, run: Callable[..., Trajectory], program: Program, scene: Scene, *rest: Any,
+    **named: Any,
+) -> Trajectory:  # fmt: skip
+    found, part = run(program, _shorter(scene, size), *rest, **named), 1.0 - size
+    return replace(found, time=found.time / part, recorded_time=found.recorded_time / part)
 
 
 def _label_both(
-    run: Callable[..., Trajectory], program: Program, scene: Scene, *rest: Any, **named: Any
-) -> Trajectory:
+    size: float, run: Callable[..., Trajectory], program: Program, scene: Scene, *rest: Any,
+    **named: Any,
+) -> Trajectory:  # fmt: skip
     found = run(program, scene, *rest, **named)
-    return replace(found, time=found.time - 0.5 * scene.step_size)
+    return replace(found, time=found.time - size * scene.step_size)
+
+
+def _earlier(time: Array, size: float) -> Array:
+    """Return times shifted by a part of the first step."""
+    return time - size * time[:1] if len(time) else time
 
 
 def _shifted(
-    solve: Callable[..., Trajectory], scene: Scene, times: Sequence[float], *rest: float
-) -> Trajectory:
-    """Call `solve` for times that are half a step late, and label the results with `times` (s).
+    size: float, solve: Callable[..., Trajectory], scene: Scene, times: Sequence[float],
+    *rest: float,
+) -> Trajectory:  # fmt: skip
+    """Call `solve` for times that are too late, and label the results with `times` (s).
 
-    This is a planted fault. The results still conserve energy and momentum, so that only a
-    comparison with the true solution detects it.
+    The delay is `size` steps. This is a planted fault. The results still conserve energy and
+    momentum, so that only a comparison with the true solution detects it.
     """
-    half = 0.5 * scene.step_size if times[-1] >= 0.0 else -0.5 * scene.step_size
-    found = solve(scene, [t + half for t in times], *rest)
+    late = size * scene.step_size if times[-1] >= 0.0 else -size * scene.step_size
+    found = solve(scene, [t + late for t in times], *rest)
     time = np.array(times[: len(found.time)], dtype=float)
     return replace(found, time=time, recorded_time=time)
 
 
-def _wrong_card() -> AbstractContextManager[Any]:
+def _wrong_card(size: float) -> AbstractContextManager[Any]:
     """Return a context manager that exchanges the flags of two defects in the compiled programs.
 
     This is a planted fault, which checks must detect. A flag tells a compiled program whether to
@@ -244,104 +205,105 @@ def _wrong_card() -> AbstractContextManager[Any]:
         kept = bits & ~(1 << known[0] | 1 << known[1])
         return int(kept | first << known[1] | second << known[0])
 
-    return patch.object(Listing, "flags", property(wrong))
+    return patch.object(Listing, "flags", property(wrong)) if size else nullcontext()
 
 
-def _digit_altered(known: Problem) -> Problem:
-    """Return a published problem with the last but one digit of its first number changed.
+def _digit_altered(known: Problem, size: float) -> Problem:
+    """Return a published problem whose first omega is wrong by `size` times its accuracy.
 
-    This is a planted fault, which the checks against published results must detect.
+    This is a planted fault, which the checks against published results must detect. A problem
+    without a published omega is returned unchanged.
     """
     value = known.values[0]
-    figure = next(each for each in value.omega if each is not None)
-    wrong = replace(figure, value=figure.value + Decimal(20.0 * figure.accuracy))
+    figure = next((each for each in value.omega if each is not None), None)
+    if figure is None:
+        return known
+    wrong = replace(figure, value=figure.value + Decimal(size * figure.accuracy))
     omega = tuple(wrong if each is figure else each for each in value.omega)
     return replace(known, values=(replace(value, omega=omega), *known.values[1:]))
 
 
-_COEFFICIENT = ("runge_kutta.py", "r2 + b * u[2]", "r2 + 1.000000001 * b * u[2]")
-_STAGE = ("runge_kutta.py", "_distances(slope[4], slope[1])", "_distances(slope[3], slope[1])")
-_SIGN = ("equations.py", "m[2] + c * u[0]", "m[2] - c * u[0]")
+_VELOCITY, _COUNT = of("velocity", third_off), of("evaluations", plus)
 
 PLANTS = (
     Plant("sign-in-twin", "a sign in the third equation of a twin",
-          lambda: _twin("four-term", *_SIGN, both=False),
+          twin("four-term", "sign", both=False), 2.0,
           ("cells", "words")),
     Plant("sign-in-both", "a sign in the third equation, in both languages alike",
-          lambda: _twin("two-term", *_SIGN, both=True),
+          twin("two-term", "sign"), 2.0,
           ("decks", "schemes")),
     Plant("sign-in-series", "a sign in what the Taylor kernel is given",
-          lambda: changed("pyharness.methods.taylor.series_kernel",
-                          lambda found: (found[0],
-                                         (found[1][0] * [1.0, 1.0, -1.0], *found[1][1:]))),
+          on("pyharness.methods.taylor.series_kernel",
+             lambda found, size: (found[0], (third_off(found[1][0], size), *found[1][1:]))), 2.0,
           ("methods", "attitudes")),
     Plant("sign-in-reference", "a sign in the reference itself",
-          lambda: changed("pyharness.truth.reference.exact_coefficients",
-                          lambda found: [found[0], found[1], -found[2]]),
+          on("pyharness.truth.reference.exact_coefficients",
+             lambda found, size: [found[0], found[1], (1 - int(size)) * found[2]]), 2.0,
           ("methods", "prepared")),
     Plant("axis-in-fortran", "two axes of the compiled programs change places",
-          lambda: changed(_COMPILED, _swapped),
+          on(COMPILED, of("omega", swapped)), 1.0,
           ("cells", "decks")),
     Plant("axis-in-method", "two axes of the closed form change places",
-          lambda: _method_changed("closed-form", _swapped),
+          in_method("closed-form", changing(of("omega", swapped))), 1.0,
           ("methods",)),
     Plant("wrong-card", "the compiled programs correct another card than the one named",
-          _wrong_card,
+          _wrong_card, 1.0,
           ("cells", "words")),
     Plant("half-step-in-fortran", "the compiled programs take half a step",
-          lambda: instead(_COMPILED, _half_step_compiled),
+          instead(COMPILED, _shorter_compiled), 0.5,
           ("decks", "schemes")),
     Plant("half-step-in-both", "half a step in both languages, labelled as a whole one",
-          lambda: instead(_BOTH, _half_step_both),
+          instead(PROGRAM, _shorter_both), 0.5,
           ("schemes", "stops")),
     Plant("ulp-in-fortran", "one unit in the last place of one result",
-          lambda: changed(_COMPILED, _one_ulp),
+          on(COMPILED, bit_off), 2.0**-52,
           ("cells",)),
     Plant("velocity-in-fortran", "a sign in the velocity",
-          lambda: changed(_COMPILED, _velocity_sign),
+          on(COMPILED, _VELOCITY), 2.0,
           ("decks", "schemes")),
     Plant("velocity-in-both", "a sign in the velocity, in both languages alike",
-          lambda: changed(_BOTH, _velocity_sign),
+          on(PROGRAM, _VELOCITY), 2.0,
           ("schemes", "stops")),
     Plant("coefficient-in-both", "a coefficient off by a part in 1e9, in both languages alike",
-          lambda: _twin("runge-kutta", *_COEFFICIENT, both=True),
+          twin("runge-kutta", "coefficient b"), 1e-9,
           ("schemes", "orders")),
     Plant("stop-in-both", "the stop test looks at another stage, in both languages alike",
-          lambda: _twin("runge-kutta", *_STAGE, both=True),
+          twin("runge-kutta", "stage of the stop test"), 1.0,
           ("stops",)),
-    Plant("stale-fortran", "the result of the run before", lambda: changed(_COMPILED, _stale()),
+    Plant("stale-fortran", "the result of the run before",
+          lambda size: on(COMPILED, _stale())(size), 1.0,
           ("stops", "cells")),
     Plant("stale-method", "the Taylor method answers with the result before",
-          lambda: _method_changed("taylor", _stale()),
+          lambda size: in_method("taylor", changing(_stale()))(size), 1.0,
           ("methods", "random")),
-    Plant("stale-solver", "a prepared solver answers with the result before", _stale_solver,
+    Plant("stale-solver", "a prepared solver answers with the result before", _stale_solver, 1.0,
           ("prepared", "random")),
     Plant("quick-refuses", "the solver for few digits refuses every scene",
-          lambda: _prepared(_refuses),
+          _prepared(_refuses), 1.0,
           ("prepared",)),
     Plant("label-in-fortran", "TIME shifted by half a step",
-          lambda: changed(_COMPILED, _half_step_label),
+          on(COMPILED, of("recorded_time", _earlier)), 0.5,
           ("cells", "decks")),
     Plant("label-in-both", "the time of every row shifted by half a step, in both languages",
-          lambda: instead(_BOTH, _label_both),
+          instead(PROGRAM, _label_both), 0.5,
           ("cells", "words")),
     Plant("label-of-method", "a motion half a step late, energy and momentum conserved",
-          lambda: _method("closed-form", _shifted),
+          in_method("closed-form", _shifted), 0.5,
           ("methods", "attitudes")),
     Plant("count-in-fortran", "one right-hand side too many in the count",
-          lambda: changed(_COMPILED, lambda run: replace(run, evaluations=run.evaluations + 1)),
+          on(COMPILED, _COUNT), 1.0,
           ("cells",)),
     Plant("count-in-both", "the count of right-hand sides, in both languages alike",
-          lambda: changed(_BOTH, lambda run: replace(run, evaluations=2 * run.evaluations)),
+          on(PROGRAM, _COUNT), 1.0,
           ("cells", "words")),
     Plant("prepared-steps", "prepared solvers in fixed steps are wrong by a hundredth",
-          lambda: _prepared(_too_large),
+          _prepared(_too_large), 1e-2,
           ("prepared",)),
     Plant("digit-of-the-print", "a digit of a published figure",
-          lambda: changed("pyharness.checks.kinds.problems",
-                          lambda found: list(map(_digit_altered, found))),
+          on("pyharness.checks.kinds.problems",
+             lambda found, size: [_digit_altered(each, size) for each in found]), 20.0,
           ("external",)),
     Plant("scipy", "another SciPy, whose results are wrong in the fourth digit",
-          lambda: _method_changed("dop853", lambda run: replace(run, omega=run.omega * 1.0001)),
+          in_method("dop853", changing(off)), 1e-4,
           ("methods", "orders")),
 )  # fmt: skip

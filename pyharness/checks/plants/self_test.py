@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -62,7 +61,7 @@ def self_test(seed: str, record: Path) -> Iterator[Caught]:
     chosen = Selection(seed=seed, draws=_DRAWS, record=record, thin=True)
     yield _caught(None, chosen)
     for plant in PLANTS:
-        with plant.planted():
+        with plant.planted(plant.size):
             yield _caught(plant, replace(chosen, only=plant.kinds))
 
 
@@ -98,9 +97,10 @@ def self_test_report(title: Sequence[str], found: Sequence[Caught], seed: str) -
     """
     told = []
     for caught in found:
-        plant = caught.plant or Plant("none", "no fault: nothing may fail", nullcontext, ())
+        plant = caught.plant
+        name, fault = (plant.name, plant.fault) if plant else ("none", "no fault: nothing may fail")
         by = f"caught by {caught.counts} ({caught.example})" if caught.failed else "nothing fails"
-        told += [f"{'' if caught.passed else 'FAILED '}{plant.name}: {plant.fault}", f"  {by}"]
+        told += [f"{'' if caught.passed else 'FAILED '}{name}: {fault}", f"  {by}"]
     missed = sum(not caught.passed for caught in found)
     end = f"{missed} not as it should be" if missed else "each caught by more than the record"
     end = f"{len(found) - 1} plants and a control: {end}"

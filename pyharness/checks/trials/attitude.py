@@ -318,13 +318,11 @@ def _angles(off: float, name: Name) -> Check:
 
 
 def _product(q: Array, by: Quaternion) -> Array:
-    a, b, c, d = q.T
-    return np.array(product((a, b, c, d), by)).T
+    return np.array(product(q.T, by)).T
 
 
 def _from_left(by: Quaternion, q: Array) -> Array:
-    a, b, c, d = q.T
-    return np.array(product(by, (a, b, c, d))).T
+    return np.array(product(by, q.T)).T
 
 
 TRIAL = Trial(

@@ -1,0 +1,58 @@
+"""The loop of all measurements: the calls of a task are prepared and then timed in turn."""
+
+import statistics
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
+
+from pyharness.compare.timing import SLOW, Clock, seconds
+from pyharness.model.progress import Progress
+
+_Row = TypeVar("_Row")
+Say = Callable[[str], None]  # receives the current part of a task
+
+
+class Task(Protocol):
+    """A task of a benchmark, such as a scene and an end time, with its name in messages."""
+
+    @property
+    def place(self) -> str: ...  # noqa: D102
+
+
+_Task = TypeVar("_Task", bound=Task)
+
+
+@dataclass(frozen=True)
+class Call(Generic[_Row]):
+    """A call of a solver that is to be timed, and the row of the results that records its time."""
+
+    run: Callable[[], object] | None  # None if the call failed and is not timed
+    clock: Clock
+    row: Callable[..., _Row]  # makes the row from the keyword argument `seconds` (s or None)
+
+
+def timed(
+    tasks: Sequence[_Task],
+    calls: Callable[[_Task, Say], Iterable[Call[_Row]]],
+    progress: Progress,
+    length: float,
+    rounds: int,
+    statistic: Callable[[Sequence[float]], float] = statistics.median,
+    slow: float = SLOW,
+) -> Iterator[_Row]:
+    """Yield the rows of the results: for each task, `calls` prepares the calls, which are timed.
+
+    `progress` is called with a message before each part of the work. The last four parameters are
+    those of `pyharness.compare.timing.seconds`.
+    """
+    for number, task in enumerate(tasks):
+
+        def say(text: str, number: int = number, place: str = task.place) -> None:
+            progress(number, len(tasks), f"{place}: {text}")
+
+        found = list(calls(task, say))
+        runs = [each.run for each in found if each.run]
+        clocks = [each.clock for each in found if each.run]
+        times = iter(seconds(runs, length, rounds, say, statistic, clocks, slow))
+        for each in found:
+            yield each.row(seconds=next(times) if each.run else None)

@@ -1,0 +1,138 @@
+"""Faults of a chosen size, which show that a check can fail: in which function, and what changes.
+
+A fault is planted in the running process and removed when its context ends. The self-test of
+`verify` and the tests of the limits plant faults by these functions.
+"""
+
+import itertools
+import pkgutil
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
+from functools import partial
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from pyharness.methods.registry import METHODS
+from pyharness.model.trajectory import Array
+
+COMPILED = "pyharness.original.compiled.run"
+PROGRAM = "pyharness.original.programs.Program.run"  # in either language
+
+Fault = Callable[[float], AbstractContextManager[Any]]
+"""A function that takes the size of a fault, and returns a context in which the fault is present.
+
+A fault of size 0 changes no result.
+"""
+
+Change = Callable[[Any, float], Any]
+"""A function that takes a right result and the size of a fault, and returns the wrong result."""
+
+Faulty = Callable[..., Any]
+"""A function that takes the size of a fault, the right function, and the arguments of a call.
+
+It returns the result of the call in place of the right function.
+"""
+
+
+def instead(target: str, faulty: Faulty) -> Fault:
+    """Return a fault that replaces the function with the dotted name `target` by `faulty`."""
+
+    def planted(size: float) -> AbstractContextManager[Any]:
+        right = pkgutil.resolve_name(target)
+        # A lambda, unlike a partial function, can replace a method of a class.
+        return patch(target, lambda *rest, **named: faulty(size, right, *rest, **named))
+
+    return planted
+
+
+def in_method(name: str, faulty: Faulty) -> Fault:
+    """Return a fault that replaces the function `solve` of the method `name` by `faulty`."""
+    known = METHODS[name]
+    return lambda size: patch.dict(
+        METHODS, {name: replace(known, solve=partial(faulty, size, known.solve))}
+    )
+
+
+def changing(change: Change) -> Faulty:
+    """Return a faulty function that applies `change` to the result of the right function."""
+    return lambda size, right, *rest, **named: change(right(*rest, **named), size)
+
+
+def on(target: str, change: Change, call: int | None = None) -> Fault:
+    """Return a fault that changes the results of the function with the dotted name `target`.
+
+    Only the call with the number `call`, counted from 1, has a wrong result. If `call` is None, all
+    calls have.
+    """
+
+    def planted(size: float) -> AbstractContextManager[Any]:
+        calls = itertools.count(1)
+
+        def wrong(found: Any, size: float) -> Any:
+            return found if call and next(calls) != call else change(found, size)
+
+        return instead(target, changing(wrong))(size)
+
+    return planted
+
+
+def beside(around: Callable[[], AbstractContextManager[Any]], planted: Fault) -> Fault:
+    """Return a fault that is planted inside another context."""
+
+    @contextmanager
+    def both(size: float) -> Iterator[None]:
+        with around(), planted(size):
+            yield
+
+    return both
+
+
+def of(name: str, change: Change) -> Change:
+    """Return a change of the attribute `name` of a result, if the result has this attribute."""
+
+    def changed(found: Any, size: float) -> Any:
+        value = getattr(found, name)
+        return found if value is None else replace(found, **{name: change(value, size)})
+
+    return changed
+
+
+def plus(found: Any, size: float) -> Any:
+    """Return a number increased by `size`, or by its integer part if the number is an integer."""
+    return found + (int(size) if isinstance(found, int) else size)
+
+
+def off(found: Any, size: float) -> Any:
+    """Return omega with each component increased by `size` times the largest component.
+
+    `found` is omega, or a result with the attribute `omega`.
+    """
+    if not isinstance(found, np.ndarray):
+        return replace(found, omega=off(found.omega, size))
+    return found + size * np.abs(found).max(initial=0.0) * np.sign(found)
+
+
+def bit_off(found: Any, size: float) -> Any:
+    """Return omega with its largest component multiplied by 1 + `size`, and all others unchanged.
+
+    `found` is omega or another array, or a result with the attribute `omega`.
+    """
+    if not isinstance(found, np.ndarray):
+        return replace(found, omega=bit_off(found.omega, size))
+    wrong = found.copy()
+    wrong[np.unravel_index(np.abs(found).argmax(), found.shape)] *= 1.0 + size
+    return wrong
+
+
+def third_off(found: Array, size: float) -> Array:
+    """Return vectors whose third component is multiplied by 1 - `size`."""
+    wrong: Array = found * [1.0, 1.0, 1.0 - size]
+    return wrong
+
+
+def swapped(found: Array, size: float) -> Array:
+    """Return vectors whose first two components are exchanged, if the size is not 0."""
+    return found[:, [1, 0, 2]] if size else found

@@ -8,11 +8,13 @@ import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from pyharness.dynamics.system import with_constant_body
+from pyharness.methods import dense
 from pyharness.methods.plan import plan
 from pyharness.methods.registry import (
     METHODS,
@@ -24,6 +26,7 @@ from pyharness.methods.registry import (
 )
 from pyharness.methods.scipy_ivp import finest_tolerance
 from pyharness.model.attitude import IDENTITY
+from pyharness.model.dense_output import DenseOutput
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, unknown
 from pyharness.model.principal import in_scene_axes, principal
@@ -53,6 +56,7 @@ def solve(
     *,
     effort: float = 1.0,
     attitude: bool = False,
+    dense_output: bool = False,
 ) -> Trajectory:
     """Solve a scene at given times.
 
@@ -77,6 +81,11 @@ def solve(
         scene has none, the body's axes are parallel to the axes of space at time 0. The tolerance
         then also applies to the attitude's angle (rad). A torque that depends on the attitude, or
         is about the axes of space, requires the attitude.
+    dense_output : bool
+        Whether the attribute `sol` of the trajectory is the solution as a function of time, from 0
+        to the last of `times` on each side of 0. The tolerance then also applies between `times`.
+        The function consists of polynomials through more results of the method, which take further
+        integrations. For a method with a fixed step it is a cubic polynomial on each step.
 
     Returns
     -------
@@ -148,7 +157,25 @@ def solve(
     found = replace(found, moments=moments, tolerance=reported, scene=given)
     if is_full:
         found = in_scene_axes(found, axes)
+    if dense_output:
+        found = replace(found, sol=_dense(given, found, method, tolerance, effort))
     return _reversed(found) if turned else found
+
+
+def _dense(
+    scene: Scene, found: Trajectory, method: str, tolerance: float, effort: float
+) -> DenseOutput:
+    """Return the solution of a scene as a function of time, between the times of `found` and 0."""
+    rows = partial(_more_rows, scene, method, effort, found.attitude is not None)
+    is_closed = not found.evaluations and method != "reference"
+    return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
+
+
+def _more_rows(
+    scene: Scene, method: str, effort: float, attitude: bool, times: list[float], tolerance: float
+) -> Trajectory:
+    """Return a trajectory of a scene; a tolerance of 1 is that of a method with a fixed step."""
+    return solve(scene, times, method, tolerance, effort=effort, attitude=attitude)
 
 
 def finest(method: str, scene: Scene, time: float) -> float:

@@ -15,6 +15,7 @@ from pyharness.model.mechanics import turned_to_space as turned_to_space
 from pyharness.model.shown import short_repr
 
 if TYPE_CHECKING:
+    from pyharness.model.dense_output import DenseOutput
     from pyharness.model.scene import Scene
 
 # Largest relative rounding error of a number in binary64.
@@ -105,6 +106,8 @@ class Trajectory(Mechanics, Conversions):
         with a fixed step, which have no tolerance.
     scene : Scene or None
         The scene that the function `solve` solved. None for programs.
+    sol : DenseOutput or None
+        The solution as a function of time, if it was requested. It is not saved in a file.
 
     Examples
     --------
@@ -131,6 +134,7 @@ class Trajectory(Mechanics, Conversions):
     exact: NDArray[np.object_] | None = None
     tolerance: float | None = None
     scene: "Scene | None" = field(default=None, repr=False)
+    sol: "DenseOutput | None" = field(default=None, repr=False)
 
     __repr__ = short_repr
 

@@ -1,0 +1,175 @@
+"""Dense output of every method: Chebyshev polynomials through the method's own results.
+
+The intervals of the polynomials are divided until the last coefficients are far below the
+tolerance. A closed form is not approximated, but evaluated.
+"""
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from pyharness.dynamics.rates import rates
+from pyharness.model.array_type import Array
+from pyharness.model.dense_output import NODES, POINTS, TO_COEFFICIENTS, DenseOutput, Pieces
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.trajectory import Trajectory
+
+# The results at the nodes are computed to this part of the tolerance, because a polynomial may
+# have larger errors than its nodes.
+_NODE_TOLERANCE = 0.25
+# Largest of the last coefficients of a polynomial, in tolerances, and relative to the state.
+_LAST = 0.02
+_ROUNDING = 4e-16
+_TAIL = 3  # coefficients whose size is an estimate of those left out
+# A piece that is divided and whose tail does not become much smaller has errors of the method that
+# are not smooth.
+_DIVIDED = 8.0
+_MOST_PARTS = 64  # into which an interval is divided at once
+_MOST_PIECES = 200_000
+_RADIANS = 2.0  # of rotation in an interval; first guess
+
+# A function that returns the trajectory at given times to a given tolerance.
+Rows = Callable[[list[float], float], Trajectory]
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """The states at any times, computed by the method itself."""
+
+    rows: Rows
+    tolerance: float
+
+    def __call__(self, times: Array) -> Array:
+        """Return the states at `times` (s), one row for each."""
+        each, place = np.unique(times, return_inverse=True)
+        return _states(self.rows(each.tolist(), self.tolerance))[place]
+
+
+def dense_output(
+    scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float, is_closed: bool
+) -> DenseOutput:
+    """Return the solution of a scene as a function of time.
+
+    `found` is the trajectory of the scene, with its rows in ascending or descending order of time.
+    The function is defined between time 0 and its rows. `rows` returns more rows of the same
+    method, `tolerance` is the requested tolerance, and `finest` the smallest one of the method.
+    `is_closed` says that the method evaluates a closed form. A tolerance of 1 means that the method
+    has a fixed step. Raise InputError if too many polynomials would be needed.
+    """
+    ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
+    derivatives = partial(rates, scene)
+    if is_closed or len(ends) == 1:
+        return DenseOutput(ends[0], ends[-1], _Solved(rows, tolerance), derivatives)
+    if tolerance == 1.0:
+        states: Pieces = _of_fixed_steps(scene, ends, rows, derivatives)
+    else:
+        own = max(finest, _NODE_TOLERANCE * tolerance)
+        states = _fitted(_first_edges(scene, found, ends), rows, tolerance, own)
+    return DenseOutput(ends[0], ends[-1], states, derivatives)
+
+
+def _first_edges(scene: Scene, found: Trajectory, ends: list[float]) -> list[float]:
+    """Return the ends of the first intervals (s), among which are all changes of tables."""
+    tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
+    tables = [each.table for each in tape.operations if each.table] if tape else []
+    changes = {time for table in tables for time in table.breaks}
+    inner = {time for time in changes if ends[0] < time < ends[-1]}
+    bounds = sorted({*ends, *inner})
+    fastest = float(np.abs(found.omega).max(initial=max(map(abs, scene.omega))))
+    total = ends[-1] - ends[0]
+    share = min(_MOST_PIECES, found.steps, fastest * total / _RADIANS) / total
+    edges: list[float] = []
+    for low, high in itertools.pairwise(bounds):
+        count = max(1, math.ceil((high - low) * share))
+        edges += np.linspace(low, high, count + 1)[:-1].tolist()
+    return [*edges, bounds[-1]]
+
+
+def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pieces:
+    """Return polynomials through the rows of a method, for intervals that are divided as needed."""
+    open_pieces = [(low, high, math.inf) for low, high in itertools.pairwise(edges)]
+    done: dict[float, tuple[float, Array]] = {}
+    scale = 0.0
+    aim = max(_LAST * tolerance, _ROUNDING)
+    while open_pieces:
+        if len(open_pieces) + len(done) > _MOST_PIECES:
+            raise InputError(
+                f"dense_output: more than {_MOST_PIECES} polynomials would be needed; use a "
+                "shorter time or a larger tolerance, or give the times of the results"
+            )
+        nodes = np.array([_nodes(low, high) for low, high, _ in open_pieces])
+        times, place = np.unique(nodes, return_inverse=True)
+        try:
+            states = _states(rows(times.tolist(), own))
+        except InputError:
+            if own == tolerance:
+                raise
+            own = tolerance
+            continue
+        if len(states) < len(times):
+            raise InputError("dense_output: the method reached fewer times than before")
+        scale = max(scale, float(np.abs(states[:, :3]).max()))
+        values = states[place.reshape(nodes.shape)]
+        coefficients = np.einsum("kj,pjm->pkm", TO_COEFFICIENTS, values)
+        tails = np.abs(coefficients[:, -_TAIL:]).max(axis=1)
+        tails[:, :3] /= scale or 1.0
+        following = []
+        for (low, high, before), terms, tail in zip(
+            open_pieces, coefficients, tails.max(axis=1).tolist(), strict=True
+        ):
+            is_rough = tail <= tolerance and tail > before / _DIVIDED
+            if tail <= aim or is_rough or high - low <= 64 * math.ulp(max(abs(low), abs(high))):
+                done[low] = high, terms
+                continue
+            parts = math.ceil(1.2 * (tail / aim) ** (1.0 / (NODES - _TAIL)))
+            cuts = np.linspace(low, high, min(max(parts, 2), _MOST_PARTS) + 1).tolist()
+            following += [(a, b, tail) for a, b in itertools.pairwise(cuts)]
+        open_pieces = following
+    starts = sorted(done)
+    return Pieces(np.array([*starts, done[starts[-1]][0]]), np.array([done[t][1] for t in starts]))
+
+
+def _nodes(low: float, high: float) -> Array:
+    middle, half = 0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low
+    nodes = middle + half * POINTS
+    nodes[[0, -1]] = low, high
+    return nodes
+
+
+def _of_fixed_steps(
+    scene: Scene, ends: list[float], rows: Rows, derivatives: Callable[[Array, Array], Array]
+) -> Pieces:
+    """Return the cubic polynomials that have the states and derivatives at the ends of steps."""
+    step = scene.step_size
+    steps = [math.ceil(abs(end) / step) for end in ends]
+    if max(steps) > _MOST_PIECES:
+        raise InputError(
+            f"dense_output: more than {_MOST_PIECES} steps; use a larger step or a shorter time"
+        )
+    before = [-k * step for k in range(steps[0] - 1, 0, -1)] if ends[0] < 0.0 else []
+    after = [k * step for k in range(1, steps[-1])] if ends[-1] > 0.0 else []
+    times = np.unique([ends[0], *before, 0.0, *after, ends[-1]])
+    states = _states(rows(times.tolist(), 1.0))
+    slopes = derivatives(times, states)
+    length = np.diff(times)[:, None, None]
+    u = (0.5 + 0.5 * POINTS)[None, :, None]
+    first, last = states[:-1, None], states[1:, None]
+    values = (
+        (1.0 + 2.0 * u) * (1.0 - u) ** 2 * first
+        + u * u * (3.0 - 2.0 * u) * last
+        + length * u * (1.0 - u) * ((1.0 - u) * slopes[:-1, None] - u * slopes[1:, None])
+    )
+    return Pieces(times, np.einsum("kj,pjm->pkm", TO_COEFFICIENTS, values))
+
+
+def _states(found: Trajectory) -> Array:
+    """Return omega and attitude of a trajectory in rows, in the order of its times."""
+    if found.attitude is None:
+        return np.array(found.omega)
+    return np.column_stack([found.omega, found.attitude])

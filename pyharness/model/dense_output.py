@@ -1,0 +1,163 @@
+"""Dense output: the solution of a scene as a function of time, by piecewise polynomials."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pyharness.model.array_type import Array
+from pyharness.model.errors import InputError
+
+# Nodes of each polynomial.
+NODES = 17
+# Chebyshev points of the second kind from -1 to 1, in ascending order, symmetric to the last bit.
+POINTS: Array = np.sin(np.pi * np.arange(1 - NODES, NODES, 2) / (2 * (NODES - 1)))
+# Times whose polynomials are evaluated together, so that little memory is needed.
+_BLOCK = 20_000
+
+
+def _values_to_coefficients() -> Array:
+    angles = np.pi * np.outer(np.arange(NODES), np.arange(NODES)[::-1]) / (NODES - 1)
+    weights = np.full(NODES, 2.0 / (NODES - 1))
+    weights[[0, -1]] /= 2.0
+    matrix: Array = np.cos(angles) * weights
+    matrix[[0, -1]] /= 2.0
+    return matrix
+
+
+# Multiplied by the values at POINTS it gives the coefficients of Chebyshev polynomials
+# (Trefethen 2013, Approximation Theory and Approximation Practice, chapters 3 and 4).
+TO_COEFFICIENTS = _values_to_coefficients()
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """A function of time that is a polynomial on each of several adjacent intervals.
+
+    Attributes
+    ----------
+    edges : ndarray, shape (p + 1,)
+        The ends of the intervals (s), in ascending order.
+    coefficients : ndarray, shape (p, NODES, m)
+        The coefficients of Chebyshev polynomials for each interval and component.
+    """
+
+    edges: Array
+    coefficients: Array
+
+    def __call__(self, times: Array) -> Array:
+        """Return the values at `times` (s), shape (n, m)."""
+        found = np.empty((len(times), self.coefficients.shape[2]))
+        for begin in range(0, len(times), _BLOCK):
+            block = slice(begin, begin + _BLOCK)
+            found[block] = self._values(times[block])
+        return found
+
+    def _values(self, times: Array) -> Array:
+        last = len(self.edges) - 2
+        piece = np.clip(np.searchsorted(self.edges, times, side="right") - 1, 0, last)
+        low, high = self.edges[piece], self.edges[piece + 1]
+        x = (((times - low) - (high - times)) / (high - low))[:, None]
+        # Clenshaw's recurrence.
+        terms = self.coefficients[piece]
+        first = second = np.zeros_like(terms[:, 0])
+        for k in range(NODES - 1, 0, -1):
+            first, second = 2.0 * x * first - second + terms[:, k], first
+        value: Array = x * first - second + terms[:, 0]
+        return value
+
+
+@dataclass(frozen=True, eq=False)
+class DenseOutput:
+    """The solution of a scene as a function of time, the attribute `sol` of a trajectory.
+
+    Attributes
+    ----------
+    t_min, t_max : float
+        The times (s) between which the solution can be evaluated.
+    states : callable
+        The function that returns omega (rad/s), and the attitude if it was requested, in rows.
+    rates : callable
+        The function that returns the derivatives of these rows at given times.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, solve
+    >>> sol = solve(case_scene(2), 2.0, dense_output=True).sol
+    >>> sol(0.5).round(6)
+    array([-0.148513,  0.147786,  0.10133 ])
+    >>> sol([0.5, 1.0]).shape
+    (3, 2)
+    """
+
+    t_min: float
+    t_max: float
+    states: Callable[[Array], Array]
+    rates: Callable[[Array, Array], Array]
+
+    def __call__(self, t: Any) -> Array:
+        """Return the state at one or more times.
+
+        Parameters
+        ----------
+        t : float or array_like, shape (n,)
+            Times from `t_min` to `t_max` (s), in any order.
+
+        Returns
+        -------
+        ndarray, shape (m,) or (m, n)
+            Omega (rad/s), and if the attitude was requested, the four components of its unit
+            quaternion, scalar first, so that m is 3 or 7. One number `t` gives shape (m,).
+
+        Raises
+        ------
+        InputError
+            If a time is no number, or is not between `t_min` and `t_max`.
+        """
+        times, shape = self._checked(t)
+        return self._shaped(self._states(times), shape)
+
+    def derivative(self, t: Any) -> Array:
+        """Return the derivative of the state at one or more times, by the equations of motion.
+
+        Parameters
+        ----------
+        t : float or array_like, shape (n,)
+            Times from `t_min` to `t_max` (s), in any order. Where a table of the torque changes,
+            the derivative is that just after the time.
+
+        Returns
+        -------
+        ndarray, shape (m,) or (m, n)
+            The derivatives (1/s) of the components that the dense output itself returns.
+
+        Raises
+        ------
+        InputError
+            If a time is no number, or is not between `t_min` and `t_max`.
+        """
+        times, shape = self._checked(t)
+        return self._shaped(self.rates(times, self._states(times)), shape)
+
+    def _states(self, times: Array) -> Array:
+        found = self.states(times)
+        found[:, 3:] /= np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
+        return found
+
+    def _checked(self, t: Any) -> tuple[Array, tuple[int, ...]]:
+        allowed = f"allowed: numbers from {self.t_min:g} to {self.t_max:g} s"
+        try:
+            times = np.asarray(t, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"dense output: a time is no number; {allowed}") from None
+        if times.ndim > 1:
+            raise InputError(f"dense output: times with {times.ndim} dimensions; allowed: one")
+        outside = times[~((times >= self.t_min) & (times <= self.t_max))]
+        if outside.size:
+            raise InputError(f"dense output: t = {outside[0]:g} s; {allowed}")
+        return np.atleast_1d(times), times.shape
+
+    @staticmethod
+    def _shaped(rows: Array, shape: tuple[int, ...]) -> Array:
+        return rows.T if shape else rows[0]

@@ -120,12 +120,12 @@ def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pie
         tails = np.abs(coefficients[:, -_TAIL:]).max(axis=1)
         tails[:, :3] /= scale or 1.0
         following = []
-        for (low, high, before), terms, tail in zip(
-            open_pieces, coefficients, tails.max(axis=1).tolist(), strict=True
+        for (low, high, before), own_values, tail in zip(
+            open_pieces, values, tails.max(axis=1).tolist(), strict=True
         ):
             is_rough = tail <= tolerance and tail > before / _DIVIDED
             if tail <= aim or is_rough or high - low <= 64 * math.ulp(max(abs(low), abs(high))):
-                done[low] = high, terms
+                done[low] = high, own_values
                 continue
             parts = math.ceil(1.2 * (tail / aim) ** (1.0 / (NODES - _TAIL)))
             cuts = np.linspace(low, high, min(max(parts, 2), _MOST_PARTS) + 1).tolist()
@@ -165,7 +165,7 @@ def _of_fixed_steps(
         + u * u * (3.0 - 2.0 * u) * last
         + length * u * (1.0 - u) * ((1.0 - u) * slopes[:-1, None] - u * slopes[1:, None])
     )
-    return Pieces(times, np.einsum("kj,pjm->pkm", TO_COEFFICIENTS, values))
+    return Pieces(times, values)
 
 
 def _states(found: Trajectory) -> Array:

@@ -18,7 +18,9 @@ _BLOCK = 20_000
 
 
 def _values_to_coefficients() -> Array:
-    angles = np.pi * np.outer(np.arange(NODES), np.arange(NODES)[::-1]) / (NODES - 1)
+    # Angles up to pi have the smallest rounding errors.
+    turns = np.outer(np.arange(NODES), np.arange(NODES)[::-1]) % (2 * NODES - 2)
+    angles = np.pi * np.minimum(turns, 2 * NODES - 2 - turns) / (NODES - 1)
     weights = np.full(NODES, 2.0 / (NODES - 1))
     weights[[0, -1]] /= 2.0
     matrix: Array = np.cos(angles) * weights
@@ -31,6 +33,11 @@ def _values_to_coefficients() -> Array:
 TO_COEFFICIENTS = _values_to_coefficients()
 
 
+# Weights of the barycentric formula (the same book, chapter 5).
+_WEIGHTS: Array = np.where(np.arange(NODES) % 2, -1.0, 1.0)
+_WEIGHTS[[0, -1]] /= 2.0
+
+
 @dataclass(frozen=True, eq=False)
 class Pieces:
     """A function of time that is a polynomial on each of several adjacent intervals.
@@ -39,33 +46,40 @@ class Pieces:
     ----------
     edges : ndarray, shape (p + 1,)
         The ends of the intervals (s), in ascending order.
-    coefficients : ndarray, shape (p, NODES, m)
-        The coefficients of Chebyshev polynomials for each interval and component.
+    values : ndarray, shape (p, NODES, m)
+        The values of the m components at the Chebyshev points of each interval.
     """
 
     edges: Array
-    coefficients: Array
+    values: Array
+
+    @property
+    def coefficients(self) -> Array:
+        """The coefficients of Chebyshev polynomials for each interval, shape (p, NODES, m)."""
+        found: Array = np.einsum("kj,pjm->pkm", TO_COEFFICIENTS, self.values)
+        return found
 
     def __call__(self, times: Array) -> Array:
         """Return the values at `times` (s), shape (n, m)."""
-        found = np.empty((len(times), self.coefficients.shape[2]))
+        found = np.empty((len(times), self.values.shape[2]))
         for begin in range(0, len(times), _BLOCK):
             block = slice(begin, begin + _BLOCK)
-            found[block] = self._values(times[block])
+            found[block] = self._at(times[block])
         return found
 
-    def _values(self, times: Array) -> Array:
+    def _at(self, times: Array) -> Array:
         last = len(self.edges) - 2
         piece = np.clip(np.searchsorted(self.edges, times, side="right") - 1, 0, last)
         low, high = self.edges[piece], self.edges[piece + 1]
-        x = (((times - low) - (high - times)) / (high - low))[:, None]
-        # Clenshaw's recurrence.
-        terms = self.coefficients[piece]
-        first = second = np.zeros_like(terms[:, 0])
-        for k in range(NODES - 1, 0, -1):
-            first, second = 2.0 * x * first - second + terms[:, k], first
-        value: Array = x * first - second + terms[:, 0]
-        return value
+        apart = (((times - low) - (high - times)) / (high - low))[:, None] - POINTS
+        values = self.values[piece]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            weights = _WEIGHTS / apart
+            found: Array = np.einsum("nj,njm->nm", weights, values) / weights.sum(axis=1)[:, None]
+        # The formula fails at the nodes themselves, where the values are known.
+        row, node = np.nonzero(apart == 0.0)
+        found[row] = values[row, node]
+        return found
 
 
 @dataclass(frozen=True, eq=False)

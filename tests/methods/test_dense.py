@@ -1,0 +1,221 @@
+"""Tests of dense output: the solution as a function of time, for every method."""
+
+import math
+import pickle
+from collections.abc import Callable
+from dataclasses import replace
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, case_scene, solve, torques
+from pyharness.methods import dense
+from pyharness.model.dense_output import DenseOutput, Pieces
+from pyharness.model.trajectory import Trajectory
+from pyharness.scenes.random_scenes import draw as draw_law
+from pyharness.scenes.state_scenes import SUDDEN, draw, draw_ready
+
+MOMENTS = (1.0, 2.0, 3.0)
+OMEGA = (0.1, 2.0, 0.1)
+TIMES = [-4.0, 0.0, 1.5, 12.0]
+BRICK = Scene("brick", OMEGA, moments=MOMENTS, step_size=0.01)
+LAW = TorqueLaw((0.1, 0.2, 0.0), sines=[((0.1, 0.0, 0.3), 2.0)])
+TABLE = torques.table(
+    [0.0, 3.0, 7.0, 11.0],
+    [[0.0, 0.0, 0.1], [0.2, 0.0, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 0.0]],
+    "held",
+)
+SCENES = {
+    "free": BRICK,
+    "law": replace(BRICK, torque=LAW),
+    "damping": replace(BRICK, torque=torques.damping(0.05)),
+    "table": replace(BRICK, torque=TABLE),
+    "full": Scene(
+        "full", OMEGA, inertia=[[2.0, 0.3, 0.1], [0.3, 3.0, -0.2], [0.1, -0.2, 4.0]], torque=LAW
+    ),
+    "changing": Scene("changing", OMEGA, moments=ChangingMoments([[1.0, 0.05], [2.0], [3.0]])),
+    "space": replace(BRICK, torque=replace(LAW, frame="space")),
+}
+
+
+def sol_of(found: Trajectory) -> DenseOutput:
+    assert found.sol is not None
+    return found.sol
+
+
+def largest_error(sol: DenseOutput, truth: Trajectory) -> float:
+    """Return the largest error at the times of a trajectory: relative, or of a quaternion."""
+    state = sol(truth.time)
+    error = float(np.abs(state[:3].T - truth.omega).max() / np.abs(truth.omega).max())
+    if len(state) > 3 and truth.attitude is not None:
+        error = max(error, 2.0 * float(np.abs(state[3:].T - truth.attitude).max()))
+    return error
+
+
+@pytest.mark.parametrize(
+    ("name", "method", "tolerance"),
+    [
+        *[(name, "auto", tol) for name in SCENES for tol in (1e-3, 1e-7, 1e-12)],
+        *[(name, "taylor", 1e-10) for name in SCENES],
+        *[(name, "dop853", 1e-7) for name in SCENES if name != "space"],
+        ("free", "closed-form", 1e-12),
+        *[("law", f"gauss-{n}", 1e-7) for n in (2, 3, 4, 8)],
+        *[(name, method, 1e-5) for name in ("law", "damping") for method in ("rk45", "lsoda")],
+        ("damping", "radau", 1e-4),
+        ("damping", "reference", 1e-12),
+        ("damping", "gauss-6", 1e-9),
+    ],
+)
+def test_the_tolerance_holds_at_all_times(name: str, method: str, tolerance: float) -> None:
+    scene = SCENES[name]
+    turning = not method.startswith("gauss") and name != "changing"
+    found = solve(scene, TIMES, method, tolerance, attitude=turning, dense_output=True)
+    source = Random(f"{name} {method} {tolerance}")
+    times = sorted(source.uniform(TIMES[0], TIMES[-1]) for _ in range(400))
+    truth = solve(scene, times, tolerance=1e-14, attitude=turning)
+    assert truth.growth is None or truth.growth < 1e4
+    limit = tolerance + 4e-15 * (found.growth or truth.growth or 1e3)
+    assert largest_error(sol_of(found), truth) <= limit
+    assert largest_error(sol_of(found), found) <= 2.0 * limit
+
+
+@pytest.mark.parametrize("number", range(12))
+def test_the_tolerance_holds_in_random_scenes(number: int) -> None:
+    source = Random(f"dense {number}")
+    if number % 4 == 0:
+        scene, time = draw_ready(source)
+    elif number % 4 == 1:
+        scene, time = draw(source, (source.choice(SUDDEN),))
+    elif number % 4 == 2:
+        scene, time = draw(source)
+    else:
+        scene, time = draw_law("dense", number).scene, source.uniform(-20.0, 20.0)
+    turning = scene.torque.needs_attitude
+    times = sorted((source.uniform(0.0, time) for _ in range(200)), key=abs)
+    truth = solve(scene, [*times, time], tolerance=1e-14, attitude=turning)
+    for tolerance in (1e-4, 1e-9):
+        found = solve(scene, time, tolerance=tolerance, attitude=turning, dense_output=True)
+        if found.ended == "overflow":
+            assert truth.ended == "overflow"
+            continue
+        assert found.growth is not None
+        assert largest_error(sol_of(found), truth) <= tolerance + 1e-14 * max(1.0, found.growth)
+
+
+def test_the_polynomials_join() -> None:
+    found = solve(SCENES["law"], [-4.0, 12.0], attitude=True, dense_output=True)
+    pieces = sol_of(found).states
+    assert isinstance(pieces, Pieces)
+    inner = pieces.edges[1:-1]
+    assert len(inner) > 10
+    assert pieces.values[:-1, -1].tolist() == pieces.values[1:, 0].tolist()
+    before = pieces(np.nextafter(inner, -math.inf))
+    # The state changes by some spacings of the time, which are up to 2e-15 s.
+    assert before == pytest.approx(pieces(inner), rel=0.0, abs=1e-14)
+
+
+def test_breakpoints_of_a_table_end_polynomials() -> None:
+    pieces = sol_of(solve(SCENES["table"], [5.0, 12.0], dense_output=True)).states
+    assert isinstance(pieces, Pieces)
+    assert {3.0, 7.0, 11.0} <= set(pieces.edges.tolist())
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_derivative_is_that_of_the_solution(name: str) -> None:
+    turning = name != "changing"
+    found = solve(SCENES[name], [-4.0, 12.0], tolerance=1e-13, attitude=turning, dense_output=True)
+    sol = sol_of(found)
+    times = np.array([-3.3, -1.0, 0.5, 2.2, 6.6, 9.0])
+    step = 1e-3
+    # A central difference of the sixth order.
+    weights = {1: 45.0, 2: -9.0, 3: 1.0}
+    slope = sum(w * (sol(times + k * step) - sol(times - k * step)) for k, w in weights.items())
+    assert sol.derivative(times) == pytest.approx(slope / (60.0 * step), rel=0.0, abs=1e-9)
+
+
+def test_the_derivative_under_an_opaque_torque() -> None:
+    torque = torques.opaque(lambda t, omega: [-0.1 * omega[0], 0.0, math.sin(t)])
+    scene = Scene("opaque", (1.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=torque)
+    sol = sol_of(solve(scene, 3.0, "dop853", 1e-9, dense_output=True))
+    assert sol.derivative(2.0) == pytest.approx(
+        [-0.05 * math.exp(-0.1), 0.0, 0.5 * math.sin(2.0)], abs=1e-8
+    )
+
+
+@pytest.mark.parametrize("method", ["rk4", "taylor-3", "improved-euler"])
+def test_a_method_with_a_fixed_step_has_a_cubic_polynomial_on_each_step(method: str) -> None:
+    scene = SCENES["law"]
+    found = solve(scene, [-0.355, 1.0, 2.0], method, dense_output=True)
+    sol = sol_of(found)
+    steps = solve(scene, [0.01, 0.5, 1.99], method)
+    assert sol(steps.time) == pytest.approx(steps.y, rel=0.0, abs=1e-15)
+    assert sol(found.time) == pytest.approx(found.y, rel=0.0, abs=2e-14)
+    truth = solve(scene, [0.123, 1.234], tolerance=1e-13)
+    assert largest_error(sol, truth) <= (1e-8 if method == "rk4" else 1e-4)
+
+
+def test_times_before_and_after() -> None:
+    down = solve(BRICK, [2.0, -3.0], dense_output=True)
+    assert (sol_of(down).t_min, sol_of(down).t_max) == (-3.0, 2.0)
+    back = solve(SCENES["law"], [-1.0, -3.0], dense_output=True)
+    assert (sol_of(back).t_min, sol_of(back).t_max) == (-3.0, 0.0)
+    assert sol_of(back)(0.0) == pytest.approx(OMEGA, rel=1e-15)
+    still = sol_of(solve(BRICK, 0.0, dense_output=True))
+    assert still(0.0).tolist() == list(OMEGA)
+
+
+def test_shapes_and_defaults() -> None:
+    assert solve(BRICK, 2.0).sol is None
+    sol = sol_of(solve(SCENES["law"], 2.0, attitude=True, dense_output=True))
+    assert sol(1.0).shape == (7,)
+    assert sol([1.0, 0.5, 1.0]).shape == sol.derivative((1.0, 0.5, 1.0)).shape == (7, 3)
+    assert sol([]).shape == (7, 0)
+    times = np.linspace(0.0, 2.0, 50_001)
+    assert np.linalg.norm(sol(times)[3:], axis=0) == pytest.approx(1.0, abs=4e-16)
+    assert sol(times)[:, [7, 49_999]].tolist() == sol(times[[7, 49_999]]).tolist()
+    again = pickle.loads(pickle.dumps(sol))
+    assert again(1.0).tolist() == sol(1.0).tolist()
+    assert again.derivative(1.0).tolist() == sol.derivative(1.0).tolist()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (2.5, "dense output: t = 2.5 s; allowed: numbers from 0 to 2 s"),
+        ([0.5, -1e-9], "dense output: t = -1e-09 s; allowed"),
+        (math.nan, "dense output: t = nan s; allowed"),
+        ("now", "dense output: a time is no number; allowed"),
+        ([[0.5]], "dense output: times with 2 dimensions; allowed: one"),
+    ],
+)
+@pytest.mark.parametrize("call", [DenseOutput.__call__, DenseOutput.derivative])
+def test_refused_times(given: Any, message: str, call: Callable[[DenseOutput, Any], Any]) -> None:
+    sol = sol_of(solve(BRICK, 2.0, dense_output=True))
+    with pytest.raises(InputError, match=f"^{message}"):
+        call(sol, given)
+
+
+def test_an_overflow_ends_the_function() -> None:
+    sphere = replace(BRICK, moments=(1.0, 1.0, 1.0))
+    scene = replace(sphere, torque=torques.recorded(lambda t, w: [w[0] * w[0], 0.0, 0.0]))
+    found = solve(scene, [1.0, 5.0, 50.0], dense_output=True)
+    assert found.ended == "overflow"
+    assert sol_of(found).t_max == found.time[-1] < 50.0
+    nothing = solve(scene, [50.0], dense_output=True)
+    assert (sol_of(nothing).t_min, sol_of(nothing).t_max) == (0.0, 0.0)
+
+
+def test_too_many_polynomials_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dense, "_MOST_PIECES", 5)
+    for method in ("taylor", "rk4"):
+        with pytest.raises(InputError, match=r"^dense_output: more than 5 "):
+            solve(SCENES["law"], 20.0, method, dense_output=True)
+
+
+def test_a_case_of_the_thesis() -> None:
+    scene = case_scene(3)
+    sol = sol_of(solve(scene, 5.0, dense_output=True))
+    truth = solve(scene, [0.01, 2.5, 4.99])
+    assert largest_error(sol, truth) <= 1e-12

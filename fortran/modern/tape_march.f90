@@ -351,7 +351,7 @@ contains
       !! there are those of the series. A pulse within the step may be too small to be seen at its
       !! beginning. The change of the unknowns is computed too.
       real(dp) :: derivatives(tape%n_unknowns), slope(tape%n_unknowns)
-      real(dp) :: size_of_terms, rounded, allowed
+      real(dp) :: defect(tape%n_unknowns), size_of_terms, rounded, allowed
       integer :: i, k
 
       rounded = 1.0_dp
@@ -370,8 +370,10 @@ contains
       end do
       call derivatives_at(tape, t_next, y + (change + y_low), -s%h, s, derivatives)
       allowed = MOST_DEFECT*local_tolerance + MOST_ROUNDING*epsilon(rounded)*rounded
+      defect = weights*abs(factor*s%h*derivatives - slope)
       ! NaN is not allowed.
-      is_continued = all(weights*abs(factor*s%h*derivatives - slope) <= allowed)
+      is_continued = all(defect <= allowed)
+      if (is_continued) found%least = max(found%least, maxval(defect)/(s%order + 1))
     end function is_continued
 
     subroutine take_step()

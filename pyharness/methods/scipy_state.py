@@ -27,7 +27,8 @@ _FIRST = {"DOP853": 4.0, "RK45": 8.0, "Radau": 4.0, "LSODA": 25.0}
 _RATIO, _LARGEST_RATIO = 8.0, 1e3
 # Safety factor on the error of the second of two integrations. The error is estimated from their
 # difference, in proportion to the local tolerances, but by no less than a fraction of it. The
-# errors of LSODA, which also changes its order, are not in proportion to the local tolerances.
+# errors of LSODA, which also changes its order, are not in proportion to the local tolerances, and
+# neither are those under a torque that jumps, as a table or an opaque function may.
 _SAFETY = 4.0
 _LEAST_FRACTION = {"DOP853": 0.25, "RK45": 0.25, "Radau": 0.25, "LSODA": 1.0}
 # The longest step is the time span over this number, which grows with each integration, so that two
@@ -121,7 +122,8 @@ def _refined(run: "_StateRun", times: Sequence[float], tolerance: float, scale: 
         after = run.rows(times, finer, scale)
         difference = _difference(before, after)
         ratio = local / finer
-        error = difference * min(1.0, max(_LEAST_FRACTION[run.name], _SAFETY / ratio))
+        least = _LEAST_FRACTION[run.name] if run.is_smooth else 1.0
+        error = difference * min(1.0, max(least, _SAFETY / ratio))
         same_end = before.is_complete == after.is_complete
         if error <= tolerance and same_end and len(before.state) == len(after.state):
             return after
@@ -204,6 +206,8 @@ class _StateRun(Run):
             limit,
         )  # fmt: skip
         self.name = name
+        tape = torque.tape
+        self.is_smooth = tape is not None and not any(each.table for each in tape.operations)
         self._integrations = 0
         self._reached, self._largest, self._stuck = 0.0, 0.0, 0
 

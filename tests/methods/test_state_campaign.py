@@ -63,3 +63,18 @@ def test_missing_rows_are_reported() -> None:
     tally = Tally()
     tally.judge("here", truth, result, 1e-6)
     assert tally.violations == ["here: 0 rows instead of 1, tolerance 1e-06, ended overflow"]
+
+
+@pytest.mark.parametrize(
+    ("seed", "number"),
+    [
+        # An exponential of omega is invisible at the beginning of a step, and large within it.
+        ("20261123", 4847),
+        ("20261123", 9583),
+        # SciPy's Radau and RK45, whose errors are irregular where a table changes.
+        ("20261124", 2250),
+        ("20261125", 100),
+    ],
+)
+def test_scenes_that_were_solved_wrongly(seed: str, number: int) -> None:
+    assert campaign(1, seed, number).violations == []

@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pyharness import torques as torques
     from pyharness.compare.comparison import Comparison, compare_programs
     from pyharness.compare.method_comparison import compare_methods
     from pyharness.dynamics.scene_reader import read_scene
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from pyharness.methods.solve import solve
     from pyharness.methods.solver import Solver
     from pyharness.model.changing import ChangingInertia, ChangingMoments
+    from pyharness.model.dense_output import DenseOutput
     from pyharness.model.errors import InputError, NotBuiltError
     from pyharness.model.impossible import ImpossibleBodyWarning
     from pyharness.model.listing import Listing, subset
@@ -40,6 +42,7 @@ __all__ = [
     "ChangingInertia",
     "ChangingMoments",
     "Comparison",
+    "DenseOutput",
     "Ensemble",
     "ImpossibleBodyWarning",
     "InputError",
@@ -75,6 +78,7 @@ _SUBMODULES = {
     "dynamics.scene_reader": ("read_scene",),
     "dynamics.trajectory_reader": ("load",),
     "model.changing": ("ChangingInertia", "ChangingMoments"),
+    "model.dense_output": ("DenseOutput",),
     "model.errors": ("InputError", "NotBuiltError"),
     "model.impossible": ("ImpossibleBodyWarning",),
     "model.listing": ("Listing", "subset"),
@@ -92,6 +96,8 @@ _SUBMODULES = {
     "methods.solver": ("Solver",),
     "methods.solve": ("solve",),
 }
+# Public modules, which are imported at their first use too.
+_MODULES = ("torques",)
 
 
 # Type checkers read the imports above. This function is hidden from them, because with it they
@@ -102,6 +108,8 @@ if not TYPE_CHECKING:
         for room, names in _SUBMODULES.items():
             if name in names:
                 return getattr(import_module(f"pyharness.{room}"), name)
+        if name in _MODULES:
+            return import_module(f"pyharness.{name}")
         if name == "__version__":
             from pyharness.model.distribution import version
 
@@ -110,4 +118,4 @@ if not TYPE_CHECKING:
 
 
 def __dir__() -> list[str]:
-    return sorted([*__all__, "__version__"])
+    return sorted([*__all__, *_MODULES, "__version__"])

@@ -16,6 +16,7 @@ from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.trajectory import Trajectory
 from pyharness.scenes.random_scenes import draw as draw_law
 from pyharness.scenes.state_scenes import SUDDEN, draw, draw_ready
+from tests.methods import dense_campaign
 
 MOMENTS = (1.0, 2.0, 3.0)
 OMEGA = (0.1, 2.0, 0.1)
@@ -219,3 +220,16 @@ def test_a_case_of_the_thesis() -> None:
     sol = sol_of(solve(scene, 5.0, dense_output=True))
     truth = solve(scene, [0.01, 2.5, 4.99])
     assert largest_error(sol, truth) <= 1e-12
+
+
+def test_a_short_campaign() -> None:
+    assert dense_campaign.main(["4", "test"]) == 0
+
+
+def test_a_wrong_dense_output_is_reported(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    right = Pieces.__call__
+    monkeypatch.setattr(Pieces, "__call__", lambda own, times: right(own, times) * (1.0 + 2e-3))
+    assert dense_campaign.main(["4", "test"]) == 1
+    assert " times the limit" in capsys.readouterr().out

@@ -47,6 +47,8 @@ class _Solved:
 
     def __call__(self, times: Array) -> Array:
         """Return the states at `times` (s), one row for each."""
+        if not times.size:
+            return self(np.zeros(1))[:0]
         each, place = np.unique(times, return_inverse=True)
         return _states(self.rows(each.tolist(), self.tolerance))[place]
 
@@ -63,15 +65,27 @@ def dense_output(
     has a fixed step. Raise InputError if too many polynomials would be needed.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
-    derivatives = partial(rates, scene)
+    states: Callable[[Array], Array]
     if is_closed or len(ends) == 1:
-        return DenseOutput(ends[0], ends[-1], _Solved(rows, tolerance), derivatives)
-    if tolerance == 1.0:
-        states: Pieces = _of_fixed_steps(scene, ends, rows, derivatives)
+        states = _Solved(rows, tolerance)
     else:
-        own = max(finest, _NODE_TOLERANCE * tolerance)
-        states = _fitted(_first_edges(scene, found, ends), rows, tolerance, own)
-    return DenseOutput(ends[0], ends[-1], states, derivatives)
+        states = state_pieces(scene, found, rows, tolerance, finest)
+    return DenseOutput(ends[0], ends[-1], states, partial(rates, scene))
+
+
+def state_pieces(
+    scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float
+) -> Pieces:
+    """Return the solution of a scene as polynomials, between time 0 and the rows of `found`.
+
+    The arguments are those of `dense_output`. There must be a row at a time other than 0. A closed
+    form is approximated like the results of any other method.
+    """
+    ends = sorted({0.0, *found.time[[0, -1]].tolist()})
+    if tolerance == 1.0:
+        return _of_fixed_steps(scene, ends, rows, partial(rates, scene))
+    own = max(finest, _NODE_TOLERANCE * tolerance)
+    return _fitted(_first_edges(scene, found, ends), rows, tolerance, own)
 
 
 def _first_edges(scene: Scene, found: Trajectory, ends: list[float]) -> list[float]:

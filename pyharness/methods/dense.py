@@ -35,7 +35,7 @@ _MOST_PIECES = 200_000
 _RADIANS = 2.0  # of rotation in an interval; first guess
 
 # A function that returns the trajectory at given times to a given tolerance.
-Rows = Callable[[list[float], float], Trajectory]
+Rows = Callable[[Array, float], Trajectory]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class _Solved:
         if not times.size:
             return self(np.zeros(1))[:0]
         each, place = np.unique(times, return_inverse=True)
-        return _states(self.rows(each.tolist(), self.tolerance))[place]
+        return _states(self.rows(each, self.tolerance))[place]
 
 
 def dense_output(
@@ -117,10 +117,10 @@ def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pie
                 f"dense_output: more than {_MOST_PIECES} polynomials would be needed; use a "
                 "shorter time or a larger tolerance, or give the times of the results"
             )
-        nodes = np.array([_nodes(low, high) for low, high, _ in open_pieces])
+        nodes = _nodes(*np.array([piece[:2] for piece in open_pieces]).T)
         times, place = np.unique(nodes, return_inverse=True)
         try:
-            states = _states(rows(times.tolist(), own))
+            states = _states(rows(times, own))
         except InputError:
             if own == tolerance:
                 raise
@@ -149,10 +149,11 @@ def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pie
     return Pieces(np.array([*starts, done[starts[-1]][0]]), np.array([done[t][1] for t in starts]))
 
 
-def _nodes(low: float, high: float) -> Array:
+def _nodes(low: Array, high: Array) -> Array:
+    """Return the nodes (s) of intervals, one row for each."""
     middle, half = 0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low
-    nodes = middle + half * POINTS
-    nodes[[0, -1]] = low, high
+    nodes: Array = middle[:, None] + half[:, None] * POINTS
+    nodes[:, 0], nodes[:, -1] = low, high
     return nodes
 
 
@@ -169,7 +170,7 @@ def _of_fixed_steps(
     before = [-k * step for k in range(steps[0] - 1, 0, -1)] if ends[0] < 0.0 else []
     after = [k * step for k in range(1, steps[-1])] if ends[-1] > 0.0 else []
     times = np.unique([ends[0], *before, 0.0, *after, ends[-1]])
-    states = _states(rows(times.tolist(), 1.0))
+    states = _states(rows(times, 1.0))
     slopes = derivatives(times, states)
     length = np.diff(times)[:, None, None]
     u = (0.5 + 0.5 * POINTS)[None, :, None]

@@ -27,6 +27,7 @@ from pyharness.methods.registry import (
     requested_tolerance,
 )
 from pyharness.methods.scipy_ivp import finest_tolerance
+from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.effort import checked_effort
@@ -230,7 +231,7 @@ def _dense(
 
 
 def _more_rows(
-    scene: Scene, method: str, effort: float, attitude: bool, times: list[float], tolerance: float
+    scene: Scene, method: str, effort: float, attitude: bool, times: Array, tolerance: float
 ) -> Trajectory:
     """Return a trajectory of a scene; a tolerance of 1 is that of a method with a fixed step."""
     return solve(scene, times, method, tolerance, effort=effort, attitude=attitude)
@@ -345,6 +346,8 @@ def _ascending(times: object) -> tuple[list[float], bool]:
     `times` is a number or an iterable of numbers. Raise InputError unless the numbers are finite
     and strictly monotonic, and at least one is given.
     """
+    if _are_ascending_floats(times):
+        return times.tolist(), False  # type: ignore[attr-defined]
     if not isinstance(times, Iterable) or getattr(times, "shape", None) == ():
         times = (times,)
     if isinstance(times, np.ndarray) and times.dtype.kind in "iuf":
@@ -366,3 +369,16 @@ def _ascending(times: object) -> tuple[list[float], bool]:
     if not all(t1 < t2 for t1, t2 in itertools.pairwise(values)):
         raise InputError("times: not strictly monotonic; give increasing or decreasing times")
     return values, turned
+
+
+def _are_ascending_floats(times: object) -> bool:
+    """Return whether times are an array that needs no further check.
+
+    Dense output requests many times in such arrays.
+    """
+    return (
+        isinstance(times, np.ndarray)
+        and (times.dtype, times.ndim) == (np.float64, 1)
+        and 0 < len(times) <= most_steps()
+        and bool(np.isfinite(times).all() and (np.diff(times) > 0.0).all())
+    )

@@ -99,11 +99,11 @@ def _product(end: float, at_edges: bool, rng: np.random.Generator) -> Planted:
                                       for k, p in enumerate(powers)])
                              for j in range(len(roots))])  # fmt: skip
     changes = np.where(powers % 2, after, 0).astype(int)
-    # A double root is the extremum of a function with rounding errors.
+    # A double root is the root of the derivative of a polynomial with rounding errors.
     largest = np.abs(function(np.linspace(0.0, end, 1001), None)).max()
     curvature = [2.0 * abs(np.prod([(r - x) ** int(p) for x, p in zip(roots, powers, strict=True)
                                     if x != r])) for r in roots]  # fmt: skip
-    double = 200.0 * _EPS * largest / (end * np.array(curvature))
+    double = 4000.0 * _EPS * largest / (end * np.array(curvature))
     rounding = 4.0 * _EPS * end + np.where(powers == 2, double, 0.0)
     return Planted(function, end, roots, changes, rounding)
 

@@ -96,6 +96,8 @@ class Roots:
         The first (1/s) and second derivative (1/s2) of the polynomial at the root.
     noise : ndarray, shape (n,)
         The magnitude below which a value of the function can't be distinguished from 0.
+    near : ndarray, shape (n,)
+        The magnitude below which a value of the polynomial can't be distinguished from 0.
     """
 
     time: Array
@@ -103,6 +105,7 @@ class Roots:
     slope: Array
     curvature: Array
     noise: Array
+    near: Array
 
     def only(self, kept: Index) -> "Roots":
         """Return the roots that an index or a mask selects."""
@@ -198,7 +201,7 @@ def _at(fits: Fits, x: Array, change: Index, number: Index, near: Array) -> Root
     slopes = fits.coefficients[number] @ _DERIVATIVE.T
     slope = values_at(slopes, x) / half
     curvature = values_at(slopes @ _DERIVATIVE.T, x) / half / half
-    return Roots(time, change, slope, curvature, fits.noise[number])
+    return Roots(time, change, slope, curvature, fits.noise[number], near[number])
 
 
 def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:

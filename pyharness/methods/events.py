@@ -15,6 +15,7 @@ from numpy.polynomial import chebyshev
 
 from pyharness.methods.event_functions import EventFunction
 from pyharness.methods.event_roots import (
+    FIT_ERROR,
     NODES,
     POINTS,
     TO_COEFFICIENTS,
@@ -108,8 +109,9 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
         found = [rough]
         for begin in range(0, len(fits.low), _BLOCK):
             found.append(isolated(fits.only(slice(begin, begin + _BLOCK))))
-        roots = _polished(g, solution, joined(found))
-        return _merged(g, solution, joined([roots, _at_ends(g, solution)]))
+        roots = _distinct(g, solution, joined(found))
+        roots = _merged(g, solution, joined([roots, _at_ends(g, solution)]))
+        return _polished(g, solution, roots)
 
 
 def _normalised(states: Array) -> Array:
@@ -198,12 +200,24 @@ def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
     row, column = np.nonzero(is_negative[:, 1:] != is_negative[:, :-1])
     change = np.where(is_negative[row, column], 1, -1)
     zeros = np.zeros(len(row))
-    return Roots(0.5 * times[row, column] + 0.5 * times[row, column + 1], change, zeros, zeros,
-                 zeros)  # fmt: skip
+    middle = 0.5 * times[row, column] + 0.5 * times[row, column + 1]
+    return Roots(middle, change, zeros, zeros, zeros, zeros)
+
+
+def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
+    """Return roots with the noise at their own times, without extrema that are not near 0."""
+    if not roots.time.size:
+        return roots
+    noise = solution.noise(g, roots.time) + _ROUNDING / FIT_ERROR * roots.near
+    noise = np.minimum(noise, roots.noise)
+    value = solution.values(g, roots.time)
+    # A value beyond 0, as seen from those beside the extremum, is on the other side of two roots.
+    is_root = (roots.change != 0) | (np.abs(value) <= noise) | (value * roots.curvature < 0.0)
+    return replace(roots, noise=noise).only(is_root)
 
 
 def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
-    """Return roots improved by the function itself, without extrema that are not near 0."""
+    """Return roots whose times are improved by the function itself."""
     if not roots.time.size:
         return roots
     time, value = roots.time, solution.values(g, roots.time)
@@ -218,10 +232,7 @@ def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
         other = solution.values(g, trial)
         better = np.abs(other) < np.abs(value)
         time, value = np.where(better, trial, time), np.where(better, other, value)
-    # A value beyond 0, as seen from those beside the extremum, is on the other side of two roots.
-    is_root = (roots.change != 0) | (np.abs(value) <= roots.noise) | (value * roots.curvature < 0.0)
-    slope = roots.slope + roots.curvature * (time - roots.time)
-    return replace(roots, time=time, slope=slope).only(is_root)
+    return replace(roots, time=time)
 
 
 def _at_ends(g: EventFunction, solution: Solution) -> Roots:
@@ -231,9 +242,10 @@ def _at_ends(g: EventFunction, solution: Solution) -> Roots:
     # A function that is not 0 to rounding at an end is on one side of 0 there.
     values = solution.values(g, ends)
     noise = 4.0 * replace(solution, tolerance=0.0).noise(g, ends)
-    found = ends[np.abs(values) <= noise]
+    is_root = np.abs(values) <= noise
+    found = ends[is_root]
     zeros = np.zeros(len(found))
-    return Roots(found, zeros.astype(int), zeros, zeros, noise[np.abs(values) <= noise])
+    return Roots(found, zeros.astype(int), zeros, zeros, noise[is_root], zeros)
 
 
 def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
@@ -245,7 +257,11 @@ def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
     noise = np.maximum(roots.noise[:-1], roots.noise[1:])
     gap = np.diff(time)
     middle = solution.values(g, time[:-1] + 0.5 * gap) if count > 1 else gap
-    is_same = (np.abs(middle) <= noise) | (gap <= 8.0 * np.spacing(np.abs(time[1:])))
+    is_same = (
+        (np.abs(middle) <= noise)
+        | _have_one_extremum(g, solution, roots, noise)
+        | (gap <= 8.0 * np.spacing(np.abs(time[1:])))
+    )
     group = np.concatenate([[0], np.cumsum(~is_same)])
     total = np.zeros(group[-1] + 1, dtype=int)
     np.add.at(total, group, roots.change)
@@ -258,6 +274,23 @@ def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
     return _with_extrema(g, solution, replace(roots.only(chosen), change=change), ends)
 
 
+def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:
+    """Return which adjacent roots are a pair only because of the errors of the polynomials.
+
+    The function is 0, to within its noise, at the extremum between them.
+    """
+    found: Index = np.zeros(len(noise), dtype=bool)
+    gap = np.diff(roots.time)
+    for k in (slice(None, -1), slice(1, None)):
+        step = -roots.slope[k] / roots.curvature[k]
+        widest = np.sqrt(8.0 * roots.near[k] / np.abs(roots.curvature[k]))
+        near = np.flatnonzero((gap <= widest) & (np.abs(step) <= widest))
+        if near.size:
+            trial = np.clip(roots.time[k] + step, *solution.pieces.edges[[0, -1]])[near]
+            found[near] |= np.abs(solution.values(g, trial)) <= noise[near]
+    return found
+
+
 def _with_extrema(
     g: EventFunction, solution: Solution, roots: Roots, ends: tuple[float, ...]
 ) -> Roots:
@@ -268,7 +301,7 @@ def _with_extrema(
     step = np.zeros(len(roots.time))
     step[is_double] = -roots.slope[is_double] / roots.curvature[is_double]
     # The errors of the polynomial, and not only the noise, may have moved the root this far.
-    widest = np.sqrt(2000.0 * roots.noise / np.abs(roots.curvature))
+    widest = np.sqrt(8.0 * roots.near / np.abs(roots.curvature))
     step[~(np.abs(step) <= widest)] = 0.0
     trial = np.clip(roots.time + step, *solution.pieces.edges[[0, -1]])
     is_root = np.abs(solution.values(g, trial)) <= roots.noise

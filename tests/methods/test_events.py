@@ -14,7 +14,7 @@ from pyharness import InputError, Scene, case_scene, load, solve
 from pyharness.events import crosses, extremum, flip, rest, tilt
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.torques import damping, opaque
-from tests.methods.event_campaign import BODY, KINDS, campaign, planted
+from tests.methods.event_campaign import BODY, KINDS, Tally, campaign, planted, run
 
 METHODS = ("auto", "closed-form", "taylor", "dop853", "gauss-4", "reference")
 
@@ -45,6 +45,37 @@ def test_planted_roots_are_found_and_none_is_invented() -> None:
     tally = campaign(3000, 7)
     assert tally.roots >= 3000
     assert (tally.missed, tally.invented, tally.wrong) == (0, 0, 0), tally.examples[:3]
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed"),
+    [("cosine", 3000260), ("cosine", 3000518), ("polynomial", 3000822), ("edges", 1000003)],
+)
+def test_pairs_as_near_as_rounding_allows(kind: str, seed: int) -> None:
+    tally = Tally()
+    run(kind, seed, tally)
+    assert (tally.missed, tally.invented, tally.wrong) == (0, 0, 0), tally.examples
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_events_of_random_bodies_are_the_sign_changes_of_many_rows(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    body = Scene("", tuple(rng.normal(size=3)), moments=(1.0, 1.5, 2.0), torque=damping(0.02))
+    weights, shift = rng.normal(size=7), rng.normal() * 0.3
+
+    def event(t: Any, omega: Any, attitude: Any) -> Any:
+        return sum(weights[:3] * [*omega]) + attitude[0] * attitude[1] * weights[3] + shift
+
+    times = np.linspace(0.0, 40.0, 40001)
+    rows = solve(body, times, attitude=True)
+    assert rows.attitude is not None
+    q = rows.attitude
+    values = rows.omega @ weights[:3] + q[:, 0] * q[:, 1] * weights[3] + shift
+    expected = times[1:][np.diff(values > 0.0)]
+    found = times_of(body, 40.0, event, attitude=True)
+    assert len(found) >= len(expected) > 0
+    # Roots that the rows do not show are pairs between two of them.
+    assert found[: len(expected)] == pytest.approx(expected.tolist(), abs=1.1e-3)
 
 
 def test_every_kind_of_function_has_roots() -> None:

@@ -367,14 +367,14 @@ class FoundEvents:
     last: float
 
 
-def found_events(functions: list[EventFunction], solution: Solution | None) -> FoundEvents:
-    """Return the events of several functions, without those beyond a terminal event.
+def no_events(count: int, columns: int) -> FoundEvents:
+    """Return the events of `count` functions if no time but 0 was requested."""
+    states = [np.zeros((0, columns)) for _ in range(count)]
+    return FoundEvents([np.zeros(0) for _ in range(count)], states, -math.inf, math.inf)
 
-    `solution` is None if no time but 0 was requested.
-    """
-    if solution is None:
-        empty = [np.zeros(0) for _ in functions]
-        return FoundEvents(empty, [np.zeros((0, 3)) for _ in functions], -math.inf, math.inf)
+
+def found_events(functions: list[EventFunction], solution: Solution) -> FoundEvents:
+    """Return the events of several functions, without those beyond a terminal event."""
     roots = [event_roots(g, solution) for g in functions]
     sides: dict[int, list[Array]] = {}
     limits: dict[int, float] = {}

@@ -16,7 +16,7 @@ import numpy as np
 from pyharness.dynamics.system import with_constant_body
 from pyharness.methods import dense
 from pyharness.methods.event_functions import EventFunction, event_functions
-from pyharness.methods.events import Solution, found_events
+from pyharness.methods.events import Solution, found_events, no_events
 from pyharness.methods.plan import plan
 from pyharness.methods.registry import (
     METHODS,
@@ -192,15 +192,15 @@ def _with_events(
     `ends` are the first and the last of the requested times (s).
     """
     sol = found.sol or _dense(scene, found, method, tolerance, effort)
-    solution = None
+    events = no_events(len(functions), 3 if found.attitude is None else 7)
     if sol.t_min < sol.t_max:
         pieces = sol.states
         if not isinstance(pieces, Pieces):
             rows = partial(_more_rows, scene, method, effort, found.attitude is not None)
             pieces = dense.state_pieces(scene, found, rows, tolerance, METHODS[method].finest)
         # A fixed step of a method has a tolerance of 1.
-        solution = Solution(pieces, sol, tolerance if tolerance < 1.0 else 0.0)
-    events = found_events(functions, solution)
+        own = tolerance if tolerance < 1.0 else 0.0
+        events = found_events(functions, Solution(pieces, sol, own))
     kept = (found.time >= events.first) & (found.time <= events.last)
     cut: dict[str, Any] = {name: getattr(found, name)[kept] for name in _rows(found)}
     # An overflow remains the ending if it is not beyond a terminal event.

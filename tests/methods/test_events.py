@@ -228,7 +228,15 @@ def test_no_events_without_a_request() -> None:
     assert found.y_events is None
     times, states = events_of(solve(BODY, 0.0, events=second))
     assert (times[0].shape, states[0].shape) == ((0,), (0, 3))
+    _, states = events_of(solve(BODY, 0.0, attitude=True, events=second))
+    assert states[0].shape == (0, 7)
     assert events_of(solve(BODY, 1.0, events=[])) == ([], [])
+
+
+def test_very_slow_body() -> None:
+    slow = replace(BODY, omega=(1e-201, 2e-200, 1e-201))
+    found = np.array(times_of(slow, 3e201, second))
+    np.testing.assert_allclose(found, 1e200 * np.array(times_of(BODY, 30.0, second)), rtol=1e-11)
 
 
 def test_attitude_is_an_argument_and_in_the_states() -> None:

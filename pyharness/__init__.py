@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pyharness import events as events
     from pyharness import torques as torques
     from pyharness.compare.comparison import Comparison, compare_programs
     from pyharness.compare.method_comparison import compare_methods
@@ -97,7 +98,7 @@ _SUBMODULES = {
     "methods.solve": ("solve",),
 }
 # Public modules, which are imported at their first use too.
-_MODULES = ("torques",)
+_MODULES = ("events", "torques")
 
 
 # Type checkers read the imports above. This function is hidden from them, because with it they

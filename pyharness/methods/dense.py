@@ -35,7 +35,7 @@ _MOST_PIECES = 200_000
 _RADIANS = 2.0  # of rotation in an interval; first guess
 
 # A function that returns the trajectory at given times to a given tolerance.
-Rows = Callable[[list[float], float], Trajectory]
+Rows = Callable[[Array, float], Trajectory]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +47,10 @@ class _Solved:
 
     def __call__(self, times: Array) -> Array:
         """Return the states at `times` (s), one row for each."""
+        if not times.size:
+            return self(np.zeros(1))[:0]
         each, place = np.unique(times, return_inverse=True)
-        return _states(self.rows(each.tolist(), self.tolerance))[place]
+        return _states(self.rows(each, self.tolerance))[place]
 
 
 def dense_output(
@@ -63,15 +65,27 @@ def dense_output(
     has a fixed step. Raise InputError if too many polynomials would be needed.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
-    derivatives = partial(rates, scene)
+    states: Callable[[Array], Array]
     if is_closed or len(ends) == 1:
-        return DenseOutput(ends[0], ends[-1], _Solved(rows, tolerance), derivatives)
-    if tolerance == 1.0:
-        states: Pieces = _of_fixed_steps(scene, ends, rows, derivatives)
+        states = _Solved(rows, tolerance)
     else:
-        own = max(finest, _NODE_TOLERANCE * tolerance)
-        states = _fitted(_first_edges(scene, found, ends), rows, tolerance, own)
-    return DenseOutput(ends[0], ends[-1], states, derivatives)
+        states = state_pieces(scene, found, rows, tolerance, finest)
+    return DenseOutput(ends[0], ends[-1], states, partial(rates, scene))
+
+
+def state_pieces(
+    scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float
+) -> Pieces:
+    """Return the solution of a scene as polynomials, between time 0 and the rows of `found`.
+
+    The arguments are those of `dense_output`. There must be a row at a time other than 0. A closed
+    form is approximated like the results of any other method.
+    """
+    ends = sorted({0.0, *found.time[[0, -1]].tolist()})
+    if tolerance == 1.0:
+        return _of_fixed_steps(scene, ends, rows, partial(rates, scene))
+    own = max(finest, _NODE_TOLERANCE * tolerance)
+    return _fitted(_first_edges(scene, found, ends), rows, tolerance, own)
 
 
 def _first_edges(scene: Scene, found: Trajectory, ends: list[float]) -> list[float]:
@@ -103,10 +117,10 @@ def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pie
                 f"dense_output: more than {_MOST_PIECES} polynomials would be needed; use a "
                 "shorter time or a larger tolerance, or give the times of the results"
             )
-        nodes = np.array([_nodes(low, high) for low, high, _ in open_pieces])
+        nodes = _nodes(*np.array([piece[:2] for piece in open_pieces]).T)
         times, place = np.unique(nodes, return_inverse=True)
         try:
-            states = _states(rows(times.tolist(), own))
+            states = _states(rows(times, own))
         except InputError:
             if own == tolerance:
                 raise
@@ -135,10 +149,11 @@ def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pie
     return Pieces(np.array([*starts, done[starts[-1]][0]]), np.array([done[t][1] for t in starts]))
 
 
-def _nodes(low: float, high: float) -> Array:
+def _nodes(low: Array, high: Array) -> Array:
+    """Return the nodes (s) of intervals, one row for each."""
     middle, half = 0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low
-    nodes = middle + half * POINTS
-    nodes[[0, -1]] = low, high
+    nodes: Array = middle[:, None] + half[:, None] * POINTS
+    nodes[:, 0], nodes[:, -1] = low, high
     return nodes
 
 
@@ -155,7 +170,7 @@ def _of_fixed_steps(
     before = [-k * step for k in range(steps[0] - 1, 0, -1)] if ends[0] < 0.0 else []
     after = [k * step for k in range(1, steps[-1])] if ends[-1] > 0.0 else []
     times = np.unique([ends[0], *before, 0.0, *after, ends[-1]])
-    states = _states(rows(times.tolist(), 1.0))
+    states = _states(rows(times, 1.0))
     slopes = derivatives(times, states)
     length = np.diff(times)[:, None, None]
     u = (0.5 + 0.5 * POINTS)[None, :, None]

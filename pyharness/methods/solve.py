@@ -15,6 +15,8 @@ import numpy as np
 
 from pyharness.dynamics.system import with_constant_body
 from pyharness.methods import dense
+from pyharness.methods.event_functions import EventFunction, event_functions
+from pyharness.methods.events import Solution, found_events, no_events
 from pyharness.methods.plan import plan
 from pyharness.methods.registry import (
     METHODS,
@@ -25,8 +27,9 @@ from pyharness.methods.registry import (
     requested_tolerance,
 )
 from pyharness.methods.scipy_ivp import finest_tolerance
+from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
-from pyharness.model.dense_output import DenseOutput
+from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, unknown
 from pyharness.model.principal import in_scene_axes, principal
@@ -57,6 +60,7 @@ def solve(
     effort: float = 1.0,
     attitude: bool = False,
     dense_output: bool = False,
+    events: object = None,
 ) -> Trajectory:
     """Solve a scene at given times.
 
@@ -86,6 +90,12 @@ def solve(
         to the last of `times` on each side of 0. The tolerance then also applies between `times`.
         The function consists of polynomials through more results of the method, which take further
         integrations. For a method with a fixed step it is a cubic polynomial on each step.
+    events : callable, Event, or list of these
+        Functions of `(t, omega)` or `(t, omega, attitude)`, whose roots from time 0 to the last of
+        `times` on each side of 0 are found; ready ones are in `pyharness.events`. A function may
+        have the attributes `terminal` and `direction`, as in SciPy's `solve_ivp`. It is called with
+        arrays of many times if it accepts them. The attributes `t_events` and `y_events` of the
+        trajectory are the events. Rows after a terminal event are removed.
 
     Returns
     -------
@@ -127,6 +137,7 @@ def solve(
             f"tolerance is {tolerance:g}; allowed for {method}: {chosen.finest:.2g} to 1"
         )
     check_torque(scene, method, attitude)
+    functions = None if events is None else event_functions(events, attitude)
     if attitude:
         check_attitude(method, scene)
     given = scene
@@ -159,7 +170,55 @@ def solve(
         found = in_scene_axes(found, axes)
     if dense_output:
         found = replace(found, sol=_dense(given, found, method, tolerance, effort))
+    if functions is not None:
+        ends = values[0], values[-1]
+        found = _with_events(given, found, functions, ends, method, tolerance, effort)
+        if turned or (len(values) == 1 and values[0] < 0.0):
+            found = _with_events_reversed(found)
     return _reversed(found) if turned else found
+
+
+def _with_events(
+    scene: Scene,
+    found: Trajectory,
+    functions: list[EventFunction],
+    ends: tuple[float, float],
+    method: str,
+    tolerance: float,
+    effort: float,
+) -> Trajectory:
+    """Return a trajectory with its events, without the rows and the function after terminal ones.
+
+    `ends` are the first and the last of the requested times (s).
+    """
+    sol = found.sol or _dense(scene, found, method, tolerance, effort)
+    events = no_events(len(functions), 3 if found.attitude is None else 7)
+    if sol.t_min < sol.t_max:
+        pieces = sol.states
+        if not isinstance(pieces, Pieces):
+            rows = partial(_more_rows, scene, method, effort, found.attitude is not None)
+            pieces = dense.state_pieces(scene, found, rows, tolerance, METHODS[method].finest)
+        # A fixed step of a method has a tolerance of 1.
+        own = tolerance if tolerance < 1.0 else 0.0
+        events = found_events(functions, Solution(pieces, sol, own))
+    kept = (found.time >= events.first) & (found.time <= events.last)
+    cut: dict[str, Any] = {name: getattr(found, name)[kept] for name in _rows(found)}
+    # An overflow remains the ending if it is not beyond a terminal event.
+    overflowed = found.ended == "overflow" and (
+        (events.first == -math.inf and ends[0] < min(found.time, default=0.0))
+        or (events.last == math.inf and ends[1] > max(found.time, default=0.0))
+    )
+    if (math.isfinite(events.first) or math.isfinite(events.last)) and not overflowed:
+        cut["ended"] = "event"
+    if found.sol is not None:
+        low, high = max(sol.t_min, events.first), min(sol.t_max, events.last)
+        cut["sol"] = replace(sol, t_min=low, t_max=high)
+    return replace(found, **cut, t_events=events.times, y_events=events.states)
+
+
+def _with_events_reversed(found: Trajectory) -> Trajectory:
+    times, states = found.t_events or [], found.y_events or []
+    return replace(found, t_events=[x[::-1] for x in times], y_events=[x[::-1] for x in states])
 
 
 def _dense(
@@ -172,7 +231,7 @@ def _dense(
 
 
 def _more_rows(
-    scene: Scene, method: str, effort: float, attitude: bool, times: list[float], tolerance: float
+    scene: Scene, method: str, effort: float, attitude: bool, times: Array, tolerance: float
 ) -> Trajectory:
     """Return a trajectory of a scene; a tolerance of 1 is that of a method with a fixed step."""
     return solve(scene, times, method, tolerance, effort=effort, attitude=attitude)
@@ -287,6 +346,8 @@ def _ascending(times: object) -> tuple[list[float], bool]:
     `times` is a number or an iterable of numbers. Raise InputError unless the numbers are finite
     and strictly monotonic, and at least one is given.
     """
+    if _are_ascending_floats(times):
+        return times.tolist(), False  # type: ignore[attr-defined]
     if not isinstance(times, Iterable) or getattr(times, "shape", None) == ():
         times = (times,)
     if isinstance(times, np.ndarray) and times.dtype.kind in "iuf":
@@ -308,3 +369,16 @@ def _ascending(times: object) -> tuple[list[float], bool]:
     if not all(t1 < t2 for t1, t2 in itertools.pairwise(values)):
         raise InputError("times: not strictly monotonic; give increasing or decreasing times")
     return values, turned
+
+
+def _are_ascending_floats(times: object) -> bool:
+    """Return whether times are an array that needs no further check.
+
+    Dense output requests many times in such arrays.
+    """
+    return (
+        isinstance(times, np.ndarray)
+        and (times.dtype, times.ndim) == (np.float64, 1)
+        and 0 < len(times) <= most_steps()
+        and bool(np.isfinite(times).all() and (np.diff(times) > 0.0).all())
+    )

@@ -100,7 +100,7 @@ class DenseOutput:
     >>> from pyharness import case_scene, solve
     >>> sol = solve(case_scene(2), 2.0, dense_output=True).sol
     >>> sol(0.5).round(6)
-    array([-0.148513,  0.147786,  0.10133 ])
+    array([ 0.598472, -0.801144, 10.      ])
     >>> sol([0.5, 1.0]).shape
     (3, 2)
     """

@@ -130,6 +130,8 @@ def ending(trajectory: Trajectory) -> str:
         )
     if trajectory.ended == "overflow":
         return f"overflow: the rows end before the first omega that is not finite ({counts})"
+    if trajectory.ended == "event":
+        return f"ended by a terminal event ({counts})"
     if trajectory.ended == "sensitive":
         return f"{sensitive(trajectory.growth, trajectory.digits)} ({counts})"
     return f"complete ({counts})"

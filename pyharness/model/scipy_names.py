@@ -55,16 +55,18 @@ class SciPyNames:
 
     @property
     def success(self) -> bool:
-        """Whether the integration reached all requested times, as `has_all_rows`."""
-        return self.has_all_rows
+        """Whether the integration reached all requested times, or a terminal event."""
+        return self.status >= 0
 
     @property
     def status(self) -> int:
         """The ending of the integration as a number, with the meaning that it has in SciPy.
 
-        It is 0 if the integration reached all requested times, and -1 if it ended before. The
-        attribute `ended` has the reason.
+        It is 0 if the integration reached all requested times, 1 if a terminal event ended it, and
+        -1 if it ended before for another reason, which is in the attribute `ended`.
         """
+        if self.ended == "event":
+            return 1
         return 0 if self.has_all_rows else -1
 
     @property
@@ -78,6 +80,8 @@ class SciPyNames:
                 f"The Lipschitz test ended the run at step {self.stop.step}, because the Lipschitz "
                 f"quotient of {self.stop.variable} was {short(self.stop.quotient)} 1/s."
             )
+        if self.ended == "event":
+            return "A terminal event ended the integration; the rows end before it or at it."
         if self.ended == "overflow":
             return "Omega overflowed; the rows end before the first omega that is not finite."
         if self.ended != "sensitive":

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 ROUNDING = 2.0**-53
 # The ways to end a run (`Trajectory.ended`) with all requested rows present.
 WITH_ALL_ROWS = ("complete", "sensitive")
-ENDINGS = (*WITH_ALL_ROWS, "stopped", "overflow")
+ENDINGS = (*WITH_ALL_ROWS, "stopped", "overflow", "event")
 STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
 
 
@@ -72,11 +72,12 @@ class Trajectory(Mechanics, Conversions):
         Translational velocity along the body axes, m/s. None if it was not computed.
     steps, evaluations : int
         The number of steps, and the number of evaluations of the right-hand side.
-    ended : {"complete", "sensitive", "stopped", "overflow"}
+    ended : {"complete", "sensitive", "stopped", "overflow", "event"}
         How the integration ended. "stopped" means that the Lipschitz test ended it. After an
         "overflow" the rows end before the first omega that is not finite. "sensitive" means that
         all rows are present, but the rounding error, amplified by the motion, exceeds the requested
-        tolerance.
+        tolerance. "event" means that a terminal event ended the integration, and that rows after it
+        are not present.
     stop : Stop or None
         The point at which the Lipschitz test ended the run; None if the test did not end it.
     ier : ndarray of int, shape (n,), or None
@@ -108,6 +109,12 @@ class Trajectory(Mechanics, Conversions):
         The scene that the function `solve` solved. None for programs.
     sol : DenseOutput or None
         The solution as a function of time, if it was requested. It is not saved in a file.
+    t_events : list of ndarray, or None
+        For each function of events the times (s) of its events, in the order of `time`; None if no
+        events were requested. Events are not saved in a file.
+    y_events : list of ndarray, or None
+        For each function of events omega (rad/s), and the attitude if it was requested, with one
+        row for each event: shape (k, 3) or (k, 7).
 
     Examples
     --------
@@ -135,6 +142,8 @@ class Trajectory(Mechanics, Conversions):
     tolerance: float | None = None
     scene: "Scene | None" = field(default=None, repr=False)
     sol: "DenseOutput | None" = field(default=None, repr=False)
+    t_events: list[Array] | None = field(default=None, repr=False)
+    y_events: list[Array] | None = field(default=None, repr=False)
 
     __repr__ = short_repr
 

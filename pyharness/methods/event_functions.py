@@ -1,0 +1,196 @@
+"""Functions whose roots are events: checks of what the user gives, and their evaluation."""
+
+import inspect
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pyharness.model.array_type import Array
+from pyharness.model.errors import InputError, kind_of
+from pyharness.model.values import converted
+
+_FUNCTIONS_ALLOWED = (
+    "allowed: a function of (t, omega) or (t, omega, attitude), or a list of such functions"
+)
+# Values of a function for one time and for many may differ by rounding.
+_AGREEMENT = 1e-10
+_CHECKED = 9  # values that are compared
+
+
+@dataclass(eq=False)
+class Event:
+    """A ready event, which a function of `pyharness.events` returns.
+
+    Attributes
+    ----------
+    name : str
+        The call that made the event.
+    function : callable
+        The function of time, omega, attitude and derivative of omega whose roots are the events.
+    terminal : bool or int
+        Whether the first event ends the integration; a number n says that the n-th does.
+    direction : {-1, 0, 1}
+        The sign change that counts as an event, in the direction of integration: 1 from negative to
+        positive, -1 from positive to negative, 0 for any.
+    needs_attitude, needs_rates : bool
+        Whether the function uses the attitude, and the derivative of omega.
+    counts_touches : bool
+        Whether a root without a sign change counts.
+    """
+
+    name: str
+    function: Callable[[Any, Any, Any, Any], Any] = field(repr=False)
+    terminal: bool | int = False
+    direction: int = 0
+    needs_attitude: bool = False
+    needs_rates: bool = False
+    counts_touches: bool = True
+
+
+@dataclass(eq=False)
+class EventFunction:
+    """A checked function of an event.
+
+    Attributes
+    ----------
+    name : str
+        The event in messages, for example "events: event 1".
+    event : Event
+        The function with its attributes. The function is called with arrays.
+    limit : float
+        The number of events that end the integration; infinite if none does.
+    is_vectorized : bool or None
+        Whether the function accepts arrays of times; None if it is not yet known.
+    """
+
+    name: str
+    event: Event
+    limit: float
+    is_vectorized: bool | None = None
+
+    def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:
+        """Return the values at `times` (s) and `states`, one row for each time.
+
+        Raise InputError if a value is no finite number.
+        """
+        columns = (states[:, :3].T, states[:, 3:].T, None if rates is None else rates[:, :3].T)
+        found = self._of_arrays(times, *columns) if self.is_vectorized is not False else None
+        if found is None:
+            self.is_vectorized = False
+            found = np.array([self._of_one(k, times, *columns) for k in range(len(times))])
+        wrong = np.flatnonzero(~np.isfinite(found))
+        if wrong.size:
+            raise InputError(
+                f"{self.name}: the function returned {found[wrong[0]]:g} at t = "
+                f"{times[wrong[0]]:g} s; allowed: finite numbers"
+            )
+        return found
+
+    def _of_arrays(
+        self, times: Array, omega: Array, attitude: Array, rates: Array | None
+    ) -> Array | None:
+        """Return the values for arrays of arguments, or None if the function takes no arrays."""
+        try:
+            with np.errstate(all="ignore"):
+                found = self.event.function(times.copy(), omega.copy(), attitude.copy(), rates)
+            found = np.array(np.broadcast_to(np.asarray(found, dtype=np.float64), times.shape))
+        except Exception:  # the function may raise anything where it expects one number
+            if self.is_vectorized:
+                raise
+            return None
+        if self.is_vectorized is None:
+            some = np.unique(np.linspace(0, len(times) - 1, _CHECKED).astype(int))
+            each = np.array([self._of_one(k, times, omega, attitude, rates) for k in some])
+            scale = _AGREEMENT * np.abs(each).max()
+            if not np.all((found[some] == each) | (np.abs(found[some] - each) <= scale)):
+                return None
+            # One time, or few, do not show that the function accepts arrays.
+            self.is_vectorized = True if len(times) > _CHECKED else None
+        return found
+
+    def _of_one(
+        self, k: int, times: Array, omega: Array, attitude: Array, rates: Array | None
+    ) -> float:
+        time = float(times[k])
+        rate = None if rates is None else rates[:, k].copy()
+        with np.errstate(all="ignore"):
+            value = self.event.function(time, omega[:, k].copy(), attitude[:, k].copy(), rate)
+        if isinstance(value, np.ndarray) and value.size == 1:
+            value = value.item()
+        found = converted(value)
+        if isinstance(found, str):
+            raise InputError(
+                f"{self.name}: the function returned {found} at t = {time:g} s; allowed: a number"
+            )
+        return found
+
+
+def event_functions(events: object, attitude: bool) -> list[EventFunction]:
+    """Return a user's events, one function or a list, as checked functions.
+
+    `attitude` says whether the attitude was requested. Raise InputError for anything else.
+    """
+    if callable(events) or isinstance(events, Event):
+        events = [events]
+    if not isinstance(events, (list, tuple)):
+        raise InputError(f"events: {kind_of(events)}; {_FUNCTIONS_ALLOWED}")
+    return [_checked(each, f"events: event {k}", attitude) for k, each in enumerate(events, 1)]
+
+
+def _checked(given: Any, name: str, attitude: bool) -> EventFunction:
+    if isinstance(given, Event):
+        event, needs_attitude = given, given.needs_attitude
+    elif callable(given):
+        needs_attitude = _arguments(given, name) == 3
+        event = Event(
+            name,
+            _with_attitude(given) if needs_attitude else _without_attitude(given),
+            getattr(given, "terminal", False),
+            getattr(given, "direction", 0),
+        )
+    else:
+        raise InputError(f"{name} is {kind_of(given)}; {_FUNCTIONS_ALLOWED}")
+    if needs_attitude and not attitude:
+        raise InputError(f"{name} needs the attitude, which was not requested; use attitude=True")
+    limit = _limit(event.terminal, name)
+    direction = converted(event.direction)
+    if direction not in (-1.0, 0.0, 1.0):
+        raise InputError(f"{name}: direction is {event.direction!r}; allowed: -1, 0, 1")
+    return EventFunction(name, event, limit)
+
+
+def _with_attitude(given: Callable[..., Any]) -> Callable[[Any, Any, Any, Any], Any]:
+    return lambda t, omega, attitude, rates: given(t, omega, attitude)
+
+
+def _without_attitude(given: Callable[..., Any]) -> Callable[[Any, Any, Any, Any], Any]:
+    return lambda t, omega, attitude, rates: given(t, omega)
+
+
+def _arguments(given: Callable[..., Any], name: str) -> int:
+    """Return the number of arguments with which a function is called, 2 or 3."""
+    try:
+        signature = inspect.signature(given)
+    except (TypeError, ValueError):
+        return 2
+    for count in (2, 3):
+        try:
+            signature.bind(*range(count))
+        except TypeError:
+            continue
+        return count
+    raise InputError(f"{name}: the function has other arguments; {_FUNCTIONS_ALLOWED}")
+
+
+def _limit(terminal: Any, name: str) -> float:
+    if terminal is None:
+        return math.inf
+    found = float(terminal) if isinstance(terminal, (bool, np.bool_)) else converted(terminal)
+    if isinstance(found, str) or found < 0.0 or not found.is_integer():
+        raise InputError(
+            f"{name}: terminal is {terminal!r}; allowed: True, False, or a number of events"
+        )
+    return found or math.inf

@@ -1,0 +1,257 @@
+"""Isolation of all real roots of polynomials on intervals, for many intervals at once.
+
+A polynomial is given by its Chebyshev coefficients c on an interval. Because no Chebyshev
+polynomial exceeds 1 there, |c[0]| > |c[1]| + |c[2]| + ... excludes a root. The same bound for the
+derivative leaves at most one root, and for the second derivative at most two, with one extremum
+between them. An interval with none of these bounds is divided in two. No root is therefore missed,
+as it may be where a function is only sampled (Trefethen 2013, Approximation Theory and
+Approximation Practice, chapters 3 and 18).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from pyharness.model.array_type import Array
+
+# A slice, a mask or numbers of the elements of an array.
+Index = Any
+# Nodes of each polynomial.
+NODES = 33
+# Chebyshev points of the second kind from -1 to 1, in ascending order.
+POINTS: Array = np.sin(np.pi * np.arange(1 - NODES, NODES, 2) / (2 * (NODES - 1)))
+# Divisions of an interval in two, after which a root is as exact as the coefficients.
+_MOST_DIVISIONS = 50
+# A derivative must exceed its bound by this factor to have no root, so that an extremum at the end
+# of an interval is never lost to rounding.
+_MARGIN = 1.001
+# Possible error of a polynomial, relative to its largest value on the interval.
+FIT_ERROR = 4e-13
+
+
+def _transforms() -> tuple[Array, Array, Array, Array]:
+    """Return matrices for values to coefficients, the derivative, and the two halves."""
+    angles = np.pi * np.outer(np.arange(NODES), np.arange(NODES)[::-1]) / (NODES - 1)
+    fit = np.cos(angles) * (2.0 / (NODES - 1))
+    fit[:, [0, -1]] /= 2.0
+    fit[[0, -1]] /= 2.0
+    slope = np.zeros((NODES, NODES))
+    slope[:-1] = chebyshev.chebder(np.eye(NODES))
+    left = fit @ chebyshev.chebvander(0.5 * (POINTS - 1.0), NODES - 1)
+    right = fit @ chebyshev.chebvander(0.5 * (POINTS + 1.0), NODES - 1)
+    return fit, slope, left, right
+
+
+TO_COEFFICIENTS, _DERIVATIVE, _LEFT, _RIGHT = _transforms()
+
+
+@dataclass(frozen=True, eq=False)
+class Fits:
+    """Polynomials on several intervals.
+
+    Attributes
+    ----------
+    low, high : ndarray, shape (p,)
+        The ends of the intervals (s).
+    first, last : ndarray, shape (p,)
+        The values of the function at these ends, whose signs are equal for adjacent intervals.
+    coefficients : ndarray, shape (p, NODES)
+        The Chebyshev coefficients.
+    noise : ndarray, shape (p,)
+        The magnitude below which a value of the function can't be distinguished from 0.
+    """
+
+    low: Array
+    high: Array
+    first: Array
+    last: Array
+    coefficients: Array
+    noise: Array
+
+    def only(self, kept: Index) -> "Fits":
+        """Return the polynomials that an index or a mask selects."""
+        return Fits(*(each[kept] for each in vars(self).values()))
+
+    @property
+    def sizes(self) -> Array:
+        """The bounds on the magnitude of each polynomial."""
+        found: Array = np.abs(self.coefficients).sum(axis=1)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Roots:
+    """Candidates for roots: their times, the sign changes there, and the magnitude of noise.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        The times (s).
+    change : ndarray of int, shape (n,)
+        The sign change in the order of time: 1 from negative to positive, -1 from positive to
+        negative, 0 for a value near 0 without a sign change.
+    slope, curvature : ndarray, shape (n,)
+        The first (1/s) and second derivative (1/s2) of the polynomial at the root.
+    noise : ndarray, shape (n,)
+        The magnitude below which a value of the function can't be distinguished from 0.
+    near : ndarray, shape (n,)
+        The magnitude below which a value of the polynomial can't be distinguished from 0.
+    """
+
+    time: Array
+    change: Index
+    slope: Array
+    curvature: Array
+    noise: Array
+    near: Array
+
+    def only(self, kept: Index) -> "Roots":
+        """Return the roots that an index or a mask selects."""
+        return Roots(*(each[kept] for each in vars(self).values()))
+
+
+def joined(parts: list[Roots]) -> Roots:
+    """Return the roots of several lists in ascending order of time."""
+    columns = (np.concatenate([getattr(x, name) for x in parts]) for name in vars(parts[0]))
+    found = Roots(*columns)
+    return found.only(np.argsort(found.time, kind="stable"))
+
+
+def values_at(coefficients: Array, x: Array) -> Array:
+    """Return the values of polynomials, each at its own point between -1 and 1 (Clenshaw)."""
+    first = second = np.zeros(len(x))
+    for k in range(NODES - 1, 0, -1):
+        first, second = 2.0 * x * first - second + coefficients[:, k], first
+    return np.asarray(x * first - second + coefficients[:, 0])
+
+
+def may_vanish(fits: Fits) -> Array:
+    """Return which polynomials may have a root, by the bound on their coefficients."""
+    c = np.abs(fits.coefficients)
+    rest = c[:, 1:].sum(axis=1)
+    near = np.maximum(fits.noise, FIT_ERROR * (c[:, 0] + rest))
+    found: Array = (c[:, 0] <= rest + near) | ((fits.first < 0.0) != (fits.last < 0.0))
+    return found
+
+
+def isolated(fits: Fits) -> Roots:
+    """Return all roots of polynomials, and the extrema whose values are near 0.
+
+    A value of an extremum is near 0 if the fit leaves open whether it is. Roots that are not
+    distinguished by the fit are all returned; the caller combines them.
+    """
+    near = np.maximum(fits.noise, FIT_ERROR * fits.sizes)
+    smallest = np.maximum(fits.noise / 16.0, 1e-15 * fits.sizes)
+    found = [_at(fits, np.zeros(0), np.zeros(0, dtype=int), np.zeros(0, dtype=int), near)]
+    number = np.arange(len(fits.low))  # of the original polynomial
+    low, high = np.full(len(number), -1.0), np.ones(len(number))
+    first, last, c = fits.first, fits.last, fits.coefficients
+    for level in range(_MOST_DIVISIONS + 1):
+        rest = np.abs(c[:, 1:]).sum(axis=1)
+        changes = (first < 0.0) != (last < 0.0)
+        kept = changes | (np.abs(c[:, 0]) <= rest + near[number])
+        number, low, high, first, last, c, rest, changes = (
+            each[kept] for each in (number, low, high, first, last, c, rest, changes)
+        )
+        if not number.size:
+            break
+        sign = np.where(last < 0.0, -1, 1)
+        slopes = c @ _DERIVATIVE.T
+        bends = slopes @ _DERIVATIVE.T
+        is_tiny = (np.abs(c[:, 0]) + rest <= smallest[number]) | (level == _MOST_DIVISIONS)
+        is_monotone = ~is_tiny & _has_no_root(slopes)
+        is_bent = ~is_tiny & ~is_monotone & _has_no_root(bends)
+        middle = 0.5 * (low + high)
+        tiny = is_tiny & changes
+        found.append(_at(fits, middle[tiny], sign[tiny], number[tiny], near))
+        tiny = is_tiny & ~changes
+        found.append(_at(fits, middle[tiny], 0 * sign[tiny], number[tiny], near))
+        one = is_monotone & changes
+        x = _bracketed(c[one], np.full(one.sum(), -1.0), np.ones(one.sum()), sign[one])
+        x = middle[one] + 0.5 * (high - low)[one] * x
+        found.append(_at(fits, x, sign[one], number[one], near))
+        for x, change, which in _bent(c[is_bent], first[is_bent], last[is_bent], slopes[is_bent],
+                                      near[number[is_bent]]):  # fmt: skip
+            inner = middle[is_bent][which] + 0.5 * (high - low)[is_bent][which] * x
+            found.append(_at(fits, inner, change, number[is_bent][which], near))
+        split = ~(is_tiny | is_monotone | is_bent)
+        centre = values_at(c[split], np.zeros(split.sum()))
+        number = np.repeat(number[split], 2)
+        ends = np.column_stack([low[split], middle[split], middle[split], high[split]])
+        low, high = ends.reshape(-1, 2).T
+        values = np.column_stack([first[split], centre, centre, last[split]])
+        first, last = values.reshape(-1, 2).T
+        c = np.stack([c[split] @ _LEFT.T, c[split] @ _RIGHT.T], axis=1).reshape(-1, NODES)
+    return joined(found)
+
+
+def _has_no_root(coefficients: Array) -> Array:
+    c = np.abs(coefficients)
+    found: Array = c[:, 0] > _MARGIN * c[:, 1:].sum(axis=1)
+    return found
+
+
+def _at(fits: Fits, x: Array, change: Index, number: Index, near: Array) -> Roots:
+    """Return roots at the points x, from -1 to 1, of the polynomials of the given numbers."""
+    half = 0.5 * fits.high[number] - 0.5 * fits.low[number]
+    time = 0.5 * fits.low[number] + 0.5 * fits.high[number] + half * x
+    time = np.clip(time, fits.low[number], fits.high[number])
+    slopes = fits.coefficients[number] @ _DERIVATIVE.T
+    slope = values_at(slopes, x) / half
+    curvature = values_at(slopes @ _DERIVATIVE.T, x) / half / half
+    return Roots(time, change, slope, curvature, fits.noise[number], near[number])
+
+
+def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
+    """Return one root of each polynomial between points where its sign changes to `sign`.
+
+    The method is Newton's, with a bisection where a step would leave the bracket.
+    """
+    slopes = c @ _DERIVATIVE.T
+    x = 0.5 * (low + high)
+    for _ in range(80):
+        value = values_at(c, x)
+        is_beyond = sign * value > 0.0
+        low, high = np.where(is_beyond, low, x), np.where(is_beyond, x, high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            following = x - value / values_at(slopes, x)
+        is_inside = (following >= low) & (following <= high)
+        following = np.where(is_inside, following, 0.5 * (low + high))
+        moved = np.abs(following - x)
+        x = following
+        if not np.any(moved > 2e-16):
+            break
+    return x
+
+
+def _bent(
+    c: Array, first: Array, last: Array, slopes: Array, near: Array
+) -> list[tuple[Array, Index, Index]]:
+    """Return the roots of polynomials with one extremum at most: points, changes and numbers."""
+    count = len(c)
+    low, high = np.full(count, -1.0), np.ones(count)
+    starts, ends = values_at(slopes, low), values_at(slopes, high)
+    has_extremum = (starts < 0.0) != (ends < 0.0)
+    x = _bracketed(slopes, low, high, np.where(ends < 0.0, -1, 1))
+    nearer = np.where(np.abs(values_at(c, low)) < np.abs(values_at(c, high)), low, high)
+    x = np.where(has_extremum, x, nearer)
+    value = values_at(c, x)
+    is_near = np.abs(value) <= near
+    negative, before, after = value < 0.0, first < 0.0, last < 0.0
+    one = np.flatnonzero(before != after)
+    is_pair = (before == after) & (negative != before) & has_extremum
+    touch = np.flatnonzero((before == after) & is_near & ~is_pair)
+    two = np.flatnonzero(is_pair)
+    is_left = negative[one] != before[one]
+    sign = np.where(after[one], -1, 1)
+    inner = np.where(has_extremum[one], x[one], np.where(is_left, 1.0, -1.0))
+    single = _bracketed(c[one], np.where(is_left, -1.0, inner), np.where(is_left, inner, 1.0), sign)
+    turn = np.where(negative[two], -1, 1)
+    return [
+        (single, sign, one),
+        (x[touch], np.zeros(len(touch), dtype=int), touch),
+        (_bracketed(c[two], low[two], x[two], turn), turn, two),
+        (_bracketed(c[two], x[two], high[two], -turn), -turn, two),
+    ]

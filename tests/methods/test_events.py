@@ -1,0 +1,377 @@
+"""Events: planted roots, SciPy's conventions, terminal events, ready events, and messages."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pyharness import InputError, Scene, case_scene, load, solve
+from pyharness.events import crosses, extremum, flip, rest, tilt
+from pyharness.model.trajectory import Array, Trajectory
+from pyharness.torques import damping, opaque
+from tests.methods.event_campaign import BODY, KINDS, Tally, campaign, planted, run
+
+METHODS = ("auto", "closed-form", "taylor", "dop853", "gauss-4", "reference")
+
+
+def with_attributes(
+    function: Callable[..., Any], terminal: Any = False, direction: Any = 0
+) -> Callable[..., Any]:
+    function.terminal, function.direction = terminal, direction  # type: ignore[attr-defined]
+    return function
+
+
+def events_of(found: Trajectory) -> tuple[list[Array], list[Array]]:
+    assert found.t_events is not None
+    assert found.y_events is not None
+    return found.t_events, found.y_events
+
+
+def times_of(scene: Scene, times: Any, event: Any, **others: Any) -> list[float]:
+    (found,), _ = events_of(solve(scene, times, events=event, **others))
+    return [float(each) for each in found]
+
+
+def second(t: Any, omega: Any) -> Any:
+    return omega[1]
+
+
+def test_planted_roots_are_found_and_none_is_invented() -> None:
+    tally = campaign(3000, 7)
+    assert tally.roots >= 3000
+    assert (tally.missed, tally.invented, tally.wrong) == (0, 0, 0), tally.examples[:3]
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed"),
+    [("cosine", 3000260), ("cosine", 3000518), ("polynomial", 3000822), ("edges", 1000003)],
+)
+def test_pairs_as_near_as_rounding_allows(kind: str, seed: int) -> None:
+    tally = Tally()
+    run(kind, seed, tally)
+    assert (tally.missed, tally.invented, tally.wrong) == (0, 0, 0), tally.examples
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_events_of_random_bodies_are_the_sign_changes_of_many_rows(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    body = Scene("", tuple(rng.normal(size=3)), moments=(1.0, 1.5, 2.0), torque=damping(0.02))
+    weights, shift = rng.normal(size=7), rng.normal() * 0.3
+
+    def event(t: Any, omega: Any, attitude: Any) -> Any:
+        return sum(weights[:3] * [*omega]) + attitude[0] * attitude[1] * weights[3] + shift
+
+    times = np.linspace(0.0, 40.0, 40001)
+    rows = solve(body, times, attitude=True)
+    assert rows.attitude is not None
+    q = rows.attitude
+    values = rows.omega @ weights[:3] + q[:, 0] * q[:, 1] * weights[3] + shift
+    expected = times[1:][np.diff(values > 0.0)]
+    found = times_of(body, 40.0, event, attitude=True)
+    assert len(found) >= len(expected) > 0
+    # Roots that the rows do not show are pairs between two of them.
+    assert found[: len(expected)] == pytest.approx(expected.tolist(), abs=1.1e-3)
+
+
+def test_every_kind_of_function_has_roots() -> None:
+    for kind in KINDS:
+        assert sum(len(planted(kind, np.random.default_rng(k)).roots) for k in range(9)) > 9
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_events_of_a_body_are_those_of_scipy(method: str) -> None:
+    tolerance = 1e-10
+    a = [(2.0 - 3.0) / 1.0, (3.0 - 1.0) / 2.0, (1.0 - 2.0) / 3.0]
+    expected = solve_ivp(
+        lambda t, w: [a[0] * w[1] * w[2], a[1] * w[2] * w[0], a[2] * w[0] * w[1]],
+        (0.0, 30.0), BODY.omega, "DOP853", events=second, rtol=1e-13, atol=1e-14,
+    )  # fmt: skip
+    times, states = events_of(solve(BODY, 30.0, method, tolerance, events=second))
+    assert len(times[0]) == 4
+    np.testing.assert_allclose(times[0], expected.t_events[0], atol=1e-8)
+    np.testing.assert_allclose(states[0], expected.y_events[0], atol=1e-8)
+
+
+def test_fixed_step_has_the_events_of_its_dense_output() -> None:
+    scene = replace(BODY, step_size=0.01)
+    found = solve(scene, 30.0, "rk4", events=second, dense_output=True)
+    (times,), (states,) = events_of(found)
+    assert found.sol is not None
+    assert len(times) == 4
+    np.testing.assert_allclose(times, times_of(BODY, 30.0, second), atol=1e-5)
+    np.testing.assert_array_equal(states, found.sol(times).T)
+    assert np.abs(states[:, 1]).max() < 1e-14
+
+
+def test_long_motion_misses_no_event() -> None:
+    times = np.array(times_of(BODY, 1000.0 * math.pi, second))
+    assert len(times) == 450
+    np.testing.assert_allclose(np.diff(times), np.diff(times).mean(), rtol=1e-10)
+
+
+def test_double_root_counts_once_and_for_direction_0_alone() -> None:
+    def touch(t: Any, omega: Any) -> Any:
+        return (t - 3.0) ** 2
+
+    assert times_of(BODY, 9.0, touch) == pytest.approx([3.0], rel=1e-13)
+    for direction in (-1, 1):
+        assert (
+            times_of(BODY, 9.0, with_attributes(lambda *x: touch(*x[:2]), False, direction)) == []
+        )
+
+
+def test_value_of_an_extremum_of_omega_counts_once() -> None:
+    (tops,), (states,) = events_of(solve(BODY, 6.9, events=extremum(2, direction=-1)))
+    (found,) = events_of(solve(BODY, 6.9, events=crosses(2, states[0, 1])))[0]
+    assert found == pytest.approx(tops, abs=1e-7)
+    assert len(times_of(BODY, 6.9, crosses(2, states[0, 1] - 1e-9))) == 2
+    assert times_of(BODY, 6.9, crosses(2, states[0, 1] + 1e-9)) == []
+
+
+def test_near_roots_are_distinguished() -> None:
+    def pair(t: Any, omega: Any) -> Any:
+        return (t - 2.0) * (t - 2.000001)
+
+    assert times_of(BODY, 9.0, pair) == pytest.approx([2.0, 2.000001], abs=1e-9)
+
+
+@pytest.mark.parametrize("power", [3, 4, 5])
+def test_root_of_higher_order_counts_once(power: int) -> None:
+    assert len(times_of(BODY, 9.0, lambda t, omega: (t - 3.25) ** power)) == 1
+
+
+def test_function_without_a_derivative() -> None:
+    assert times_of(BODY, 9.0, lambda t, omega: abs(t - 3.1) - 0.5) == pytest.approx([2.6, 3.6])
+    jump = times_of(BODY, 9.0, lambda t, omega: 1.0 if t > math.pi else -1.0)
+    assert jump == pytest.approx([math.pi], rel=1e-12)
+    steep = times_of(BODY, 9.0, lambda t, omega: np.tanh(1e6 * (t - 4.4)))
+    assert steep == pytest.approx([4.4], rel=1e-12)
+
+
+def test_function_that_is_0_everywhere_has_no_events() -> None:
+    spin = Scene("spin", omega=(0.0, 0.0, 2.0), moments=(1.0, 1.0, 3.0))
+    assert times_of(spin, 9.0, crosses(1)) == []
+    assert times_of(spin, 9.0, crosses(3, 2.0)) == []
+
+
+def scipy_events(scene: Scene, end: float, event: Callable[..., Any]) -> list[float]:
+    found = solve_ivp(lambda t, w: -w, (0.0, end), scene.omega, events=event, rtol=1e-10)
+    return list(found.t_events[0])
+
+
+@pytest.mark.parametrize("end", [2.0, -2.0])
+@pytest.mark.parametrize("direction", [-1, 0, 1])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize("root", [0.0, 0.6, 1.0])
+def test_direction_and_ends_as_in_scipy(
+    end: float, direction: int, sign: float, root: float
+) -> None:
+    scene = Scene("ball", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=damping(1.0))
+    event = with_attributes(lambda t, omega: sign * (t - root * end), False, direction)
+    assert times_of(scene, end, event) == pytest.approx(scipy_events(scene, end, event), abs=1e-12)
+
+
+@pytest.mark.parametrize("terminal", [True, 1, 2, 3])
+def test_terminal_event_removes_what_follows(terminal: bool | int) -> None:
+    event = with_attributes(lambda t, omega: omega[1], terminal)
+    rows = np.linspace(0.0, 30.0, 301)
+    found = solve(BODY, rows, events=[event, lambda t, omega: t - 4.0, crosses(1)],
+                  dense_output=True)  # fmt: skip
+    times, states = events_of(found)
+    expected = times_of(BODY, 30.0, second)[: int(terminal)]
+    assert times[0].tolist() == pytest.approx(expected)
+    assert states[0].shape == (int(terminal), 3)
+    assert (times[1].size == 1) == (expected[-1] > 4.0)
+    assert times[2].max(initial=0.0) <= expected[-1]
+    assert found.time.tolist() == rows[rows <= expected[-1]].tolist()
+    assert found.omega.shape == (len(found.time), 3)
+    assert (found.status, found.success, found.ended) == (1, True, "event")
+    assert "terminal event" in found.message
+    assert not found.has_all_rows
+    assert found.sol is not None
+    assert found.sol.t_max == times[0][-1]
+
+
+def test_terminal_event_that_does_not_occur() -> None:
+    event = with_attributes(lambda t, omega: omega[1], 9)
+    found = solve(BODY, [10.0, 30.0], events=event)
+    assert (found.status, found.ended, len(found.time)) == (0, "complete", 2)
+
+
+def test_each_side_of_0_has_its_terminal_event() -> None:
+    rows = [-20.0, -10.0, -1.0, 0.0, 1.0, 10.0, 20.0]
+    found = solve(BODY, rows, events=with_attributes(lambda t, omega: omega[1], True))
+    (times,), (states,) = events_of(found)
+    before, after = times_of(BODY, -20.0, second)[0], times_of(BODY, 20.0, second)[0]
+    assert times.tolist() == pytest.approx([before, after])
+    assert states.shape == (2, 3)
+    assert found.time.tolist() == [t for t in rows if before <= t <= after]
+    descending = solve(BODY, rows[::-1], events=with_attributes(lambda t, omega: omega[1], True))
+    assert events_of(descending)[0][0].tolist() == times[::-1].tolist()
+    np.testing.assert_array_equal(events_of(descending)[1][0], states[::-1])
+
+
+def test_terminal_event_at_time_0() -> None:
+    found = solve(BODY, [0.0, 1.0], events=crosses(1, BODY.omega[0], terminal=True))
+    assert events_of(found)[0][0].tolist() == [0.0]
+    assert found.time.tolist() == [0.0]
+
+
+def test_no_events_without_a_request() -> None:
+    found = solve(BODY, 1.0)
+    assert found.t_events is None
+    assert found.y_events is None
+    times, states = events_of(solve(BODY, 0.0, events=second))
+    assert (times[0].shape, states[0].shape) == ((0,), (0, 3))
+    _, states = events_of(solve(BODY, 0.0, attitude=True, events=second))
+    assert states[0].shape == (0, 7)
+    assert events_of(solve(BODY, 1.0, events=[])) == ([], [])
+
+
+def test_very_slow_body() -> None:
+    slow = replace(BODY, omega=(1e-201, 2e-200, 1e-201))
+    found = np.array(times_of(slow, 3e201, second))
+    np.testing.assert_allclose(found, 1e200 * np.array(times_of(BODY, 30.0, second)), rtol=1e-11)
+
+
+def test_attitude_is_an_argument_and_in_the_states() -> None:
+    ball = Scene("ball", (0.5, 0.0, 0.0), moments=(1.0, 1.0, 1.0))
+    (times,), (states,) = events_of(
+        solve(ball, 20.0, attitude=True, events=lambda t, omega, attitude: attitude[0])
+    )
+    assert times == pytest.approx(2.0 * math.pi * np.array([1.0, 3.0]))
+    assert states.shape == (2, 7)
+    np.testing.assert_allclose(np.abs(states[:, 4]), 1.0)
+
+
+@pytest.mark.parametrize("axis", [1, 2, 3])
+def test_tilt_is_the_angle_of_the_rotation_matrix(axis: int) -> None:
+    toward, angle = (1.0, -2.0, 0.5), 1.2
+    event = tilt(axis, toward, angle)
+    (times,), (states,) = events_of(solve(BODY, 30.0, attitude=True, events=event))
+    assert len(times) > 3
+    q0, q = states[:, 3], states[:, 4:]
+    unit = np.eye(3)[axis - 1]
+    turned = unit + 2.0 * np.cross(q, np.cross(q, unit) + q0[:, None] * unit)
+    np.testing.assert_allclose(turned @ toward / np.linalg.norm(toward), math.cos(angle), atol=1e-9)
+
+
+def test_extrema_are_those_of_the_rows() -> None:
+    grid = np.linspace(0.0, 30.0, 30001)
+    rows = solve(BODY, grid).omega[:, 1]
+    for direction, sign in ((-1, 1.0), (1, -1.0)):
+        inner = sign * rows[1:-1]
+        tops = grid[1:-1][(inner > sign * rows[:-2]) & (inner > sign * rows[2:])]
+        found = times_of(BODY, 30.0, extremum(2, direction=direction))
+        assert found == pytest.approx(tops.tolist(), abs=2e-3)
+        assert len(found) >= 2
+
+
+def test_rest_and_flip() -> None:
+    ball = Scene("ball", (3.0, 0.0, 4.0), moments=(1.0, 1.0, 1.0), torque=damping(1.0))
+    assert times_of(ball, 3.0, rest(0.5)) == pytest.approx([math.log(10.0)])
+    assert times_of(ball, 3.0, rest(0.5, direction=1)) == []
+    assert times_of(BODY, 30.0, flip(2)) == pytest.approx(times_of(BODY, 30.0, second))
+    assert times_of(case_scene(1), 2.0, flip(1)) == []
+
+
+def test_function_of_one_number_alone() -> None:
+    calls: list[float] = []
+
+    def magnitude(t: Any, omega: Any) -> float:
+        calls.append(float(t))
+        return float(np.linalg.norm(omega)) - level
+
+    level = float(np.linalg.norm(solve(BODY, 1.0).omega[0]))
+    expected = times_of(BODY, 9.0, lambda t, omega: sum(omega**2) - level**2)
+    assert len(expected) >= 2
+    assert times_of(BODY, 9.0, magnitude) == pytest.approx(expected, rel=1e-10)
+    assert len(calls) > 30
+
+
+def test_few_calls_with_arrays() -> None:
+    calls: list[int] = []
+
+    def counted(t: Any, omega: Any) -> Any:
+        calls.append(np.size(t))
+        return omega[1]
+
+    times_of(BODY, 300.0, counted)
+    assert len(calls) < 60
+    assert max(calls) > 1000
+
+
+def test_opaque_torque_has_events() -> None:
+    torque = opaque(lambda t, omega: [-w for w in omega])
+    ball = Scene("ball", (3.0, 0.0, 4.0), moments=(1.0, 1.0, 1.0), torque=torque)
+    found = times_of(ball, 3.0, rest(0.5), method="dop853")
+    assert found == pytest.approx([math.log(10.0)], rel=1e-8)
+
+
+def test_overflow_after_the_last_row() -> None:
+    runaway = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
+    found = solve(runaway, [0.5, 0.9, 2.0], events=crosses(1, 4.0))
+    assert (found.ended, found.status) == ("overflow", -1)
+    assert events_of(found)[0][0].tolist() == pytest.approx([0.75])
+    ended = solve(runaway, [0.5, 0.9, 2.0], events=crosses(1, 4.0, terminal=True))
+    assert (ended.ended, ended.time.tolist()) == ("event", [0.5])
+
+
+def test_ending_is_saved(tmp_path: Path) -> None:
+    found = solve(BODY, [1.0, 9.0], events=crosses(2, 0.0, terminal=True))
+    found.save(tmp_path / "found.npz")
+    assert load(tmp_path / "found.npz").status == 1
+
+
+def _three(t: Any, omega: Any, attitude: Any) -> Any:
+    return omega[0]
+
+
+WRONG: Sequence[tuple[Any, str]] = (
+    (3.0, "events: a number; allowed: a function of"),
+    ("omega", "events: text; allowed"),
+    ([second, 1], "events: event 2 is a whole number; allowed"),
+    (lambda t: t, "events: event 1: the function has other arguments; allowed"),
+    (_three, "events: event 1 needs the attitude, which was not requested; use attitude=True"),
+    (tilt(1, (0, 0, 1), 1.0), "events: event 1 needs the attitude"),
+    (lambda t, omega: "x", "events: event 1: the function returned text at t = "),
+    (lambda t, omega: omega, "events: event 1: the function returned a list at t = "),
+    (lambda t, omega: math.nan, "events: event 1: the function returned nan at t = "),
+    (with_attributes(lambda t, omega: t, -1), "events: event 1: terminal is -1; allowed"),
+    (with_attributes(lambda t, omega: t, 1.5), "events: event 1: terminal is 1.5; allowed"),
+    (with_attributes(lambda t, omega: t, "yes"), "events: event 1: terminal is 'yes'; allowed"),
+    (with_attributes(lambda t, omega: t, True, 2), "events: event 1: direction is 2; allowed"),
+    (with_attributes(lambda t, omega: t, True, "up"), "events: event 1: direction is 'up'"),
+)
+
+
+@pytest.mark.parametrize(("events", "message"), WRONG, ids=[str(k) for k in range(len(WRONG))])
+def test_message(events: Any, message: str) -> None:
+    with pytest.raises(InputError) as raised:
+        solve(BODY, 1.0, events=events)
+    assert str(raised.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: crosses(0), "events: crosses axis: 0; allowed: 1, 2, 3"),
+        (lambda: crosses(1, math.inf), "events: crosses value: inf is not finite"),
+        (
+            lambda: flip(1.5),  # type: ignore[arg-type]
+            "events: flip axis is a number",
+        ),
+        (lambda: rest(0.0), "events: rest value: 0; allowed: a number greater than 0"),
+        (lambda: tilt(1, (0, 0, 0), 1.0), "events: tilt direction: 0, 0, 0; allowed"),
+        (lambda: tilt(1, (0, 0, 1), 4.0), "events: tilt angle: 4 rad; allowed: 0 to pi"),
+    ],
+)
+def test_message_of_a_ready_event(make: Callable[[], object], message: str) -> None:
+    with pytest.raises(InputError) as raised:
+        make()
+    assert str(raised.value).startswith(message)

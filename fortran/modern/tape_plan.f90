@@ -76,16 +76,19 @@ contains
                  out => tape%operations(4, n))
         select case (tape%operations(1, n))
         case (EXPONENTIAL)
-          call limit(first, max(0.5_dp*order, -a(0, first) - INVISIBLE))
+          converging = limited(first, max(0.5_dp*order, -a(0, first) - INVISIBLE), converging)
         case (TANGENT)
           ! The derivative decreases as exp(-2 abs(x)).
-          call limit(first, 0.5_dp*max(0.5_dp*order, 2.0_dp*abs(a(0, first)) - INVISIBLE))
+          converging = limited(first, max(0.25_dp*order, abs(a(0, first)) - 0.5_dp*INVISIBLE), &
+                               converging)
         case (QUOTIENT)
-          call limit(second, WITHIN_CIRCLE*abs(a(0, second)))
+          converging = limited(second, WITHIN_CIRCLE*abs(a(0, second)), converging)
         case (SQUARE_ROOT)
-          call limit(first, WITHIN_CIRCLE*a(0, first))
+          converging = limited(first, WITHIN_CIRCLE*a(0, first), converging)
         case (SINE_COSINE)
-          if (any(is_squared(out:out + 1))) call limit(first, ANGLE_OF_ORDER*order)
+          if (any(is_squared(out:out + 1))) then
+            converging = limited(first, ANGLE_OF_ORDER*order, converging)
+          end if
         case default
           cycle
         end select
@@ -94,24 +97,26 @@ contains
 
   contains
 
-    pure subroutine limit(slot, most)
-      !! Reduce the factor until a slot changes by at most `most` in the circle of the step.
+    pure real(dp) function limited(slot, most, factor)
+      !! Return the factor, reduced until a slot changes by at most `most` in the step's circle.
       integer, intent(in) :: slot
       real(dp), intent(in) :: most
+      real(dp), intent(in) :: factor
       real(dp) :: change
       integer :: k
 
+      limited = factor
       do
         change = 0.0_dp
         do k = order - 1, 1, -1
-          change = converging*(change + abs(a(k, slot)))
+          change = limited*(change + abs(a(k, slot)))
         end do
         if (.not. change > most) return
         ! The change is a convex function of the factor, so that the quotient is small enough.
-        converging = converging*max(0.5_dp, most/change)
-        if (most >= 0.5_dp*change .or. .not. converging > 0.0_dp) return
+        limited = limited*max(0.5_dp, most/change)
+        if (most >= 0.5_dp*change .or. .not. limited > 0.0_dp) return
       end do
-    end subroutine limit
+    end function limited
 
   end function converging
 

@@ -351,23 +351,23 @@ contains
       !! there are those of the series. A pulse within the step may be too small to be seen at its
       !! beginning. The change of the unknowns is computed too.
       real(dp) :: derivatives(tape%n_unknowns), slope(tape%n_unknowns)
-      real(dp) :: defect(tape%n_unknowns), size_of_terms, rounded, allowed
+      real(dp) :: defect(tape%n_unknowns), size_of_terms(tape%n_unknowns), rounded, allowed
       integer :: i, k
 
-      rounded = 1.0_dp
-      do i = 1, n
-        change(i) = 0.0_dp
-        slope(i) = 0.0_dp
-        size_of_terms = 0.0_dp
-        do k = s%order, 1, -1
+      change = 0.0_dp
+      slope = 0.0_dp
+      size_of_terms = 0.0_dp
+      ! The sums of the unknowns do not wait for each other.
+      do k = s%order, 1, -1
+        do i = 1, n
           associate (term => s%a(k, FIRST_UNKNOWN - 1 + i))
             change(i) = factor*(change(i) + term)
             slope(i) = factor*(slope(i) + k*term)
-            size_of_terms = factor*(size_of_terms + k*abs(term))
+            size_of_terms(i) = factor*(size_of_terms(i) + k*abs(term))
           end associate
         end do
-        rounded = max(rounded, weights(i)*(size_of_terms + noise(i)*abs(factor*s%h)))
       end do
+      rounded = max(1.0_dp, maxval(weights*(size_of_terms + noise*abs(factor*s%h))))
       call derivatives_at(tape, t_next, y + (change + y_low), -s%h, s, derivatives)
       allowed = MOST_DEFECT*local_tolerance + MOST_ROUNDING*epsilon(rounded)*rounded
       defect = weights*abs(factor*s%h*derivatives - slope)

@@ -7,7 +7,7 @@ import numpy as np
 from pyharness.dynamics.array_tape import outputs_at
 from pyharness.dynamics.system import slopes_of, system_of, with_constant_body
 from pyharness.model.array_type import Array
-from pyharness.model.attitude import product, quaternion_of_axes
+from pyharness.model.attitude import product, quaternion_of_axes, quaternion_rates
 from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import of_law
@@ -39,6 +39,5 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
         found = np.array([slopes(*row)[:3] for row in rows]).reshape(-1, 3)
     found = found @ axes.T
     if attitude.size:
-        x, y, z = 0.5 * omega.T
-        found = np.column_stack([found, *product(attitude.T, (0.0 * x, x, y, z))])
+        found = np.column_stack([found, *quaternion_rates(omega.T, attitude.T)])
     return found

@@ -14,6 +14,7 @@ import numpy as np
 
 from pyharness.dynamics.rates import rates
 from pyharness.model.array_type import Array
+from pyharness.model.chebyshev import nodes
 from pyharness.model.dense_output import NODES, POINTS, TO_COEFFICIENTS, DenseOutput, Pieces
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
@@ -50,7 +51,7 @@ class _Solved:
         if not times.size:
             return self(np.zeros(1))[:0]
         each, place = np.unique(times, return_inverse=True)
-        return _states(self.rows(each, self.tolerance))[place]
+        return self.rows(each, self.tolerance).y.T[place]
 
 
 def dense_output(
@@ -117,10 +118,11 @@ def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pie
                 f"dense_output: more than {_MOST_PIECES} polynomials would be needed; use a "
                 "shorter time or a larger tolerance, or give the times of the results"
             )
-        nodes = _nodes(*np.array([piece[:2] for piece in open_pieces]).T)
-        times, place = np.unique(nodes, return_inverse=True)
+        lows, highs = np.array([piece[:2] for piece in open_pieces]).T
+        each = nodes(lows, highs, POINTS)
+        times, place = np.unique(each, return_inverse=True)
         try:
-            states = _states(rows(times, own))
+            states = rows(times, own).y.T
         except InputError:
             if own == tolerance:
                 raise
@@ -129,7 +131,7 @@ def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pie
         if len(states) < len(times):
             raise InputError("dense_output: the method reached fewer times than before")
         scale = max(scale, float(np.abs(states[:, :3]).max()))
-        values = states[place.reshape(nodes.shape)]
+        values = states[place.reshape(each.shape)]
         coefficients = np.einsum("kj,pjm->pkm", TO_COEFFICIENTS, values)
         tails = np.abs(coefficients[:, -_TAIL:]).max(axis=1)
         tails[:, :3] /= scale or 1.0
@@ -149,14 +151,6 @@ def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pie
     return Pieces(np.array([*starts, done[starts[-1]][0]]), np.array([done[t][1] for t in starts]))
 
 
-def _nodes(low: Array, high: Array) -> Array:
-    """Return the nodes (s) of intervals, one row for each."""
-    middle, half = 0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low
-    nodes: Array = middle[:, None] + half[:, None] * POINTS
-    nodes[:, 0], nodes[:, -1] = low, high
-    return nodes
-
-
 def _of_fixed_steps(
     scene: Scene, ends: list[float], rows: Rows, derivatives: Callable[[Array, Array], Array]
 ) -> Pieces:
@@ -170,7 +164,7 @@ def _of_fixed_steps(
     before = [-k * step for k in range(steps[0] - 1, 0, -1)] if ends[0] < 0.0 else []
     after = [k * step for k in range(1, steps[-1])] if ends[-1] > 0.0 else []
     times = np.unique([ends[0], *before, 0.0, *after, ends[-1]])
-    states = _states(rows(times, 1.0))
+    states = rows(times, 1.0).y.T
     slopes = derivatives(times, states)
     length = np.diff(times)[:, None, None]
     u = (0.5 + 0.5 * POINTS)[None, :, None]
@@ -181,10 +175,3 @@ def _of_fixed_steps(
         + length * u * (1.0 - u) * ((1.0 - u) * slopes[:-1, None] - u * slopes[1:, None])
     )
     return Pieces(times, values)
-
-
-def _states(found: Trajectory) -> Array:
-    """Return omega and attitude of a trajectory in rows, in the order of its times."""
-    if found.attitude is None:
-        return np.array(found.omega)
-    return np.column_stack([found.omega, found.attitude])

@@ -15,13 +15,14 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from pyharness.model.array_type import Array
+from pyharness.model.chebyshev import points, to_coefficients
 
 # A slice, a mask or numbers of the elements of an array.
 Index = Any
 # Nodes of each polynomial.
 NODES = 33
-# Chebyshev points of the second kind from -1 to 1, in ascending order.
-POINTS: Array = np.sin(np.pi * np.arange(1 - NODES, NODES, 2) / (2 * (NODES - 1)))
+POINTS = points(NODES)
+TO_COEFFICIENTS = to_coefficients(NODES)
 # Divisions of an interval in two, after which a root is as exact as the coefficients.
 _MOST_DIVISIONS = 50
 # A derivative must exceed its bound by this factor to have no root, so that an extremum at the end
@@ -31,20 +32,16 @@ _MARGIN = 1.001
 FIT_ERROR = 4e-13
 
 
-def _transforms() -> tuple[Array, Array, Array, Array]:
-    """Return matrices for values to coefficients, the derivative, and the two halves."""
-    angles = np.pi * np.outer(np.arange(NODES), np.arange(NODES)[::-1]) / (NODES - 1)
-    fit = np.cos(angles) * (2.0 / (NODES - 1))
-    fit[:, [0, -1]] /= 2.0
-    fit[[0, -1]] /= 2.0
+def _transforms() -> tuple[Array, Array, Array]:
+    """Return matrices for the coefficients of the derivative, and of the two halves."""
     slope = np.zeros((NODES, NODES))
     slope[:-1] = chebyshev.chebder(np.eye(NODES))
-    left = fit @ chebyshev.chebvander(0.5 * (POINTS - 1.0), NODES - 1)
-    right = fit @ chebyshev.chebvander(0.5 * (POINTS + 1.0), NODES - 1)
-    return fit, slope, left, right
+    left = TO_COEFFICIENTS @ chebyshev.chebvander(0.5 * (POINTS - 1.0), NODES - 1)
+    right = TO_COEFFICIENTS @ chebyshev.chebvander(0.5 * (POINTS + 1.0), NODES - 1)
+    return slope, left, right
 
 
-TO_COEFFICIENTS, _DERIVATIVE, _LEFT, _RIGHT = _transforms()
+_DERIVATIVE, _LEFT, _RIGHT = _transforms()
 
 
 @dataclass(frozen=True, eq=False)

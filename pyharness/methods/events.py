@@ -27,6 +27,7 @@ from pyharness.methods.event_roots import (
     may_vanish,
 )
 from pyharness.model.array_type import Array
+from pyharness.model.chebyshev import nodes
 from pyharness.model.dense_output import DenseOutput, Pieces
 
 # Largest of the last coefficients of a polynomial that has converged, relative to its values.
@@ -125,9 +126,10 @@ def _fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
     smallest = (high - low) * 2.0**-_MOST_DIVISIONS
-    basis = chebyshev.chebvander(POINTS, solution.pieces.coefficients.shape[1] - 1)
-    inner = _normalised(basis @ solution.pieces.coefficients)
-    times = _times(low, high)
+    coefficients = solution.pieces.coefficients
+    basis = chebyshev.chebvander(POINTS, coefficients.shape[1] - 1)
+    inner = _normalised(basis @ coefficients)
+    times = nodes(low, high, POINTS)
     values = solution.values(g, times.ravel(), inner.reshape(-1, inner.shape[2])).reshape(
         times.shape
     )
@@ -158,18 +160,11 @@ def _fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
         first, last = first[split], last[split]
         if not low.size:
             break
-        times = _times(low, high)
+        times = nodes(low, high, POINTS)
         values = solution.values(g, times.ravel()).reshape(times.shape)
         centre = values[0::2, -1]
         first, last = np.column_stack([first, centre, centre, last]).reshape(-1, 2).T
     return _all_fits(done), joined(rough)
-
-
-def _times(low: Array, high: Array) -> Array:
-    middle, half = 0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low
-    times: Array = middle[:, None] + half[:, None] * POINTS
-    times[:, 0], times[:, -1] = low, high
-    return times
 
 
 def _all_fits(parts: list[Fits]) -> Fits:
@@ -180,7 +175,7 @@ def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> 
     """Return the noise of a function on intervals, the largest at three of their nodes."""
     if not low.size:
         return np.zeros(0)
-    times = _times(low, high)[:, NODES // 6 :: NODES // 3]
+    times = nodes(low, high, POINTS)[:, NODES // 6 :: NODES // 3]
     noise = solution.noise(g, times.ravel()).reshape(times.shape)
     return np.asarray(noise.max(axis=1))
 

@@ -238,10 +238,10 @@ def tilt(
     array([1.57079633])
     """
     where = "events: tilt"
-    k, vector = _axis(where, axis), np.array(three(f"{where} direction", toward))
+    k, vector = _axis(where, axis), np.array(three(f"{where} toward", toward))
     largest = float(np.abs(vector).max())
     if largest == 0.0:
-        raise InputError(f"{where} direction: 0, 0, 0; allowed: three numbers that are not all 0")
+        raise InputError(f"{where} toward: 0, 0, 0; allowed: three numbers that are not all 0")
     vector = vector / largest
     unit = (vector / np.linalg.norm(vector)).tolist()
     level = finite(f"{where} angle", angle)

@@ -111,7 +111,8 @@ def solve(
         If the method is unknown, or can't take the scene or propagate its attitude; if a torque
         that needs the attitude comes without it; if the times are not in order; if a moment that
         changes with time reaches 0 before a time; if the method can't meet the tolerance, or needs
-        more work for it than `effort` allows.
+        more work for it than `effort` allows; if dense output would need too many polynomials; if
+        an event is not a function with the right arguments, or does not return finite numbers.
     NotBuiltError
         If the method needs the extension, and it is not built.
 

@@ -7,7 +7,7 @@ q' = q (0, omega)/2, and is integrated. Angles and matrices are only other forms
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -81,10 +81,11 @@ def product(p: Iterable[Any], q: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
     )
 
 
-def quaternion_rates(omega: Sequence[Any], q: Sequence[Any]) -> list[Any]:
+def quaternion_rates(omega: Iterable[Any], q: Iterable[Any]) -> list[Any]:
     """Return the rates of the attitude quaternion q, which satisfies q' = q (0, omega)/2.
 
-    `omega` (rad/s) and `q` are numbers, symbols of a recorded function, or other expressions.
+    `omega` (rad/s) and `q` are numbers, arrays, symbols of a recorded function, or other
+    expressions.
     """
     (x, y, z), (a, b, c, d) = omega, q
     return [

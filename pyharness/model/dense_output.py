@@ -7,33 +7,16 @@ from typing import Any
 import numpy as np
 
 from pyharness.model.array_type import Array
+from pyharness.model.chebyshev import points, to_coefficients
 from pyharness.model.errors import InputError
 
 # Nodes of each polynomial.
 NODES = 17
-# Chebyshev points of the second kind from -1 to 1, in ascending order, symmetric to the last bit.
-POINTS: Array = np.sin(np.pi * np.arange(1 - NODES, NODES, 2) / (2 * (NODES - 1)))
+POINTS = points(NODES)
+TO_COEFFICIENTS = to_coefficients(NODES)
 # Times whose polynomials are evaluated together, so that little memory is needed.
 _BLOCK = 20_000
-
-
-def _values_to_coefficients() -> Array:
-    # Angles up to pi have the smallest rounding errors.
-    turns = np.outer(np.arange(NODES), np.arange(NODES)[::-1]) % (2 * NODES - 2)
-    angles = np.pi * np.minimum(turns, 2 * NODES - 2 - turns) / (NODES - 1)
-    weights = np.full(NODES, 2.0 / (NODES - 1))
-    weights[[0, -1]] /= 2.0
-    matrix: Array = np.cos(angles) * weights
-    matrix[[0, -1]] /= 2.0
-    return matrix
-
-
-# Multiplied by the values at POINTS it gives the coefficients of Chebyshev polynomials
-# (Trefethen 2013, Approximation Theory and Approximation Practice, chapters 3 and 4).
-TO_COEFFICIENTS = _values_to_coefficients()
-
-
-# Weights of the barycentric formula (the same book, chapter 5).
+# Weights of the barycentric formula.
 _WEIGHTS: Array = np.where(np.arange(NODES) % 2, -1.0, 1.0)
 _WEIGHTS[[0, -1]] /= 2.0
 

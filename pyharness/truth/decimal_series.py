@@ -53,9 +53,9 @@ def taylor_series(
     steps, and fewer if the torque depends on the state. Raise InputError if the work limit is
     exceeded.
     """
-    equations, at_end = (_Equations(scene, coefficients, velocity) for _ in range(2))
+    equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     is_recorded = isinstance(scene.torque, StateTorque)
-    limit = _Limit(scene, effort)
+    at_end = _Equations(scene, coefficients, velocity) if is_recorded else equations
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
     moving = len(state)
     state += [Decimal(x) for x in scene.attitude or ()]

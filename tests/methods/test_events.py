@@ -367,7 +367,7 @@ def test_message(events: Any, message: str) -> None:
             "events: flip axis is a number",
         ),
         (lambda: rest(0.0), "events: rest value: 0; allowed: a number greater than 0"),
-        (lambda: tilt(1, (0, 0, 0), 1.0), "events: tilt direction: 0, 0, 0; allowed"),
+        (lambda: tilt(1, (0, 0, 0), 1.0), "events: tilt toward: 0, 0, 0; allowed"),
         (lambda: tilt(1, (0, 0, 1), 4.0), "events: tilt angle: 4 rad; allowed: 0 to pi"),
     ],
 )

@@ -17,6 +17,8 @@ _LARGEST_ANGLE = Decimal("1e308")
 _INVISIBLE = 400
 # Part of the distance of a divisor's zero that a step may be long.
 _WITHIN_CIRCLE = Decimal("0.9")
+# Largest change of an angle (rad) in a step, if the square of its sine or cosine is used.
+_PART_OF_TURN = Decimal(2)
 # Relative accuracy with which the square of a root's polynomial must agree with its operand, so
 # that a negative value of the polynomial is not merely its truncation error.
 _TRUSTED = Decimal("1e-6")
@@ -57,6 +59,14 @@ class TapeSeries:
         # The times at which a table changes. Its first piece holds before its first break too.
         changes = {time for _, breaks in self._breaks.values() for time in breaks[1:]}
         self._changes = sorted(changes)
+        # The slots of the sines and cosines of which a product is the square.
+        products = [each.operands for each in tape.operations if each.kind == "product"]
+        squared = {x for x, y in products if x == y}
+        self._powers = {
+            slot
+            for slot, each in enumerate(tape.operations, N_INPUTS)
+            if each.kind in ("sine", "cosine") and slot in squared
+        }
         self._slots: list[Row] = []
 
     def begin(
@@ -170,24 +180,34 @@ class TapeSeries:
         An exponential may be so small at the beginning of a step that it changes no digit, and
         large a little later. Therefore its argument changes by at most half the order, unless the
         exponential stays invisible. The derivative of a hyperbolic tangent is such a pulse too. A
-        divisor has no zero in the circle around the beginning of the step.
+        divisor has no zero in the circle around the beginning of the step. A high power of a sine
+        has a pulse in every half turn, and may be invisible at both ends of a step.
         """
-        for operation, _ in self._operations:
-            if operation.kind not in ("exp", "tanh", "quotient"):
+        for slot, (operation, _) in enumerate(self._operations, N_INPUTS):
+            most = self._largest_change(operation, slot)
+            if most is None:
                 continue
-            x, *terms = self._slots[operation.operands[-1]]
-            sizes = [Decimal(0), *map(abs, terms)]
-            if operation.kind == "quotient":
-                most = _WITHIN_CIRCLE * abs(x)
-            elif operation.kind == "exp":
-                most = max(Decimal(self._order) / 2, -x - _INVISIBLE)
-            else:
-                # The derivative decreases as exp(-2 abs(x)).
-                most = max(Decimal(self._order) / 2, 2 * abs(x) - _INVISIBLE) / 2
-            while (change := _value(sizes, length)) > most:
-                # The change is a convex function of the length.
-                length *= max(Decimal("0.5"), most / change)
+            sizes = [Decimal(0), *map(abs, self._slots[operation.operands[-1]][1:])]
+            while (change := _value(sizes, length)) > 2 * most:
+                length /= 2
+            if change > most:
+                # The change is a convex function of the length, so that the quotient is enough.
+                length *= most / change
         return length
+
+    def _largest_change(self, operation: Operation, slot: int) -> Decimal | None:
+        """Return by how much the last operand of an operation may change in a step, if limited."""
+        if slot in self._powers:
+            return _PART_OF_TURN
+        if operation.kind not in ("exp", "tanh", "quotient"):
+            return None
+        x = self._slots[operation.operands[-1]][0]
+        if operation.kind == "quotient":
+            return _WITHIN_CIRCLE * abs(x)
+        if operation.kind == "exp":
+            return max(Decimal(self._order) / 2, -x - _INVISIBLE)
+        # The derivative decreases as exp(-2 abs(x)).
+        return max(Decimal(self._order) / 2, 2 * abs(x) - _INVISIBLE) / 2
 
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
         """Return the next time (s) after `time` at which a table changes, or None if there is none.

@@ -208,6 +208,15 @@ def test_an_overflow_ends_the_function() -> None:
     assert (sol_of(nothing).t_min, sol_of(nothing).t_max) == (0.0, 0.0)
 
 
+def test_the_smallest_tolerance_of_a_method_is_enough() -> None:
+    # Results at the nodes would be computed to a quarter of the tolerance.
+    with pytest.raises(InputError, match=r"^tolerance is 1e-09; dop853 can't meet it"):
+        solve(BRICK, [-5.0, 20.0], "dop853", 1e-9, attitude=True)
+    found = solve(BRICK, [-5.0, 20.0], "dop853", 4e-9, attitude=True, dense_output=True)
+    truth = solve(BRICK, [-3.3, 7.7, 19.1], attitude=True)
+    assert largest_error(sol_of(found), truth) <= 4e-9
+
+
 def test_too_many_polynomials_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dense, "_MOST_PIECES", 5)
     for method in ("taylor", "rk4"):

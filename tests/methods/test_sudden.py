@@ -14,12 +14,16 @@ from pyharness.truth.reference import reference
 
 SPHERE = (2.0, 2.0, 2.0)
 MIDDLE = 4.321
-WIDTHS = (1e-1, 1e-3, 1e-6)
+WIDTHS = (1e-1, 1e-2, 3e-3, 1e-3, 1e-6)
 
 # A torque as a function of x, the time since MIDDLE over a width, and its integral over x.
 PULSES: dict[str, tuple[Callable[[Any], Any], Callable[[float], float]]] = {
     "bell": (lambda x: np.exp(-x * x), lambda x: 0.5 * math.sqrt(math.pi) * math.erf(x)),
     "peak": (lambda x: 1.0 / (1.0 + x * x), math.atan),
+    "narrow peak": (
+        lambda x: 1.0 / (1.0 + x * x) ** 2,
+        lambda x: 0.5 * (math.atan(x) + x / (1.0 + x * x)),
+    ),
     "switch": (
         lambda x: np.tanh(x),
         lambda x: abs(x) + math.log1p(math.exp(-2.0 * abs(x))) - math.log(2.0),
@@ -95,6 +99,8 @@ def test_a_power_of_a_sine_is_a_series_of_pulses(power: int) -> None:
         found = solve(scene, [2.0 * math.pi * n for n in turns], "taylor", tolerance)
         error = np.abs(found.omega[:, 0] - wanted).max() / max(wanted)
         assert error <= tolerance + 4e-15
+    true = reference(scene, [2.0 * math.pi])
+    assert true.omega[0, 0] == pytest.approx(wanted[0], rel=1e-15)
 
 
 @pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-8, 1e-300])

@@ -22,6 +22,8 @@ SEED = "mutations"
 NOT_HERE = ("tests/mutations/", "tests/browser/", "tests/bench/")
 # The files that most mutations need are recorded first, so that an interrupted recording is useful.
 FIRST = ("methods", "model", "original", "truth", "compare", "theory", "ensembles", "checks")
+# Arguments of pytest for every test.
+PYTEST = ("--no-header", "--tb=no", "-p", "no:cacheprovider")
 OF_ONE_FILE, UNKNOWN = 3000.0, 20.0  # s
 # A build for debuggers keeps the names of its functions.
 INSTRUMENTED = (
@@ -108,7 +110,8 @@ def _record(name: str, traced: Tree, plain: Tree, hooks: Path) -> tuple[str, str
     if kind != name:
         command = [sys.executable, "-m", "tests.mutations.recorder", *command_of(kind)]
     else:
-        command = [*pytest_command(), "-p", "tests.mutations.recorder", name]
+        command = [sys.executable, "-m", "pytest", "-q", *PYTEST]
+        command += ["-p", "tests.mutations.recorder", name]
     _, said = traced.run(command, OF_ONE_FILE, environment)
     if not place.exists():
         return name, f"not recorded: {said[-300:]}"
@@ -118,7 +121,7 @@ def _record(name: str, traced: Tree, plain: Tree, hooks: Path) -> tuple[str, str
     # Tests that fail under the recording are tried again without it; skipped tests catch nothing.
     failed = [test for test, (_, _, passed) in found.items() if not passed]
     if failed and kind == name:
-        _, said = plain.run([*pytest_command("-v"), *failed], OF_ONE_FILE)
+        _, said = plain.test([*PYTEST, "-v", *failed], OF_ONE_FILE)
         failed = [test for test in failed if f"{test} PASSED" not in said]
     for test in failed:
         del found[test]
@@ -130,9 +133,3 @@ def _record(name: str, traced: Tree, plain: Tree, hooks: Path) -> tuple[str, str
     place.unlink()
     said = f"{sum(s for s, _ in tests.values()):.1f} s, {len(tests)} tests"
     return name, said + (f", not {', '.join(failed)}" if failed else "")
-
-
-def pytest_command(verbosity: str = "-q") -> list[str]:
-    """Return the beginning of a command that runs tests."""
-    return [sys.executable, "-m", "pytest", verbosity, "--no-header", "--tb=no",
-            "-p", "no:cacheprovider"]  # fmt: skip

@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import json
 import os
 import resource
 import shutil
@@ -9,7 +10,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from threading import Lock
+from threading import Lock, Timer
 
 ROOT = Path(__file__).parent.parent.parent
 PLACE = ROOT / "build" / "mutations"
@@ -24,7 +25,7 @@ class Processes:
     """The running processes, so that they can be ended."""
 
     def __init__(self) -> None:
-        self._running: set[subprocess.Popen[str]] = set()
+        self._groups: set[int] = set()
         self._lock = Lock()
         self._ended = False
 
@@ -33,41 +34,93 @@ class Processes:
     ) -> tuple[int | None, str]:
         """Return the exit code of a command, or None after the time limit, and its output."""
         with self._lock:
-            if self._ended:
-                raise Stopped
+            self.check()
             process = subprocess.Popen(
                 command, cwd=folder, env=environment, text=True, errors="replace",
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                 start_new_session=True,
             )  # fmt: skip
-            self._running.add(process)
+            self._groups.add(process.pid)
         try:
             said, _ = process.communicate(timeout=limit)
             code: int | None = process.returncode
         except subprocess.TimeoutExpired:
-            _kill(process)
+            kill(process.pid)
             said, _ = process.communicate()
             code = None
         finally:
-            with self._lock:
-                self._running.discard(process)
-            # Processes that a test left behind are ended with it.
-            _kill(process)
+            self.leave(process.pid)
+        self.check()
+        return code, said
+
+    def check(self) -> None:
+        """Raise Stopped if the whole run was ended."""
         if self._ended:
             raise Stopped
-        return code, said
+
+    def enter(self, group: int) -> None:
+        """Add a process group."""
+        with self._lock:
+            self._groups.add(group)
+
+    def leave(self, group: int) -> None:
+        """End what is left of a process group, and forget it."""
+        with self._lock:
+            self._groups.discard(group)
+        kill(group)
 
     def end(self) -> None:
         """End all processes, and let none begin."""
         with self._lock:
             self._ended = True
-            for process in self._running:
-                _kill(process)
+            for group in self._groups:
+                kill(group)
 
 
-def _kill(process: subprocess.Popen[str]) -> None:
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
+def kill(group: int) -> None:
+    """Kill the processes of a group, if there are any."""
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(group, signal.SIGKILL)
+
+
+class Server:
+    """A process that has imported the libraries, and runs pytest in copies of itself."""
+
+    def __init__(self, folder: Path, environment: dict[str, str], processes: Processes) -> None:
+        self._processes = processes
+        self._place = folder / "build" / "said"
+        self._one_at_a_time = Lock()
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "tests.mutations.server"], cwd=folder, env=environment,
+            text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
+        )  # fmt: skip
+        processes.enter(self._process.pid)
+
+    def run(self, arguments: list[str], limit: float) -> tuple[int, str]:
+        """Return the exit status of pytest, which is negative after the time limit, and its output.
+
+        Raise Stopped if the whole run was ended.
+        """
+        assert self._process.stdin is not None
+        with self._one_at_a_time:
+            self._processes.check()
+            request = json.dumps([arguments, str(self._place)])
+            print(request, file=self._process.stdin, flush=True)
+            copy = self._answer()
+            self._processes.enter(copy)
+            timer = Timer(limit, kill, [copy])
+            timer.start()
+            try:
+                return self._answer(), self._place.read_text(errors="replace")
+            finally:
+                timer.cancel()
+                self._processes.leave(copy)
+
+    def _answer(self) -> int:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        self._processes.check()
+        return int(line)
 
 
 class Tree:
@@ -82,6 +135,7 @@ class Tree:
         self._processes = processes
         self._build = self.folder / "build" / "mutated"
         self._options = options
+        self._server: Server | None = None
         self.is_stale = True  # the extension was not built from these sources
         # A limit on memory for every process: a loop that allocates for ever must end.
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
@@ -92,6 +146,8 @@ class Tree:
             "PYTHONPATH": str(self.folder),
             "MESONPY_EDITABLE_SKIP": os.pathsep.join(editable),
             "COLUMNS": "300",
+            # Most of the time of a short test is the compilation of unchanged sources otherwise.
+            "PYTHONDONTWRITEBYTECODE": "",
             # The output before a crash is not lost.
             "PYTHONUNBUFFERED": "1",
         }
@@ -106,6 +162,12 @@ class Tree:
         return self._processes.run(
             command, self.folder, {**self._environment, **(more or {})}, limit
         )
+
+    def test(self, arguments: list[str], limit: float) -> tuple[int, str]:
+        """Run pytest in the copy."""
+        if self._server is None:
+            self._server = Server(self.folder, self._environment, self._processes)
+        return self._server.run(arguments, limit)
 
     def write(self, file: str, text: str) -> None:
         """Replace the text of a file."""

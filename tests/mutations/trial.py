@@ -5,13 +5,14 @@ import sys
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
-from tests.mutations.reach import Check, command_of, files_of_tests, pytest_command
+from tests.mutations.reach import PYTEST, Check, command_of, files_of_tests
 from tests.mutations.sample import Mutation
 from tests.mutations.tree import ROOT, Tree
 
-# Recorded time of all tests of the first tier; of the second tier; and of each kind of `verify`.
-# Slower checks are not tried, so that a mutation lives that only they would catch.
-FIRST, SECOND = 20.0, 60.0  # s
+# Recorded time of the tests of the changed file that are run first; of the first tier of other
+# tests; of the second tier; and of all kinds of `verify`. Slower checks are not tried, so that a
+# mutation lives that only they would catch.
+OWN, FIRST, SECOND, VERIFY = 10.0, 20.0, 60.0, 60.0  # s
 # Tests that passed without a mutation since the run began.
 _PASS: set[str] = set()
 # A trial may take this many times its recorded time, and some seconds to start.
@@ -105,23 +106,30 @@ def near(mutation: Mutation, checks: list[Check]) -> list[Check]:
     named = {path for path in files_of_tests() if mention.search(path + (ROOT / path).read_text())}
     chosen = {each.name for each in entered}
     more = [e for e in checks if e.name.partition("::")[0] in named and e.name not in chosen]
-    # Tests of the module's own name come first, then the quickest.
-    own = f"/test_{stem}.py"
-    entered.sort(key=lambda each: (own not in each.name, each.seconds))
-    return [*entered, *sorted(more, key=lambda each: each.seconds)]
+    return [each for group in (entered, more) for each in sorted(group, key=lambda e: e.seconds)]
 
 
 def _tiers(mutation: Mutation, checks: list[Check]) -> list[list[Check]]:
     """Return lists of checks, each to be run if nothing failed in the lists before."""
     found = near(mutation, checks)
+    kinds = sorted((e for e in found if e.name.startswith("verify")), key=lambda e: e.seconds)
     tests = [each for each in found if not each.name.startswith("verify")]
-    first = _within(tests, FIRST)
-    tried = {each.name for each in first}
+    # A test run with few files begins soonest.
+    own = _within([each for each in tests if _own(mutation) in each.name], OWN)
+    first = _within(_without(tests, own), FIRST)
     # Start again from the quickest, so that most of them fit.
-    rest = sorted((each for each in tests if each.name not in tried), key=lambda e: e.seconds)
-    kinds = [e for e in found if e.name.startswith("verify") and e.seconds <= SECOND]
-    kinds.sort(key=lambda each: each.seconds)
-    return [first, _within(rest, SECOND), *([kind] for kind in kinds)]
+    rest = sorted(_without(tests, [*own, *first]), key=lambda each: each.seconds)
+    return [own, first, _within(rest, SECOND), *([kind] for kind in _within(kinds, VERIFY))]
+
+
+def _without(checks: list[Check], tried: list[Check]) -> list[Check]:
+    names = {each.name for each in tried}
+    return [each for each in checks if each.name not in names]
+
+
+def _own(mutation: Mutation) -> str:
+    """Return the end of the name of a file with the tests of the changed file."""
+    return f"/test_{PurePosixPath(mutation.file).stem}.py"
 
 
 def _within(checks: list[Check], limit: float) -> list[Check]:
@@ -142,9 +150,7 @@ def first_failure(tree: Tree, checks: list[Check]) -> Check | None:
         kind = checks[0].name.removeprefix("verify ")
         code, _ = tree.run([sys.executable, "-m", "pyharness", *command_of(kind)], limit)
         return checks[0] if code != 0 else None
-    names = tree.folder / "build" / "tests"
-    names.write_text("\n".join(each.name for each in checks))
-    code, said = tree.run([*pytest_command("-v"), "-x", f"@{names}"], limit)
+    code, said = tree.test([*PYTEST, "-v", "-x", *(each.name for each in checks)], limit)
     if code == 0:
         return None
     by_name = {each.name: each for each in checks}

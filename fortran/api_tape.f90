@@ -33,3 +33,40 @@ subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_at
   steps = solution%steps
   effort(2:) = [solution%needed, solution%error, solution%growth, solution%spent]
 end subroutine tape_rows
+
+subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, trial, longest, &
+                     n_terms, h, terms, ends, order, expansions, status)
+  ! Compute one step of a system of ordinary differential equations by Taylor series: the terms of
+  ! the unknowns, whose sums are the state at its end. The unit of time is the user's.
+  !f2py threadsafe
+  use levels, only: step => tape_step
+  use problem, only: step_request_t, step_t
+  use tape, only: tape_of
+  implicit none
+  integer(4), intent(in) :: n_numbers
+  real(8), intent(in), target :: numbers(n_numbers) ! the tape, as tape.f90 describes it
+  integer(4), intent(in) :: n
+  real(8), intent(in) :: t
+  real(8), intent(in), target :: state(n)
+  real(8), intent(in), target :: tolerances(n)  ! allowed errors of the unknowns in the step
+  real(8), intent(in) :: relative               ! tolerance that decides the order
+  real(8), intent(in) :: trial, longest         ! step that is tried, and longest step
+  integer(4), intent(in) :: n_terms             ! largest order plus 1
+  real(8), intent(out) :: h                     ! step
+  real(8), intent(out), target :: terms(n_terms, n)
+  real(8), intent(out), target :: ends(n)       ! state at the end
+  integer(4), intent(out) :: order
+  integer(4), intent(out) :: expansions         ! number of expansions that were tried
+  integer(4), intent(out) :: status             ! 0 complete, 2 no step is short enough
+  type(step_t) :: taken
+
+  taken%h = 0.0d0
+  taken%order = 0
+  taken%terms(0:n_terms - 1, 1:n) => terms
+  taken%state => ends
+  call step(tape_of(numbers), step_request_t(t, trial, longest, relative, state, tolerances), taken)
+  h = taken%h
+  order = taken%order
+  expansions = taken%expansions
+  status = taken%status
+end subroutine tape_step

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pyharness.methods.prepared_attitude import AttitudeSolver
     from pyharness.methods.solve import solve
     from pyharness.methods.solver import Solver
+    from pyharness.methods.taylor_ivp import Taylor
     from pyharness.model.changing import ChangingInertia, ChangingMoments
     from pyharness.model.dense_output import DenseOutput
     from pyharness.model.errors import InputError, NotBuiltError
@@ -54,6 +55,7 @@ __all__ = [
     "Solver",
     "StateTorque",
     "Stop",
+    "Taylor",
     "TorqueLaw",
     "Trajectory",
     "case_scene",
@@ -95,6 +97,7 @@ _SUBMODULES = {
     "methods.prepared": ("prepare",),
     "methods.prepared_attitude": ("AttitudeSolver",),
     "methods.solver": ("Solver",),
+    "methods.taylor_ivp": ("Taylor",),
     "methods.solve": ("solve",),
 }
 # Public modules, which are imported at their first use too.

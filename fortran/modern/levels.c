@@ -18,11 +18,12 @@ typedef void runner(void *ensemble);
   series_solver solve_many_taylor_##level;                                                     \
   fixed_solver solve_many_fixed_##level;                                                       \
   runner run_lanes_##level;                                                                    \
-  solver solve_tape_##level;
+  solver solve_tape_##level;                                                                   \
+  solver step_tape_##level;
 #define TAKEN(level)                                                                           \
   {taylor_solve_##level,       quick_solve_##level,      solve_many_free_##level,              \
    solve_many_taylor_##level,  solve_many_fixed_##level, run_lanes_##level,                    \
-   solve_tape_##level}
+   solve_tape_##level,         step_tape_##level}
 
 DECLARED(plain)
 #ifdef WITH_LEVELS
@@ -38,6 +39,7 @@ static struct {
   fixed_solver *fixed;
   runner *lanes;
   solver *tape;
+  solver *step;
 } chosen, known[] = {
   TAKEN(plain),
 #ifdef WITH_LEVELS
@@ -99,6 +101,11 @@ void many_fixed(const void *bodies, int method, int n, double *omega, int8_t *st
 void tape_solve(const void *tape, const void *request, void *solution)
 {
   chosen.tape(tape, request, solution);
+}
+
+void tape_step(const void *tape, const void *request, void *step)
+{
+  chosen.step(tape, request, step);
 }
 
 void run_lanes(void *ensemble) { chosen.lanes(ensemble); }

@@ -26,6 +26,22 @@ module problem
     real(dp), pointer, contiguous :: times(:)      !! s
   end type request_t
 
+  type, public :: step_request_t
+    !! A step of a system of ordinary differential equations.
+    real(dp) :: t, trial, longest               !! time, trial step and longest step, s
+    real(dp) :: relative                        !! tolerance that decides the order
+    real(dp), pointer, contiguous :: state(:)
+    real(dp), pointer, contiguous :: tolerances(:) !! allowed errors of the unknowns in the step
+  end type step_request_t
+
+  type, public :: step_t
+    !! A step that was taken: the state is the sum of the terms at its end.
+    real(dp) :: h                               !! s
+    integer :: order, status, expansions        !! status of the module statuses
+    real(dp), pointer, contiguous :: terms(:, :) !! (0:, unknowns); 0 beyond the order
+    real(dp), pointer, contiguous :: state(:)
+  end type step_t
+
   type, public :: solution_t
     !! What was computed. A kernel sets the components that it has.
     real(dp), pointer, contiguous :: rows(:, :)    !! omega at the first n_rows times, rad/s

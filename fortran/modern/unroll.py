@@ -32,6 +32,7 @@ MODULES = (
     "tape_plan",
     "tape_march",
     "tape_solve",
+    "tape_step",
     "many_circular",
     "many_columns",
     "many_free",

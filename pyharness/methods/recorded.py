@@ -15,7 +15,7 @@ from pyharness.model.errors import InputError, TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.tape import N_INPUTS, TIME, Linear, Table, Tape
+from pyharness.model.tape import TIME, Linear, Table, Tape
 from pyharness.model.trajectory import Array, Trajectory
 
 _KINDS = {
@@ -82,8 +82,8 @@ def kernel_tape(tape: Tape) -> Array:
 
     Sine and cosine of one angle become one operation, because each recurrence needs the other.
     """
-    places = {slot: slot + 1 for slot in range(N_INPUTS)}
-    n_slots = N_INPUTS
+    places = {slot: slot + 1 for slot in range(tape.n_inputs)}
+    n_slots = tape.n_inputs
     operations: list[tuple[int, int, int, int]] = []
     combinations: list[tuple[float, list[tuple[int, float]]]] = []
     frequencies: dict[int, int] = {}  # the combination that is proportional to time, by slot
@@ -95,7 +95,7 @@ def kernel_tape(tape: Tape) -> Array:
         combinations.append((linear.constant, terms))
         return len(combinations)
 
-    for number, (kind, operands, linear, table) in enumerate(tape.operations, N_INPUTS):
+    for number, (kind, operands, linear, table) in enumerate(tape.operations, tape.n_inputs):
         if kind in ("sine", "cosine") and operands[0] in waves:
             places[number] = waves[operands[0]] + (kind == "cosine")
             continue

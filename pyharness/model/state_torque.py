@@ -1,7 +1,6 @@
 """Torques that depend on the state: recorded from a Python function, or evaluated by calling it."""
 
 import math
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from inspect import Parameter, signature
@@ -11,9 +10,9 @@ import numpy as np
 
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes
-from pyharness.model.errors import InputError, kind_of, printable
+from pyharness.model.errors import InputError, kind_of
 from pyharness.model.law_symbols import body_torque
-from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, refusal
+from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, called_once
 from pyharness.model.tape import FLOATS, N_INPUTS, TIME, Tape, evaluate
 from pyharness.model.torque_law import FRAMES, TorqueLaw
 from pyharness.model.values import Triple, three_floats
@@ -179,19 +178,8 @@ def recorded(function: Function) -> StateTorque:
 
     def called(time: Symbol, omega: Any, attitude: Any) -> list[Any]:
         given = (time, omega, attitude) if takes_attitude else (time, omega)
-        try:
-            found = function(*given)
-            components = list(found)
-        except InputError:
-            raise
-        except Exception as error:
-            missing = re.search(r"no callable (\w+) method", str(error))
-            if missing:
-                raise refusal(f"{missing[1]} of the state") from None
-            raise InputError(
-                f"[torque]: the function raised {type(error).__name__}: {printable(str(error))}; "
-                "allowed: a function that returns three components in N m"
-            ) from error
+        allowed = "a function that returns three components in N m"
+        components = called_once(function, given, time.recorder, allowed)
         if len(components) != 3:
             raise InputError(f"[torque]: {len(components)} components; allowed: three")
         return components

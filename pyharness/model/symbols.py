@@ -6,12 +6,13 @@ same operation on the same slots returns the same slot.
 """
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from pyharness.model.errors import InputError
+from pyharness.model.errors import InputError, printable
 from pyharness.model.tape import (
     N_INPUTS,
     TIME,
@@ -28,29 +29,36 @@ from pyharness.model.values import converted
 # are proportional to their number.
 MOST_OPERATIONS = 2000
 _MOST_POWER = 1000
-_ALLOWED = (
-    "allowed: + - * /, integer powers, sqrt, sin, cos, tan, exp, sinh, cosh, tanh of NumPy, or "
-    "opaque(function), which SciPy's methods solve"
-)
-
-
-def refusal(what: str) -> InputError:
-    """Return the exception for an operation that can't be recorded; `what` names it."""
-    return InputError(f"[torque]: {what} can't be recorded; {_ALLOWED}")
+_ALLOWED = "+ - * /, integer powers, sqrt, sin, cos, tan, exp, sinh, cosh, tanh of NumPy"
 
 
 class Recorder:
     """A tape while it is being recorded."""
 
-    def __init__(self, most: int = MOST_OPERATIONS) -> None:
-        """Begin an empty tape, on which at most `most` operations can be recorded."""
-        self._most = most
+    def __init__(
+        self,
+        most: int = MOST_OPERATIONS,
+        n_inputs: int = N_INPUTS,
+        place: str = "[torque]",
+        instead: str = "opaque(function), which SciPy's methods solve",
+    ) -> None:
+        """Begin an empty tape of a function of `n_inputs` numbers, with at most `most` operations.
+
+        Messages begin with `place`, and say what to use `instead` of what can't be recorded.
+        """
+        self.place = place
+        self._most, self._n_inputs, self._instead = most, n_inputs, instead
         self._operations: list[Operation] = []
         self._slots: dict[Operation, int] = {}
 
     def inputs(self) -> list["Symbol"]:
-        """Return a symbol for each of the eight inputs: time, omega and attitude."""
-        return [Symbol(self, 0.0, {slot: 1.0}) for slot in range(N_INPUTS)]
+        """Return a symbol for each input: the time, then the unknowns (omega and attitude)."""
+        return [Symbol(self, 0.0, {slot: 1.0}) for slot in range(self._n_inputs)]
+
+    def refusal(self, what: str) -> InputError:
+        """Return the exception for an operation that can't be recorded; `what` names it."""
+        allowed = f"allowed: {_ALLOWED}, or {self._instead}"
+        return InputError(f"{self.place}: {what} can't be recorded; {allowed}")
 
     def number(self, value: float) -> "Symbol":
         """Return a constant as a symbol."""
@@ -61,9 +69,9 @@ class Recorder:
         if operation not in self._slots:
             if len(self._operations) == self._most:
                 raise InputError(
-                    f"[torque]: more than {self._most} operations; use fewer, or a table"
+                    f"{self.place}: more than {self._most} operations; use fewer, or a table"
                 )
-            self._slots[operation] = N_INPUTS + len(self._operations)
+            self._slots[operation] = self._n_inputs + len(self._operations)
             self._operations.append(operation)
         return self._slots[operation]
 
@@ -73,7 +81,7 @@ class Recorder:
         Operations on which no output depends are removed.
         """
         linear = [self._output(axis, each) for axis, each in enumerate(outputs, 1)]
-        return _without_unused(self._operations, linear)
+        return _without_unused(self._operations, linear, self._n_inputs)
 
     def _output(self, axis: int, value: Any) -> Linear:
         if isinstance(value, np.ndarray) and value.shape == ():
@@ -82,26 +90,30 @@ class Recorder:
             return value.linear()
         number = converted(value)
         if not isinstance(number, float):
-            raise InputError(f"[torque]: component {axis} is {number}; allowed: a number")
+            raise InputError(f"{self.place}: component {axis} is {number}; allowed: a number")
         if not math.isfinite(number):
-            raise InputError(f"[torque]: component {axis} is {number:g}; allowed: a finite number")
+            raise InputError(
+                f"{self.place}: component {axis} is {number:g}; allowed: a finite number"
+            )
         return Linear(number, ())
 
 
 class Symbol:
     """A linear combination of slots of a tape, which records what is done to it."""
 
-    __slots__ = ("_constant", "_recorder", "_terms")
+    __slots__ = ("_constant", "_terms", "recorder")
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, recorder: Recorder, constant: float, terms: dict[int, float]) -> None:
         if not (math.isfinite(constant) and all(map(math.isfinite, terms.values()))):
             raise InputError(
-                "[torque]: a constant overflows or is not a number; use finite numbers"
+                f"{recorder.place}: a constant overflows or is not a number; use finite numbers"
             )
         if len(terms) > MOST_OPERATIONS:
-            raise InputError(f"[torque]: a sum of more than {MOST_OPERATIONS} terms; use fewer")
-        self._recorder, self._constant, self._terms = recorder, constant, terms
+            raise InputError(
+                f"{recorder.place}: a sum of more than {MOST_OPERATIONS} terms; use fewer"
+            )
+        self.recorder, self._constant, self._terms = recorder, constant, terms
 
     def linear(self) -> Linear:
         """Return the linear combination as data."""
@@ -112,7 +124,7 @@ class Symbol:
         if len(self._terms) == 1 and not self._constant:
             ((slot, factor),) = self._terms.items()
             return slot, factor
-        return self._recorder.slot(Operation("linear", (), self.linear())), 1.0
+        return self.recorder.slot(Operation("linear", (), self.linear())), 1.0
 
     def _other(self, value: Any) -> "Symbol | None":
         """Return the other operand of an operator as a symbol, or None if it is no number."""
@@ -121,13 +133,13 @@ class Symbol:
         if isinstance(value, np.ndarray):
             return None
         number = converted(value)
-        return Symbol(self._recorder, number, {}) if isinstance(number, float) else None
+        return Symbol(self.recorder, number, {}) if isinstance(number, float) else None
 
     def _scaled(self, factor: float) -> "Symbol":
         if factor == 0.0:
-            return Symbol(self._recorder, 0.0, {})
+            return Symbol(self.recorder, 0.0, {})
         terms = {slot: factor * each for slot, each in self._terms.items()}
-        return Symbol(self._recorder, factor * self._constant, terms)
+        return Symbol(self.recorder, factor * self._constant, terms)
 
     def __add__(self, value: Any) -> "Symbol":
         """Return the sum with a symbol or a real number."""
@@ -139,7 +151,7 @@ class Symbol:
             total = terms.pop(slot, 0.0) + coefficient
             if total != 0.0:
                 terms[slot] = total
-        return Symbol(self._recorder, self._constant + other._constant, terms)
+        return Symbol(self.recorder, self._constant + other._constant, terms)
 
     __radd__ = __add__
 
@@ -173,8 +185,8 @@ class Symbol:
         if not self._terms:
             return other._scaled(self._constant)
         (a, factor), (b, second) = self._slot(), other._slot()
-        product = self._recorder.slot(Operation("product", (min(a, b), max(a, b))))
-        return Symbol(self._recorder, 0.0, {product: factor * second})
+        product = self.recorder.slot(Operation("product", (min(a, b), max(a, b))))
+        return Symbol(self.recorder, 0.0, {product: factor * second})
 
     __rmul__ = __mul__
 
@@ -185,9 +197,9 @@ class Symbol:
             return NotImplemented
         if not other._terms:
             if other._constant == 0.0:
-                raise InputError("[torque]: division by the constant 0")
+                raise InputError(f"{self.recorder.place}: division by the constant 0")
             quotient = {slot: each / other._constant for slot, each in self._terms.items()}
-            return Symbol(self._recorder, self._constant / other._constant, quotient)
+            return Symbol(self.recorder, self._constant / other._constant, quotient)
         if not (self._terms or self._constant):
             return self
         (b, divisor) = other._slot()
@@ -195,9 +207,9 @@ class Symbol:
             a, factor = self._slot()
         else:
             one = Linear(1.0, ())
-            a, factor = self._recorder.slot(Operation("linear", (), one)), self._constant
-        slot = self._recorder.slot(Operation("quotient", (a, b)))
-        return Symbol(self._recorder, 0.0, {slot: factor / divisor})
+            a, factor = self.recorder.slot(Operation("linear", (), one)), self._constant
+        slot = self.recorder.slot(Operation("quotient", (a, b)))
+        return Symbol(self.recorder, 0.0, {slot: factor / divisor})
 
     def __rtruediv__(self, value: Any) -> "Symbol":
         """Record and return a real number divided by the symbol."""
@@ -210,12 +222,12 @@ class Symbol:
         """Record and return an integer power, or the square root as the power 0.5."""
         exponent = converted(power) if not isinstance(power, Symbol) else None
         if not isinstance(exponent, float):
-            raise refusal("a power that is not a number")
+            raise self.recorder.refusal("a power that is not a number")
         if exponent == 0.5:
             return self.sqrt()
         if exponent != int(exponent) or abs(exponent) > _MOST_POWER:
-            raise refusal(f"the power {exponent:g}")
-        result, square, left = self._recorder.number(1.0), self, abs(int(exponent))
+            raise self.recorder.refusal(f"the power {exponent:g}")
+        result, square, left = self.recorder.number(1.0), self, abs(int(exponent))
         while left:
             if left % 2:
                 result = result * square
@@ -226,21 +238,22 @@ class Symbol:
 
     def __rpow__(self, base: Any) -> "Symbol":
         """Refuse a power whose exponent is a symbol."""
-        raise refusal("a power that is not a number")
+        raise self.recorder.refusal("a power that is not a number")
 
     def _of(self, kind: str, function: Callable[[float], float]) -> "Symbol":
         if not self._terms:
-            return Symbol(self._recorder, function(self._constant), {})
+            return Symbol(self.recorder, function(self._constant), {})
         slot, factor = self._slot()
         if factor != 1.0:
-            slot = self._recorder.slot(Operation("linear", (), self.linear()))
-        return Symbol(self._recorder, 0.0, {self._recorder.slot(Operation(kind, (slot,))): 1.0})
+            slot = self.recorder.slot(Operation("linear", (), self.linear()))
+        return Symbol(self.recorder, 0.0, {self.recorder.slot(Operation(kind, (slot,))): 1.0})
 
     # NumPy calls the methods with these names for np.sqrt(symbol) and so on.
     def sqrt(self) -> "Symbol":
         """Return the square root."""
         if not self._terms and self._constant < 0.0:
-            raise InputError(f"[torque]: square root of the constant {self._constant:g}")
+            place = self.recorder.place
+            raise InputError(f"{place}: square root of the constant {self._constant:g}")
         return self._of("sqrt", math.sqrt)
 
     def exp(self) -> "Symbol":
@@ -274,9 +287,11 @@ class Symbol:
     def of_table(self, table: Table) -> "Symbol":
         """Return the value of a table at this time; raise InputError if it isn't the plain time."""
         if self._constant or self._terms != {TIME: 1.0}:
-            raise InputError("[torque]: a table of anything but the time can't be recorded")
-        slot = self._recorder.slot(Operation("table", (), None, table))
-        return Symbol(self._recorder, 0.0, {slot: 1.0})
+            raise InputError(
+                f"{self.recorder.place}: a table of anything but the time can't be recorded"
+            )
+        slot = self.recorder.slot(Operation("table", (), None, table))
+        return Symbol(self.recorder, 0.0, {slot: 1.0})
 
     def conjugate(self) -> "Symbol":
         """Return the symbol itself, because it is real."""
@@ -284,31 +299,34 @@ class Symbol:
 
     def __eq__(self, other: object) -> bool:
         """Refuse a comparison."""
-        raise refusal("a comparison of the state")
+        raise self.recorder.refusal("a comparison of the state")
 
     def __lt__(self, other: object) -> bool:
         """Refuse a comparison."""
-        raise refusal("a comparison of the state")
+        raise self.recorder.refusal("a comparison of the state")
 
     __le__ = __gt__ = __ge__ = __lt__
 
     def __bool__(self) -> bool:
         """Refuse the use as a condition."""
-        raise refusal("a branch that depends on the state")
+        raise self.recorder.refusal("a branch that depends on the state")
 
     def __abs__(self) -> "Symbol":
         """Refuse the absolute value, which has no derivative at 0."""
-        raise refusal("an absolute value")
+        raise self.recorder.refusal("an absolute value")
 
     def __float__(self) -> float:
         """Refuse the conversion to a number."""
-        raise refusal("a conversion of the state to a float, as in functions of math,")
+        raise self.recorder.refusal(
+            "a conversion of the state to a float, as in functions of math, or in an assignment to "
+            "an array of floats,"
+        )
 
     __int__ = __index__ = __complex__ = __round__ = __float__
 
     def __mod__(self, other: object) -> "Symbol":
         """Refuse the remainder."""
-        raise refusal("a remainder")
+        raise self.recorder.refusal("a remainder")
 
     __rmod__ = __floordiv__ = __rfloordiv__ = __mod__
 
@@ -316,7 +334,28 @@ class Symbol:
         """Refuse functions that can't be recorded; NumPy looks them up by name."""
         if name.startswith("_"):
             raise AttributeError(name)
-        raise refusal(f"{name} of the state")
+        raise self.recorder.refusal(f"{name} of the state")
+
+
+def called_once(
+    function: Callable[..., Any], given: Sequence[Any], recorder: Recorder, allowed: str
+) -> list[Any]:
+    """Return the components that a user's function returns for symbols of `recorder`.
+
+    Raise InputError if it raises an exception; `allowed` describes the functions that don't.
+    """
+    try:
+        return list(function(*given))
+    except InputError:
+        raise
+    except Exception as error:
+        missing = re.search(r"no callable (\w+) method", str(error))
+        if missing:
+            raise recorder.refusal(f"{missing[1]} of the state") from None
+        raise InputError(
+            f"{recorder.place}: the function raised {type(error).__name__}: "
+            f"{printable(str(error))}; allowed: {allowed}"
+        ) from error
 
 
 # The functions with which a tape is evaluated in symbols of a recorder. A constant stays a float.
@@ -338,20 +377,22 @@ def _exp(x: float) -> float:
         return math.inf  # which the symbol refuses
 
 
-def _without_unused(operations: Sequence[Operation], outputs: Sequence[Linear]) -> Tape:
+def _without_unused(
+    operations: Sequence[Operation], outputs: Sequence[Linear], n_inputs: int
+) -> Tape:
     used = {slot for output in outputs for slot, _ in output.terms}
     for number in range(len(operations) - 1, -1, -1):
-        if N_INPUTS + number in used:
+        if n_inputs + number in used:
             used.update(slots_of(operations[number]))
-    places = {slot: slot for slot in range(N_INPUTS)}
+    places = {slot: slot for slot in range(n_inputs)}
     kept: list[Operation] = []
     for number, (kind, operands, linear, table) in enumerate(operations):
-        if N_INPUTS + number in used:
-            places[N_INPUTS + number] = N_INPUTS + len(kept)
+        if n_inputs + number in used:
+            places[n_inputs + number] = n_inputs + len(kept)
             moved = None if linear is None else _moved(linear, places)
             moved_operands = tuple(places[slot] for slot in operands)
             kept.append(Operation(kind, moved_operands, moved, table))
-    return Tape(tuple(kept), tuple(_moved(each, places) for each in outputs))
+    return Tape(tuple(kept), tuple(_moved(each, places) for each in outputs), n_inputs)
 
 
 def _moved(linear: Linear, places: dict[int, int]) -> Linear:

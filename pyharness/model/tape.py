@@ -14,7 +14,8 @@ from pyharness.model.functions import cosine, sine
 
 T = TypeVar("T")
 
-# The slots of the inputs. The result of operation number n of a tape is in slot N_INPUTS + n.
+# The slots of the inputs of a torque. The result of operation number n of its tape is in slot
+# N_INPUTS + n.
 TIME = 0
 OMEGA = (1, 2, 3)
 ATTITUDE = (4, 5, 6, 7)
@@ -60,17 +61,21 @@ class Operation(NamedTuple):
 
 @dataclass(frozen=True)
 class Tape:
-    """A recorded function: its operations in order of execution, and its results."""
+    """A recorded function: its operations in order of execution, and its results.
+
+    `n_inputs` is the number of its inputs, the time and the unknowns, which are in the first slots.
+    """
 
     operations: tuple[Operation, ...]
     outputs: tuple[Linear, ...]
+    n_inputs: int = N_INPUTS
 
     @property
     def inputs(self) -> frozenset[int]:
         """The slots of the inputs on which an operation or an output depends."""
         used = {slot for each in self.operations for slot in slots_of(each)}
         used |= {slot for output in self.outputs for slot, _ in output.terms}
-        return frozenset(slot for slot in used if slot < N_INPUTS)
+        return frozenset(slot for slot in used if slot < self.n_inputs)
 
     @property
     def needs_attitude(self) -> bool:

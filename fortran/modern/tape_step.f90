@@ -1,0 +1,108 @@
+module tape_step
+  !! One step of any system of ordinary differential equations that is a tape, by Taylor series.
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_ptr
+  use kinds, only: dp
+  use problem, only: step_request_t, step_t
+  use statuses, only: COMPLETE, OVERFLOW
+  use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
+  use tape_plan, only: converging, fitting, MOST_TRIES, order_for
+  use tape_series, only: allocate_series, derivatives_at, expand, series_t
+  implicit none(type, external)
+  private
+
+  ! Largest of the last terms, in tolerances. The terms that a step leaves out are smaller.
+  real(dp), parameter :: LOCAL_TOLERANCE = 0.1_dp
+  ! Largest difference of a derivative and that of its series at the end of a step, times the step,
+  ! in tolerances, and over the rounding errors.
+  real(dp), parameter :: MOST_DEFECT = 1.0_dp
+  real(dp), parameter :: MOST_ROUNDING = 1e3_dp
+
+  public :: step_tape
+
+contains
+
+  subroutine step_tape(tape_at, request_at, step_at) bind(c, name="step_tape_level")
+    !! Compute the terms of a step, as long as the tolerances allow. The status is COMPLETE, or
+    !! OVERFLOW if no step is short enough.
+    ! Addresses of a tape_t, a step_request_t and a step_t, passed through C.
+    type(c_ptr), intent(in), value :: tape_at, request_at, step_at
+    type(tape_t), pointer :: tape
+    type(step_request_t), pointer :: request
+    type(step_t), pointer :: step
+    real(dp), allocatable, target :: memory(:)
+    real(dp), allocatable :: weights(:)
+    type(series_t) :: s
+    real(dp) :: factor
+    integer :: failed, i, k
+    logical :: fits
+
+    call c_f_pointer(tape_at, tape)
+    call c_f_pointer(request_at, request)
+    call c_f_pointer(step_at, step)
+    step%status = OVERFLOW
+    step%expansions = 0
+    call allocate_series(tape, memory, s, fits)
+    if (.not. fits) return
+    allocate (weights(tape%n_unknowns), stat=failed)
+    if (failed /= 0) return
+    weights = 1.0_dp/request%tolerances
+    s%order = order_for(LOCAL_TOLERANCE*request%relative)
+    step%order = s%order
+    s%h = request%trial
+    do while (step%expansions < MOST_TRIES)
+      ! The steps shrink to nothing before a singularity.
+      if (abs(s%h) <= spacing(request%t) .and. abs(s%h) < abs(request%longest)) return
+      s%a = 0.0_dp
+      s%a(0, TIME_SLOT) = request%t
+      s%a(1, TIME_SLOT) = s%h
+      s%a(0, FIRST_UNKNOWN:FIRST_UNKNOWN + tape%n_unknowns - 1) = request%state
+      call expand(tape, 0.0_dp, .false., s)
+      step%expansions = step%expansions + 1
+      factor = fitting(tape, s%order, LOCAL_TOLERANCE, weights, s%a)
+      if (.not. factor > 0.0_dp) then
+        ! The terms are not finite.
+        s%h = 0.0625_dp*s%h
+        cycle
+      end if
+      factor = converging(tape, s%order, s%is_squared, s%a, min(factor, request%longest/s%h))
+      step%h = factor*s%h
+      do i = 1, tape%n_unknowns
+        step%terms(:, i) = 0.0_dp
+        do k = 0, s%order
+          step%terms(k, i) = s%a(k, FIRST_UNKNOWN - 1 + i)*factor**k
+        end do
+      end do
+      if (is_continued()) then
+        step%status = COMPLETE
+        return
+      end if
+      s%h = 0.5_dp*step%h
+    end do
+
+  contains
+
+    logical function is_continued()
+      !! Return whether the derivatives at the end of the step are those of the series. The state at
+      !! the end is computed too.
+      real(dp) :: slope(tape%n_unknowns), sizes(tape%n_unknowns), derivatives(tape%n_unknowns)
+      integer :: k
+
+      step%state = 0.0_dp
+      slope = 0.0_dp
+      sizes = 0.0_dp
+      do k = s%order, 1, -1
+        step%state = step%state + step%terms(k, :)
+        slope = slope + k*step%terms(k, :)
+        sizes = sizes + k*abs(step%terms(k, :))
+      end do
+      step%state = request%state + step%state
+      call derivatives_at(tape, [request%t + step%h, 0.0_dp], step%state, -s%h, s, derivatives)
+      ! NaN is not allowed.
+      is_continued = all(abs(step%h*derivatives - slope) &
+                         <= MOST_DEFECT*request%tolerances &
+                         + MOST_ROUNDING*epsilon(s%h)*(sizes + maxval(abs(request%state))))
+    end function is_continued
+
+  end subroutine step_tape
+
+end module tape_step

@@ -1,0 +1,194 @@
+"""Taylor series as a method of `scipy.integrate.solve_ivp`, for any ordinary differential equation.
+
+The order is fixed, and the step is chosen from the last terms of the series (Jorba and Zou 2005,
+Experimental Mathematics 14, section 3).
+"""
+
+import math
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.polynomial.polynomial import polyval
+from scipy.integrate import DenseOutput, OdeSolver
+
+from pyharness.methods.recorded import kernel_tape
+from pyharness.model.errors import InputError
+from pyharness.model.extension import COMPLETE, extension
+from pyharness.model.symbols import Recorder, called_once
+from pyharness.model.tape import Tape
+from pyharness.model.trajectory import Array
+
+# The largest order, of fortran/modern/tape_series.f90, plus 1.
+_N_TERMS = 29
+_MOST_OPERATIONS = 20_000
+# The first step that is tried, in the user's unit of time. Its length hardly matters: the series
+# tells how much shorter, or up to 16 times longer, the step will be.
+_LONGEST_TRIAL = 1e3
+# The least relative tolerance that SciPy's methods allow.
+_LEAST_RTOL = 100.0 * np.finfo(float).eps
+
+
+class Taylor(OdeSolver):  # type: ignore[misc]
+    """Integrate an ordinary differential equation y' = fun(t, y) by its Taylor series.
+
+    It is a method of `scipy.integrate.solve_ivp`: ``solve_ivp(fun, t_span, y0, method=Taylor)``.
+    `fun` is called once, with symbols in place of numbers, and its arithmetic is recorded; the
+    series are then computed by compiled code. The order, which follows from the tolerances, is
+    between 8 and 28. The dense output is the series itself.
+
+    Parameters
+    ----------
+    fun : callable
+        The right-hand side ``fun(t, y)``, where `t` is a number and `y` has shape (n,). It returns
+        n numbers. Its arithmetic is + - * /, integer powers, and sqrt, sin, cos, tan, exp, sinh,
+        cosh and tanh of NumPy, without any branch that depends on `t` or `y`.
+    t0 : float
+        The time of the initial state.
+    y0 : array_like, shape (n,)
+        The initial state, which is real.
+    t_bound : float
+        The time at which the integration ends, before or after `t0`.
+    max_step : float, optional
+        The longest step. Default is inf. Events are found between the ends of steps, so that two
+        roots of an event function within a step are missed, unless the step is made shorter.
+    rtol, atol : float or array_like, shape (n,), optional
+        Relative and absolute tolerances. The largest local error of component k of y in a step is
+        below ``atol[k] + rtol[k] * abs(y[k])``. Defaults are 1e-3 and 1e-6.
+    vectorized : bool, optional
+        Ignored, because `fun` is called only once.
+    first_step : float, optional
+        The longest first step. By default it is chosen by the method.
+    **extraneous : dict
+        Options of other methods, such as `jac`. They are ignored, with a warning.
+
+    Raises
+    ------
+    InputError
+        If `fun` can't be recorded or does not return n numbers, or if an option is not allowed. It
+        is a ValueError.
+    ValueError
+        If `y0` is complex or not one-dimensional.
+
+    Examples
+    --------
+    >>> from scipy.integrate import solve_ivp
+    >>> from pyharness import Taylor
+    >>> found = solve_ivp(lambda t, y: [y[1], -y[0]], (0.0, 10.0), [1.0, 0.0],
+    ...                   method=Taylor, rtol=1e-12, atol=1e-12)
+    >>> found.y[:, -1].round(6)
+    array([-0.839072,  0.544021])
+    """
+
+    t: float
+    t_bound: float
+    y: Array
+
+    def __init__(
+        self,
+        fun: Callable[..., Any],
+        t0: float,
+        y0: Any,
+        t_bound: float,
+        max_step: float = math.inf,
+        rtol: Any = 1e-3,
+        atol: Any = 1e-6,
+        vectorized: bool = False,
+        first_step: float | None = None,
+        **extraneous: Any,
+    ) -> None:
+        if extraneous:
+            names = ", ".join(f"`{name}`" for name in extraneous)
+            warnings.warn(f"the method Taylor ignores {names}", stacklevel=3)
+        super().__init__(fun, t0, y0, t_bound, vectorized)
+        self._tape = kernel_tape(recorded_equation(fun, self.n))
+        self.nfev = 1
+        self.max_step = _positive("max_step", max_step)
+        self.rtol, self.atol = _tolerances(rtol, atol, self.n)
+        longest = np.abs(self.y).max(initial=0.0)
+        share = self.atol.min(initial=math.inf) / longest if longest else 0.0
+        self._relative = min(1.0, float(self.rtol.min(initial=1.0) + share))
+        span = abs(self.t_bound - self.t)
+        self._longest = span if first_step is None else _positive("first_step", first_step)
+        if self._longest > span:
+            raise InputError(f"first_step is {first_step}; allowed: up to {span:g}, the time span")
+        self._trial = min(self._longest, _LONGEST_TRIAL)
+        self._terms = np.zeros((1, self.n))
+
+    def _step_impl(self) -> tuple[bool, str | None]:
+        rest = abs(self.t_bound - self.t)
+        longest = min(rest, self.max_step, self._longest)
+        trial = min(self._trial, longest)
+        h, terms, state, order, expansions, status = extension().tape_step(
+            self._tape, self.t, self.y, self._scale(), self._relative,
+            self.direction * trial, self.direction * longest, _N_TERMS,
+        )  # fmt: skip
+        self.nfev += expansions
+        if status != COMPLETE or self.t + h == self.t:
+            return False, self.TOO_SMALL_STEP
+        self._terms = terms[: order + 1]
+        self._trial, self._longest = abs(h), math.inf
+        self.t = self.t_bound if abs(h) >= rest else self.t + h
+        self.y = state
+        return True, None
+
+    def _scale(self) -> Array:
+        sizes = np.abs(self.y)
+        scale = self.atol + self.rtol * sizes
+        # Without an absolute tolerance, a component that is 0 is compared with the largest.
+        missing = float(self.rtol.min()) * float(sizes.max(initial=0.0)) or 1.0
+        return np.where(scale > 0.0, scale, missing)
+
+    def _dense_output_impl(self) -> DenseOutput:
+        assert self.t_old is not None
+        return _Series(self.t_old, self.t, self._terms)
+
+
+class _Series(DenseOutput):  # type: ignore[misc]
+    """The Taylor series of a step; a term includes its power of the step."""
+
+    def __init__(self, t_old: float, t: float, terms: Array) -> None:
+        super().__init__(t_old, t)
+        self._terms = terms
+
+    def _call_impl(self, t: Array) -> Array:
+        values: Array = polyval((t - self.t_old) / (self.t - self.t_old), self._terms)
+        return values
+
+
+def recorded_equation(fun: Callable[..., Any], n: int) -> Tape:
+    """Return the right-hand side ``fun(t, y)`` of n equations as a tape.
+
+    Raise InputError if it can't be recorded, or does not return n numbers.
+    """
+    instead = "another method of solve_ivp"
+    recorder = Recorder(_MOST_OPERATIONS, n + 1, "fun", instead)
+    time, *state = recorder.inputs()
+    given = (time, np.array(state, dtype=object))
+    rates = called_once(fun, given, recorder, f"a function of (t, y) that returns {n} numbers")
+    rates = list(np.array(rates, dtype=object).ravel())
+    if len(rates) != n:
+        raise InputError(f"fun returned {len(rates)} numbers; allowed: as many as y0 has, {n}")
+    return recorder.tape(rates)
+
+
+def _positive(name: str, value: Any) -> float:
+    if not value > 0.0:
+        raise InputError(f"{name} is {value:g}; allowed: a positive number")
+    return float(value)
+
+
+def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
+    """Return checked tolerances, each of shape (n,)."""
+    found = []
+    for name, value in (("rtol", rtol), ("atol", atol)):
+        given = np.asarray(value, dtype=float)
+        if given.shape not in ((), (n,)):
+            raise InputError(f"{name} has shape {given.shape}; allowed: a number, or shape ({n},)")
+        if not np.all(given >= 0.0):
+            raise InputError(f"{name} is {value}; allowed: numbers of at least 0")
+        found.append(np.broadcast_to(given, (n,)))
+    if np.any(found[0] < _LEAST_RTOL):
+        warnings.warn(f"`rtol` is too small; {_LEAST_RTOL:.2g} is used", stacklevel=4)
+    return np.maximum(found[0], _LEAST_RTOL), found[1]

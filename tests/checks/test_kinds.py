@@ -149,6 +149,8 @@ def test_replay_of_a_draw_is_read_by_the_shell_as_it_was_given(seed: str, draws:
     [check] = verify(chosen)
     words = shlex.split(check.replay)
     assert words[words.index("--seed") + 1] == seed
+    # An option with its default value is not repeated.
+    assert ("--draws" in words) == (draws > DRAWS)
     assert main(words[3:]) == 0
 
 

@@ -19,6 +19,7 @@ from pyharness.checks.port_protocol import ENDINGS, read_answer, request
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
+from pyharness.original.linear_solver import leqt1f
 from pyharness.scenes.random_scenes import draw
 from tests.ports import WEB, node, sample
 
@@ -119,3 +120,25 @@ def test_sine_and_cosine_of_the_javascript_are_the_nearest_floats() -> None:
     with mp.workprec(300):
         wanted = [[float(mp.sin(x)), float(mp.cos(x))] for x in map(mp.mpf, angles)]
     assert found == wanted
+
+
+def test_the_linear_solver_of_the_javascript_has_the_twins_bits() -> None:
+    # The programs' own systems exchange no rows with the first one.
+    source = random.Random(3)
+    systems = []
+    for n in (1, 2, 3, 5, 8) * 20:
+        matrix = [[source.gauss(0.0, 1.0) * 10.0 ** source.randint(-3, 3) for _ in range(n)]
+                  for _ in range(n)]  # fmt: skip
+        systems.append([matrix, [[source.gauss(0.0, 1.0) for _ in range(n)] for _ in range(2)]])
+    systems.append([[[1.0, 2.0], [2.0, 4.0]], [[1.0, 1.0]]])
+    script = (
+        f"import {{ leqt1f }} from {json.dumps(str(WEB / 'programs/linear-solver.js'))};"
+        'import { readFileSync } from "node:fs";'
+        "console.log(JSON.stringify(JSON.parse(readFileSync(0)).map(([a, b]) => leqt1f(a, b))));"
+    )
+    done = subprocess.run(
+        [shlex.split(node(WEB))[0], "--input-type=module", "--eval", script],
+        input=json.dumps(systems), capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    wanted = [[[list(column) for column in x], ier] for x, ier in (leqt1f(*s) for s in systems)]
+    assert json.loads(done.stdout) == wanted

@@ -39,6 +39,10 @@ MISTAKES = {
         '[[axis]]\nfield = "omega.1"\nvalues = [1.0]\ndimension = "both"',
         '[[axis]]\nfield = "omega.2"\nvalues = [1.0, 2.0]\ndimension = "both"',
     ): "allowed: equal numbers of values",
+    text(
+        '[[axis]]\nfield = "omega.1"\nvalues = [1.0]\ndimension = "omega.2"',
+        '[[axis]]\nfield = "omega.2"\nvalues = [1.0]\ndimension = "both"',
+    ): "dimension omega.2: a field on another axis has this name",
     text(TILT, top='reductions = ["stop-step"]'): "can't be computed from a method",
     text(TILT, "[solve]\nmethod = 'rk4'", top='reductions = ["axis-tilt"]'): "computed with rk4",
     text(TILT, top='reductions = [{name = "axis-tilt", of = "long"}]'): "unknown axis 'long'",

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pyharness import InputError, Scene, case_scene, load, solve
+from pyharness import InputError, Scene, TorqueLaw, case_scene, load, solve
 from pyharness.events import crosses, extremum, flip, rest, tilt
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.torques import damping, opaque
@@ -278,6 +278,19 @@ def test_rest_and_flip() -> None:
     assert times_of(ball, 3.0, rest(0.5, direction=1)) == []
     assert times_of(BODY, 30.0, flip(2)) == pytest.approx(times_of(BODY, 30.0, second))
     assert times_of(case_scene(1), 2.0, flip(1)) == []
+    # omega1 = (t - 1)**2 reaches 0 without a change of sign.
+    law = TorqueLaw((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0))
+    touching = Scene("touching", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
+    assert times_of(touching, 3.0, crosses(1, 0.0)) == pytest.approx([1.0])
+    assert times_of(touching, 3.0, flip(1)) == []
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (1, 1)])
+def test_a_function_may_return_an_array_of_one_number(shape: tuple[int, ...]) -> None:
+    def of_one(t: Any, omega: Any) -> Any:
+        return np.full(shape, float(omega[1]))
+
+    assert times_of(BODY, 9.0, of_one) == pytest.approx(times_of(BODY, 9.0, flip(2)))
 
 
 def test_function_of_one_number_alone() -> None:

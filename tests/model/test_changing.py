@@ -38,6 +38,20 @@ def test_moments_and_their_rates_are_those_of_the_polynomials() -> None:
     assert momentum.tolist() == [[40.0, 30.0, 20.0], [84.0, 31.0, 10.0]]
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_body_is_impossible_if_it_is_at_time_0(sign: float) -> None:
+    # One moment crosses the sum of the others within a microsecond.
+    moments = [[3.0 + 1e-9 * sign, -1e-3 * sign], [2.0], [1.0]]
+    matrices = [np.diag(each) for each in zip(*[[*m, 0.0][:2] for m in moments], strict=True)]
+    for changing in (ChangingMoments(moments), ChangingInertia(matrices)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ImpossibleBodyWarning)
+            given: dict[str, Any] = {
+                "moments" if isinstance(changing, ChangingMoments) else "inertia": changing
+            }
+            assert Scene("", (1.0, 2.0, 3.0), **given).is_impossible is (sign > 0.0)
+
+
 @pytest.mark.parametrize(
     ("polynomials", "message"),
     [

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pyharness.methods.prepared_attitude import AttitudeSolver
     from pyharness.methods.solve import solve
     from pyharness.methods.solver import Solver
+    from pyharness.methods.stepper import Stepper
     from pyharness.methods.taylor_ivp import Taylor
     from pyharness.model.changing import ChangingInertia, ChangingMoments
     from pyharness.model.dense_output import DenseOutput
@@ -54,6 +55,7 @@ __all__ = [
     "Scene",
     "Solver",
     "StateTorque",
+    "Stepper",
     "Stop",
     "Taylor",
     "TorqueLaw",
@@ -97,6 +99,7 @@ _SUBMODULES = {
     "methods.prepared": ("prepare",),
     "methods.prepared_attitude": ("AttitudeSolver",),
     "methods.solver": ("Solver",),
+    "methods.stepper": ("Stepper",),
     "methods.taylor_ivp": ("Taylor",),
     "methods.solve": ("solve",),
 }

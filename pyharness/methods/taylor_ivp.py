@@ -13,19 +13,13 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 from scipy.integrate import DenseOutput, OdeSolver
 
-from pyharness.methods.recorded import kernel_tape
+from pyharness.methods.taylor_step import LONGEST_TRIAL, taylor_step
 from pyharness.model.errors import InputError
-from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.symbols import Recorder, called_once
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Array
 
-# The largest order, of fortran/modern/tape_series.f90, plus 1.
-_N_TERMS = 29
 _MOST_OPERATIONS = 20_000
-# The first step that is tried, in the user's unit of time. Its length hardly matters: the series
-# tells how much shorter, or up to 16 times longer, the step will be.
-_LONGEST_TRIAL = 1e3
 # The least relative tolerance that SciPy's methods allow.
 _LEAST_RTOL = 100.0 * np.finfo(float).eps
 
@@ -102,7 +96,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
             names = ", ".join(f"`{name}`" for name in extraneous)
             warnings.warn(f"the method Taylor ignores {names}", stacklevel=3)
         super().__init__(fun, t0, y0, t_bound, vectorized)
-        self._tape = kernel_tape(recorded_equation(fun, self.n))
+        self._tape = recorded_equation(fun, self.n)
         self.nfev = 1
         self.max_step = _positive("max_step", max_step)
         self.rtol, self.atol = _tolerances(rtol, atol, self.n)
@@ -113,24 +107,24 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         self._longest = span if first_step is None else _positive("first_step", first_step)
         if self._longest > span:
             raise InputError(f"first_step is {first_step}; allowed: up to {span:g}, the time span")
-        self._trial = min(self._longest, _LONGEST_TRIAL)
+        self._trial = min(self._longest, LONGEST_TRIAL)
         self._terms = np.zeros((1, self.n))
 
     def _step_impl(self) -> tuple[bool, str | None]:
         rest = abs(self.t_bound - self.t)
         longest = min(rest, self.max_step, self._longest)
         trial = min(self._trial, longest)
-        h, terms, state, order, expansions, status = extension().tape_step(
+        step = taylor_step(
             self._tape, self.t, self.y, self._scale(), self._relative,
-            self.direction * trial, self.direction * longest, _N_TERMS,
+            self.direction * trial, self.direction * longest,
         )  # fmt: skip
-        self.nfev += expansions
-        if status != COMPLETE or self.t + h == self.t:
+        self.nfev += step.expansions
+        if step.h == 0.0:
             return False, self.TOO_SMALL_STEP
-        self._terms = terms[: order + 1]
-        self._trial, self._longest = abs(h), math.inf
-        self.t = self.t_bound if abs(h) >= rest else self.t + h
-        self.y = state
+        self._terms = step.terms
+        self._trial, self._longest = abs(step.h), math.inf
+        self.t = self.t_bound if abs(step.h) >= rest else self.t + step.h
+        self.y = step.state
         return True, None
 
     def _scale(self) -> Array:

@@ -1,0 +1,270 @@
+"""A motion that is computed step by step, while the user changes the torque or the state."""
+
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.polynomial.polynomial import polyval
+
+from pyharness.methods.taylor_step import LONGEST_TRIAL, Step, taylor_step
+from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
+from pyharness.model.errors import InputError
+from pyharness.model.scene import CHANGING, Scene, checked_scene
+from pyharness.model.state_torque import StateTorque, of_law, torque_of
+from pyharness.model.symbols import MOST_OPERATIONS, Recorder
+from pyharness.model.tape import FLOATS, Tape, evaluate
+from pyharness.model.trajectory import Array
+from pyharness.model.values import finite, three_floats, tolerance_of
+
+_FINEST = 1e-14
+_DEFAULT = 1e-9
+
+
+class Stepper:
+    """A motion that is computed step by step by Taylor series.
+
+    It is for simulations in which something happens between the steps: a controller changes its
+    torque, a mass is released, an impact changes omega. If nothing does, `pyharness.solve` is
+    faster, and estimates its error.
+
+    Parameters
+    ----------
+    scene : Scene
+        The body, its torque and its omega at time 0. Its moments or its inertia do not change with
+        time, and its torque is not opaque.
+    tolerance : float, optional
+        The largest error of a step: of a component of omega, relative to the largest |omega| so
+        far, and of the attitude's angle (rad). Default is 1e-9.
+    attitude : bool, optional
+        Whether the attitude is computed too. It begins with that of the scene, or with (1, 0, 0,
+        0). A torque that depends on the attitude, or is about the axes of space, requires it.
+
+    Attributes
+    ----------
+    time : float
+        The time (s); 0 at first.
+    omega : ndarray, shape (3,)
+        The angular velocity (rad/s) at this time. It may be set.
+    attitude : ndarray, shape (4,), or None
+        The quaternion from body to space at this time, scalar first. It may be set.
+    held_torque : ndarray, shape (3,)
+        A torque about the body axes (N m) that is added to that of the scene and held until it is
+        set again; 0 at first.
+    scene : Scene
+        The scene. Another one may be set, with another torque or body; time, omega and attitude
+        continue.
+    steps : int
+        The number of steps so far.
+
+    Raises
+    ------
+    InputError
+        If the scene can't be computed step by step, or an argument is out of range.
+
+    Examples
+    --------
+    A speed of 2 rad/s is reduced by a brake that is switched off once it is below 1 rad/s:
+
+    >>> from pyharness import Scene, Stepper
+    >>> wheel = Stepper(Scene("wheel", (0.0, 0.0, 2.0), moments=(1.0, 1.0, 2.0)))
+    >>> wheel.held_torque = (0.0, 0.0, -0.5)
+    >>> while wheel.omega[2] > 1.001:
+    ...     wheel.until(wheel.time + 0.25)
+    >>> wheel.held_torque = (0.0, 0.0, 0.0)
+    >>> wheel.until(10.0)
+    >>> wheel.omega.round(6)
+    array([0., 0., 1.])
+    """
+
+    def __init__(
+        self, scene: Scene, tolerance: float = _DEFAULT, *, attitude: bool = False
+    ) -> None:
+        self.time = 0.0
+        self.steps = 0
+        self._tolerance = tolerance_of(tolerance, _FINEST)
+        if not _FINEST <= self._tolerance <= 1.0:
+            raise InputError(f"tolerance is {self._tolerance:g}; allowed: {_FINEST:g} to 1")
+        self._n = 7 if attitude else 3
+        self._state = np.zeros(self._n + 3)
+        self._change(scene)
+        self._state[:3] = scene.omega
+        if attitude:
+            self._state[3:7] = unit_quaternion("attitude", scene.attitude or IDENTITY)[0]
+        self._trial, self._largest = LONGEST_TRIAL, 0.0
+        self._last = Step(0.0, self._state[None], self._state, 0)
+        self._begin = 0.0
+
+    @property
+    def scene(self) -> Scene:
+        """The scene; its omega and attitude are those of time 0."""
+        return self._scene
+
+    @scene.setter
+    def scene(self, scene: Scene) -> None:
+        self._change(scene)
+
+    @property
+    def omega(self) -> Array:
+        """The angular velocity (rad/s), shape (3,)."""
+        return self._state[:3].copy()
+
+    @omega.setter
+    def omega(self, values: Sequence[float] | Array) -> None:
+        self._set(slice(0, 3), _three("omega", values))
+
+    @property
+    def attitude(self) -> Array | None:
+        """The quaternion from body to space, scalar first, shape (4,); None if not computed."""
+        return self._state[3:7].copy() if self._n == 7 else None
+
+    @attitude.setter
+    def attitude(self, values: Sequence[float] | Array) -> None:
+        if self._n == 3:
+            raise InputError("attitude is not computed; allowed: Stepper(scene, attitude=True)")
+        self._set(slice(3, 7), unit_quaternion("attitude", values)[0])
+
+    @property
+    def held_torque(self) -> Array:
+        """The torque that is added to that of the scene (N m, body axes), shape (3,)."""
+        return self._state[self._n :].copy()
+
+    @held_torque.setter
+    def held_torque(self, values: Sequence[float] | Array) -> None:
+        self._set(slice(self._n, None), _three("held_torque", values))
+
+    def step(self, longest: float = math.inf) -> float:
+        """Take one step, as long as the tolerance allows, and return the new time (s).
+
+        `longest` is the longest step that is allowed (s); a negative one leads to earlier times. A
+        step ends where a table of the torque changes. Raise InputError if `longest` is 0 or not a
+        number, and ArithmeticError if the motion or its torque is singular.
+        """
+        if math.isnan(longest) or longest == 0.0:
+            raise InputError(f"longest is {longest:g}; allowed: a positive or negative number of s")
+        end = self.time + longest
+        stop = self._next_break(longest > 0.0)
+        if stop is not None and abs(stop - self.time) < abs(longest):
+            end, longest = stop, stop - self.time
+        scale = self._scale()
+        tolerances = np.full(len(self._state), math.inf)
+        tolerances[:3] = self._tolerance * scale
+        tolerances[3 : self._n] = 0.5 * self._tolerance
+        trial = math.copysign(min(self._trial, abs(longest)), longest)
+        taken = taylor_step(
+            self._tape, self.time, self._state, tolerances, self._tolerance, trial, longest
+        )
+        if taken.h == 0.0 or not np.isfinite(taken.state).all():
+            raise ArithmeticError(f"no step is short enough at t = {self.time:g} s")
+        self._begin, self._last = self.time, taken
+        self._trial = abs(taken.h)
+        self.time = end if abs(taken.h) >= abs(longest) else self.time + taken.h
+        self._state = taken.state.copy()
+        self._state[3 : self._n] = _normalised(self._state[3 : self._n])
+        self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
+        self.steps += 1
+        return self.time
+
+    def until(self, time: float) -> None:
+        """Take steps until `time` (s), which is later or earlier than now.
+
+        Raise InputError if `time` is not a finite number, and ArithmeticError as `step` does.
+        """
+        end = finite("time", time)
+        while self.time != end:
+            self.step(end - self.time)
+            if abs(self.time - end) <= 4.0 * math.ulp(end):
+                self.time = end
+
+    def at(self, times: float | Sequence[float] | Array) -> Array:
+        """Return the state at times (s) within the last step.
+
+        One time gives omega (rad/s), shape (3,), or omega and the quaternion, shape (7,). n times
+        give one column for each time. What was set after the step is not included. Raise
+        InputError for a time outside the last step.
+        """
+        given: Array = np.asarray(times, dtype=float)
+        low, high = sorted((self._begin, self._begin + self._last.h))
+        # The end of a step is rounded.
+        slack = 4.0 * math.ulp(max(abs(low), abs(high)))
+        if not np.all((given >= low - slack) & (given <= high + slack)):
+            raise InputError(f"t is outside the last step; allowed: {low:g} to {high:g} s")
+        share: Any = (given - self._begin) / (self._last.h or 1.0)
+        state: Array = polyval(share, self._last.terms[:, : self._n])
+        state[3:] = _normalised(state[3:])
+        return state
+
+    def _change(self, scene: Scene) -> None:
+        checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
+        if scene.changing is not None:
+            raise InputError(CHANGING)
+        torque = scene.torque if isinstance(scene.torque, StateTorque) else of_law(scene.torque)
+        if torque.tape is None:
+            raise InputError(
+                "an opaque torque can't be computed step by step; allowed: a torque that can be "
+                "recorded, or held_torque"
+            )
+        if torque.needs_attitude and self._n == 3:
+            raise InputError("the torque depends on the attitude; give attitude=True")
+        self._tape = _equations(scene, torque.tape, self._n == 7)
+        tables = [each.table for each in self._tape.operations if each.table is not None]
+        self._breaks = sorted({time for table in tables for time in table.breaks[1:]})
+        self._scene = scene
+
+    def _set(self, place: slice, values: Sequence[float]) -> None:
+        self._state = self._state.copy()
+        self._state[place] = values
+
+    def _scale(self) -> float:
+        """Return the omega to which errors are relative."""
+        self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
+        if self._largest > 0.0:
+            return self._largest
+        # The omega that a body at rest is about to reach.
+        try:
+            rates = evaluate(self._tape, [self.time, *self._state.tolist()], FLOATS)
+        except ArithmeticError:
+            return 1.0
+        return math.sqrt(max(map(abs, rates[:3]))) or 1.0
+
+    def _next_break(self, forward: bool) -> float | None:
+        if forward:
+            place = bisect_right(self._breaks, self.time)
+            return self._breaks[place] if place < len(self._breaks) else None
+        place = bisect_left(self._breaks, self.time)
+        return self._breaks[place - 1] if place else None
+
+
+def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
+    """Return the equations of motion as a tape.
+
+    Their unknowns are omega, the attitude if it is computed, and a further torque, which is held.
+    """
+    n = 7 if attitude else 3
+    recorder = Recorder(2 * MOST_OPERATIONS, n + 4)
+    time, *unknowns = recorder.inputs()
+    omega: Any = np.array(unknowns[:3], dtype=object)
+    q: Any = unknowns[3:n] or IDENTITY
+    total = torque_of(torque, time, omega, q) + np.array(unknowns[n:], dtype=object)
+    if scene.inertia is None:
+        x, y, z = omega
+        products = np.array([y * z, z * x, x * y], dtype=object)
+        moments = np.array(scene.moments or (1.0, 1.0, 1.0))
+        rates: Any = np.array(scene.euler_coefficients) * products + total / moments
+    else:
+        inertia = np.array(scene.inertia)
+        rates = np.linalg.inv(inertia) @ (total - np.cross(omega, inertia @ omega))
+    rates = list(rates)
+    if attitude:
+        rates += quaternion_rates(omega, q)
+    return recorder.tape([*rates, 0.0, 0.0, 0.0])
+
+
+def _three(name: str, values: object) -> tuple[float, ...]:
+    return tuple(finite(name, each) for each in three_floats(name, values))
+
+
+def _normalised(q: Array) -> Array:
+    """Return quaternions with norm 1, shape (4,) or (4, n); or none of them, shape (0,)."""
+    return q / np.sqrt(np.sum(q * q, axis=0)) if len(q) else q

@@ -1,0 +1,51 @@
+"""One step of an ordinary differential equation by its Taylor series, for callers that step."""
+
+from typing import NamedTuple
+
+from pyharness.methods.recorded import kernel_tape
+from pyharness.model.extension import COMPLETE, extension
+from pyharness.model.tape import Tape
+from pyharness.model.trajectory import Array
+
+# The largest order, of fortran/modern/tape_series.f90, plus 1.
+_N_TERMS = 29
+# The first step that is tried, in the user's unit of time. Its length hardly matters: the series
+# tells how much shorter, or up to 16 times longer, the step will be.
+LONGEST_TRIAL = 1e3
+
+
+class Step(NamedTuple):
+    """A step that was taken, or tried: its length `h` is 0 if no step is short enough.
+
+    `terms` are the terms of the series, shape (order + 1, n); a term includes its power of `h`.
+    `state` is their sum, the state at the end, shape (n,). `expansions` counts the series that were
+    computed for it.
+    """
+
+    h: float
+    terms: Array
+    state: Array
+    expansions: int
+
+
+def taylor_step(
+    tape: Tape,
+    t: float,
+    state: Array,
+    tolerances: Array,
+    relative: float,
+    trial: float,
+    longest: float,
+) -> Step:
+    """Return a step of the equation y' = tape(t, y) from the time `t` and the state, shape (n,).
+
+    The step is as long as `tolerances` allow, shape (n,): the largest errors of the components in
+    this step. `relative` is the relative tolerance that decides the order. `trial` is a first guess
+    of the step. It has the sign of `longest`, the longest step that is allowed.
+    """
+    h, terms, end, order, expansions, status = extension().tape_step(
+        kernel_tape(tape), t, state, tolerances, relative, trial, longest, _N_TERMS
+    )
+    if status != COMPLETE or t + h == t:
+        h = 0.0
+    return Step(h, terms[: order + 1], end, expansions)

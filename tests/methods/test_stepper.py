@@ -1,0 +1,236 @@
+"""Tests of motions that are computed step by step."""
+
+import math
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import (
+    ChangingMoments,
+    InputError,
+    Scene,
+    Stepper,
+    TorqueLaw,
+    case_scene,
+    opaque,
+    solve,
+)
+from pyharness.scenes.state_scenes import draw, draw_ready
+from pyharness.torques import damping, in_space, table
+
+BRICK = Scene("brick", (0.1, 2.0, 0.3), moments=(1.0, 2.0, 3.0))
+MATRIX = [[2.0, 0.3, -0.2], [0.3, 3.0, 0.1], [-0.2, 0.1, 2.5]]
+
+
+@pytest.mark.parametrize("number", range(12))
+def test_steps_agree_with_solve(number: int) -> None:
+    source = Random(f"stepper {number}")
+    scene, end = (draw, draw_ready)[number % 2](source)
+    attitude = scene.attitude is not None
+    times = [0.3 * end, end]
+    truth = solve(scene, times, "taylor", 1e-12, attitude=attitude)
+    if truth.growth is None:
+        assert truth.ended == "overflow"
+        return
+    stepper = Stepper(scene, 1e-11, attitude=attitude)
+    largest = np.abs(np.vstack([scene.omega, truth.omega])).max()
+    for k, time in enumerate(times):
+        stepper.until(time)
+        assert stepper.time == time
+        limit = 1e-9 * max(1.0, truth.growth)
+        assert np.abs(stepper.omega - truth.omega[k]).max() <= limit * largest
+        if attitude:
+            assert truth.attitude is not None
+            assert abs(abs(stepper.attitude @ truth.attitude[k]) - 1.0) <= limit
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        case_scene(3),
+        case_scene(5),
+        Scene("matrix", (0.5, 1.0, -0.3), inertia=MATRIX, torque=damping(0.2)),
+        Scene("coefficients", (0.5, 1.0, -0.3), coefficients=(0.2, -0.5, 0.3)),
+        Scene("rest", (0.0, 0.0, 0.0), moments=(1, 2, 3), torque=TorqueLaw((1.0, 2.0, 0.5))),
+        Scene("space", (0.1, 0.2, 0.3), moments=(1, 2, 3), torque=in_space((1.0, 0.2, 0.5))),
+    ],
+    ids=lambda scene: scene.name,
+)
+@pytest.mark.parametrize("end", [3.0, -3.0])
+def test_bodies_and_torques_of_every_kind(scene: Scene, end: float) -> None:
+    attitude = scene.name == "space"
+    truth = solve(scene, end, tolerance=1e-12, attitude=attitude)
+    stepper = Stepper(scene, 1e-12, attitude=attitude)
+    while stepper.time != end:
+        stepper.step(end - stepper.time)
+        assert abs(stepper.time) <= abs(end)
+    np.testing.assert_allclose(
+        stepper.omega, truth.omega[-1], rtol=0.0, atol=1e-9 * np.abs(truth.omega).max()
+    )
+
+
+def test_a_held_torque_is_a_table_that_is_held() -> None:
+    values = [(0.5, 0.0, 0.0), (0.0, -1.0, 0.0), (0.2, 0.3, -0.4)]
+    held = Scene("held", BRICK.omega, BRICK.moments, torque=table([0.0, 1.0, 2.0], values, "held"))
+    truth = solve(held, [1.0, 2.0, 5.0], tolerance=1e-12)
+    stepper, by_table = Stepper(BRICK, 1e-12), Stepper(held, 1e-12)
+    for k, (value, end) in enumerate(zip(values, (1.0, 2.0, 5.0), strict=True)):
+        stepper.held_torque = value
+        for each in (stepper, by_table):
+            each.until(end)
+            np.testing.assert_allclose(each.omega, truth.omega[k], atol=1e-10)
+    assert stepper.held_torque.tolist() == [0.2, 0.3, -0.4]
+
+
+@pytest.mark.parametrize("kind", ["held", "linear"])
+def test_a_step_ends_where_a_table_changes(kind: str) -> None:
+    torque = table([1.0, 2.5], [(0.5, 0.0, 0.0), (-0.5, 0.2, 0.0)], kind)
+    still = Scene("still", (1e-3, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
+    stepper = Stepper(still)
+    ends = [stepper.step() for _ in range(4)]
+    assert 2.5 in ends
+    stepper.until(4.0)
+    assert Stepper(still).step(10.0) == (2.5 if kind == "held" else 1.0) or 1.0 in ends
+    back = Stepper(still)
+    back.until(4.0)
+    back.until(0.0)
+    np.testing.assert_allclose(back.omega, still.omega, atol=1e-12)
+
+
+def test_the_state_within_the_last_step() -> None:
+    stepper = Stepper(BRICK, 1e-12, attitude=True)
+    begin = 0.0
+    for _ in range(5):
+        end = stepper.step()
+        times = np.linspace(begin, end, 7)
+        truth = solve(BRICK, times[1:], tolerance=1e-12, attitude=True)
+        found = stepper.at(times)
+        assert found.shape == (7, 7)
+        np.testing.assert_allclose(found[:3, 1:], truth.omega.T, atol=1e-10)
+        assert truth.attitude is not None
+        assert stepper.attitude is not None
+        np.testing.assert_allclose(found[3:, 1:], truth.attitude.T, atol=1e-10)
+        now = np.concatenate([stepper.omega, stepper.attitude])
+        np.testing.assert_allclose(stepper.at(end), now, rtol=0.0, atol=1e-15)
+        begin = end
+    assert stepper.steps == 5
+    with pytest.raises(InputError, match=r"^t is outside the last step; allowed: .* to .* s$"):
+        stepper.at(0.0)
+
+
+def test_before_the_first_step_the_state_is_that_of_time_0() -> None:
+    stepper = Stepper(BRICK, attitude=True)
+    assert stepper.at(0.0).tolist() == [0.1, 2.0, 0.3, 1.0, 0.0, 0.0, 0.0]
+    assert Stepper(BRICK).attitude is None
+
+
+def test_the_state_and_the_scene_may_be_changed() -> None:
+    stepper = Stepper(BRICK, 1e-12, attitude=True)
+    stepper.until(1.0)
+    before = stepper.at(1.0)
+    # An impact turns the spin around, and the body returns.
+    stepper.omega = -stepper.omega
+    assert stepper.at(1.0).tolist() == before.tolist()
+    mirrored = Scene("", tuple(stepper.omega), BRICK.moments, attitude=stepper.attitude)
+    truth = solve(mirrored, 0.7, tolerance=1e-12, attitude=True)
+    stepper.until(1.7)
+    np.testing.assert_allclose(stepper.omega, truth.omega[-1], atol=1e-10)
+    assert stepper.attitude is not None
+    assert truth.attitude is not None
+    np.testing.assert_allclose(stepper.attitude, truth.attitude[-1], atol=1e-10)
+    # Another body.
+    sphere = Scene("sphere", (9.0, 9.0, 9.0), moments=(1.0, 1.0, 1.0))
+    omega = stepper.omega
+    stepper.scene = sphere
+    stepper.until(5.0)
+    np.testing.assert_allclose(stepper.omega, omega, atol=1e-12)
+    assert stepper.scene is sphere
+    stepper.attitude = (0.0, 0.0, 0.0, 2.0)
+    assert stepper.attitude is not None
+    assert stepper.attitude.tolist() == [0.0, 0.0, 0.0, 1.0]
+
+
+def test_results_are_copies() -> None:
+    stepper = Stepper(BRICK)
+    stepper.omega[:] = 7.0
+    stepper.held_torque[:] = 7.0
+    assert stepper.omega.tolist() == [0.1, 2.0, 0.3]
+    assert stepper.held_torque.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_a_singular_torque_ends_the_steps() -> None:
+    scene = Scene(
+        "pole", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0),
+        torque=lambda t, omega: [1.0 / (1.0 - t) + 0.0 * omega[0], 0.0, 0.0],
+    )  # fmt: skip
+    stepper = Stepper(scene)
+    with pytest.raises(ArithmeticError, match="no step is short enough at t = "):
+        stepper.until(2.0)
+    assert stepper.time < 1.0
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: setattr(Stepper(BRICK), "scene", 3), "scene is a whole number; it must be a"),
+        (lambda: Stepper(BRICK, 1e-16), "tolerance is 1e-16; allowed: 1e-14 to 1"),
+        (lambda: Stepper(BRICK, math.nan), "tolerance is nan; allowed: 1e-14 to 1"),
+        (
+            lambda: Stepper(Scene("", (1, 2, 3), ChangingMoments([[1, 1], [2], [3]]))),
+            "the scene's inertia changes with time, and this takes a constant one",
+        ),
+        (
+            lambda: Stepper(Scene("", (1, 2, 3), (1, 2, 3), torque=opaque(lambda t, w: w))),
+            "an opaque torque can't be computed step by step",
+        ),
+        (
+            lambda: Stepper(Scene("", (1, 2, 3), (1, 2, 3), torque=in_space((1, 2, 3)))),
+            "the torque depends on the attitude; give attitude=True",
+        ),
+        (lambda: Stepper(BRICK).step(0.0), "longest is 0; allowed: a positive or negative number"),
+        (lambda: Stepper(BRICK).step(math.nan), "longest is nan; allowed: a positive or negative"),
+        (
+            lambda: Stepper(BRICK).until(math.inf),
+            "time: inf is not finite; allowed: finite numbers",
+        ),
+        (
+            lambda: setattr(Stepper(BRICK), "omega", (1, 2)),
+            "omega: 2 numbers; allowed: three numbers",
+        ),
+        (
+            lambda: setattr(Stepper(BRICK), "held_torque", (1, 2, math.nan)),
+            "held_torque: nan is not finite; allowed",
+        ),
+        (lambda: setattr(Stepper(BRICK), "attitude", (1, 0, 0, 0)), "attitude is not computed"),
+    ],
+)
+def test_mistakes_are_one_line(call: Any, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        call()
+    assert str(caught.value).startswith(message)
+    assert (
+        "allowed" in str(caught.value) or "give" in str(caught.value) or "must" in str(caught.value)
+    )
+
+
+def test_a_refused_change_changes_nothing() -> None:
+    stepper = Stepper(BRICK)
+    with pytest.raises(InputError):
+        stepper.omega = (1.0, math.inf, 2.0)
+    with pytest.raises(InputError):
+        stepper.scene = Scene("", (1, 2, 3), (1, 2, 3), torque=in_space((1, 2, 3)))
+    assert stepper.scene is BRICK
+    stepper.until(1.0)
+    np.testing.assert_allclose(stepper.omega, solve(BRICK, 1.0).omega[-1], atol=1e-8)
+
+
+def test_a_control_loop() -> None:
+    # The sampled brake multiplies the momentum by 0.995 in each interval.
+    stepper = Stepper(Scene("wheel", (0.0, 0.0, 2.0), moments=(1.0, 2.0, 3.0)))
+    for k in range(400):
+        stepper.held_torque = -1.5 * stepper.omega
+        stepper.until(0.01 * (k + 1))
+    assert stepper.omega[2] == pytest.approx(2.0 * 0.995**400, rel=1e-9)
+    assert stepper.steps <= 800

@@ -35,6 +35,7 @@ contains
     real(dp) :: factor
     integer :: failed, i, k
     logical :: fits
+    logical :: is_rejected ! whether a longer step was rejected
 
     call c_f_pointer(tape_at, tape)
     call c_f_pointer(request_at, request)
@@ -49,6 +50,7 @@ contains
     s%order = order_for(LOCAL_TOLERANCE*request%relative)
     step%order = s%order
     s%h = request%trial
+    is_rejected = .false.
     do while (step%expansions < MOST_TRIES)
       ! The steps shrink to nothing before a singularity.
       if (abs(s%h) <= spacing(request%t) .and. abs(s%h) < abs(request%longest)) return
@@ -64,8 +66,13 @@ contains
         s%h = 0.0625_dp*s%h
         cycle
       end if
+      if (is_rejected) factor = min(1.0_dp, factor)
       factor = converging(tape, s%order, s%is_squared, s%a, min(factor, request%longest/s%h))
       step%h = factor*s%h
+      ! The quotient of the two was rounded.
+      if (abs(step%h) >= (1.0_dp - 4.0_dp*epsilon(s%h))*abs(request%longest)) then
+        step%h = request%longest
+      end if
       do i = 1, tape%n_unknowns
         step%terms(:, i) = 0.0_dp
         do k = 0, s%order
@@ -77,6 +84,7 @@ contains
         return
       end if
       s%h = 0.5_dp*step%h
+      is_rejected = .true.
     end do
 
   contains

@@ -159,7 +159,7 @@ class Stepper:
             raise ArithmeticError(f"no step is short enough at t = {self.time:g} s")
         self._begin, self._last = self.time, taken
         self._trial = abs(taken.h)
-        self.time = end if abs(taken.h) >= abs(longest) else self.time + taken.h
+        self.time = end if taken.h == longest else self.time + taken.h
         self._state = taken.state.copy()
         self._state[3 : self._n] = _normalised(self._state[3 : self._n])
         self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
@@ -174,7 +174,8 @@ class Stepper:
         end = finite("time", time)
         while self.time != end:
             self.step(end - self.time)
-            if abs(self.time - end) <= 4.0 * math.ulp(end):
+            # The sum of time and difference is rounded.
+            if abs(self.time - end) <= math.ulp(end):
                 self.time = end
 
     def at(self, times: float | Sequence[float] | Array) -> Array:

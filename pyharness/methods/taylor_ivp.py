@@ -123,7 +123,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
             return False, self.TOO_SMALL_STEP
         self._terms = step.terms
         self._trial, self._longest = abs(step.h), math.inf
-        self.t = self.t_bound if abs(step.h) >= rest else self.t + step.h
+        self.t = self.t_bound if abs(step.h) == rest else self.t + step.h
         self.y = step.state
         return True, None
 

@@ -5,6 +5,7 @@ than the file, and every value is checked.
 """
 
 import io
+import itertools
 import json
 import math
 import os
@@ -23,8 +24,8 @@ from pyharness.model.scene import Scene
 from pyharness.model.schema import check_schema
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape_record import tape_of
-from pyharness.model.trajectory import ENDINGS, STOP_VARIABLES, Stop, Trajectory
-from pyharness.model.trajectory_file import AXES, KIND, ROWS, TEXTS, checked_path
+from pyharness.model.trajectory import ENDINGS, STOP_VARIABLES, Array, Stop, Trajectory
+from pyharness.model.trajectory_file import AXES, EVENTS, KIND, ROWS, TEXTS, checked_path
 from pyharness.model.values import three_floats
 
 _WRITTEN = "a file that Trajectory.save wrote"
@@ -86,7 +87,7 @@ def _arrays(content: bytes) -> dict[str, Any]:
     """Return the arrays in the content of a file by their names."""
     found = {}
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        allowed = {f"{name}.npy" for name in (*TEXTS, *ROWS, AXES)}
+        allowed = {f"{name}.npy" for name in (*TEXTS, *ROWS, AXES, *EVENTS)}
         for each in archive.infolist():
             allowed.remove(each.filename)  # an error if the name is unknown, or occurs twice
             if each.compress_type != zipfile.ZIP_STORED or each.file_size > len(content):
@@ -130,6 +131,7 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
         raise ValueError("no omega, or axes of another type or shape")
     if header["ended"] not in ENDINGS:
         raise ValueError("an unknown ending")
+    t_events, y_events = _events(arrays, 3 if rows["attitude"] is None else 7)
     scene = None
     if header["scene"] is not None:
         scene = _scene(_text(arrays, "scene"), header["scene"], where)
@@ -145,7 +147,26 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
         error=_estimate(header["error"]),
         growth=_estimate(header["growth"]),
         tolerance=_estimate(header["tolerance"]),
+        t_events=t_events,
+        y_events=y_events,
     )
+
+
+def _events(arrays: dict[str, Any], width: int) -> tuple[list[Array] | None, list[Array] | None]:
+    """Return the times of the events of each function, and the states there, or None twice."""
+    if not any(name in arrays for name in EVENTS):
+        return None, None
+    counts, times, states = (arrays[name] for name in EVENTS)
+    n = len(times)
+    found = [(each.dtype, each.shape) for each in (counts, times, states)]
+    if found != [("i8", (len(counts),)), ("f8", (n,)), ("f8", (n, width))]:
+        raise ValueError("events of another type or shape")
+    lengths = counts.tolist()
+    if min(lengths, default=0) < 0 or sum(lengths) != n:
+        raise ValueError("other numbers of events")
+    ends = list(itertools.accumulate(lengths))
+    parts = [slice(end - length, end) for end, length in zip(ends, lengths, strict=True)]
+    return [times[part] for part in parts], [states[part] for part in parts]
 
 
 def _scene(text: str, record: dict[str, Any], where: str) -> Scene:

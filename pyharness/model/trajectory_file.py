@@ -39,6 +39,8 @@ ROWS: dict[str, tuple[str, tuple[int, ...]]] = {
     "ier": ("i4", ()),
 }
 AXES = "axes"  # an array without rows, shape (3, 3)
+# For all events: their number for each function, their times, and the states there.
+EVENTS = ("event_counts", "event_times", "event_states")
 _TAPED = "The torque was recorded from a function. Its operations are in the header."
 
 
@@ -80,6 +82,12 @@ def file_content(found: "Trajectory") -> bytes:
             arrays |= {} if value is None else {name: np.asarray(value, kind)}
     if found.axes is not None:
         arrays[AXES] = found.axes
+    if found.t_events is not None and found.y_events is not None:
+        counts = np.array([len(times) for times in found.t_events], "i8")
+        width = 3 if found.attitude is None else 7
+        times = np.concatenate([np.zeros(0), *found.t_events])
+        states = np.concatenate([np.zeros((0, width)), *found.y_events])
+        arrays |= dict(zip(EVENTS, (counts, times, states), strict=True))
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, array in arrays.items():

@@ -31,6 +31,7 @@ from pyharness import (
     solve,
     subset,
 )
+from pyharness.events import crosses, flip
 from pyharness.model.scene_file import scene_text
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.symbols import MOST_OPERATIONS
@@ -111,6 +112,13 @@ FOUND: dict[str, Callable[[], Trajectory]] = {
     "solver": lambda: prepared(False),
     "solver of attitudes": lambda: prepared(True),
     "no scene": lambda: replace(solve(case_scene(5), [1.0]), scene=None),
+    "events": lambda: solve(
+        case_scene(3), [5.0, 9.0], events=[flip(1), crosses(2, 50.0), crosses(3, 10.0)]
+    ),
+    "terminal event": lambda: solve(
+        case_scene(3), [5.0, 9.0], events=flip(1, terminal=2), attitude=True
+    ),
+    "no functions of events": lambda: solve(case_scene(3), 1.0, events=[]),
     "a million digits": lambda: solve(case_scene(5), np.linspace(0.0, 1.0, 100_000)),
 }  # fmt: skip
 RESULTS = ("energy", "power", "work", "angular_momentum", "y")
@@ -144,6 +152,8 @@ def check_same(found: Trajectory, saved: Trajectory) -> None:
             assert (now.dtype, now.shape) == (was.dtype, was.shape), each.name
             assert now.tobytes() == was.tobytes(), each.name
             assert now.flags.writeable
+        elif each.name in ("t_events", "y_events") and was is not None:
+            assert [(x.shape, x.tobytes()) for x in now] == [(x.shape, x.tobytes()) for x in was]
         else:
             now, was = described(now), described(was)
             assert now == was, each.name
@@ -170,6 +180,16 @@ def test_every_bit_returns(name: str, tmp_path: Path) -> None:
         # The scene is solved again, and saved again, as the original one.
         first, second = (with_attitude(each.scene, [0.7]) for each in (found, saved))  # type: ignore[arg-type]
         check_same(first, second)
+
+
+def test_events_return(tmp_path: Path) -> None:
+    path = tmp_path / "found.npz"
+    path.write_bytes(_changed(**EVENT)())
+    found = load(path)
+    assert found.t_events is not None
+    assert found.y_events is not None
+    assert [each.tolist() for each in found.t_events] == [[0.5, 0.7]]
+    assert [each.tolist() for each in found.y_events] == [[[1.0] * 7] * 2]
 
 
 def test_attitudes_and_numbers_of_scenes_return() -> None:
@@ -303,6 +323,12 @@ def _changed(**arrays: Any) -> Callable[[], bytes]:
     return lambda: _content(lambda given: given.update(arrays))
 
 
+# Two events of one function.
+EVENT: dict[str, Any] = {
+    "event_counts": np.array([2]),
+    "event_times": np.array([0.5, 0.7]),
+    "event_states": np.ones((2, 7)),
+}
 FOREIGN: dict[str, Callable[[], bytes]] = {
     "empty": lambda: b"",
     "text": lambda: b"schema = 1\n",
@@ -333,6 +359,12 @@ FOREIGN: dict[str, Callable[[], bytes]] = {
     "two dimensions": _changed(time=np.zeros((5, 1))),
     "no dimension": _changed(time=np.float64(0.0)),
     "axes of another shape": _changed(axes=np.zeros((3, 2))),
+    "half of the events": _changed(event_counts=np.array([0])),
+    "fewer events": _changed(**EVENT | {"event_counts": np.array([1, 0])}),
+    "a negative number of events": _changed(**EVENT | {"event_counts": np.array([3, -1])}),
+    "events without attitudes": _changed(**EVENT | {"event_states": np.zeros((2, 3))}),
+    "an event without a state": _changed(**EVENT | {"event_states": np.zeros((1, 7))}),
+    "an infinity of events": _changed(**EVENT | {"event_counts": np.array([1e300])}),
     "scene of numbers": _changed(scene=np.zeros(3)),
     "scene that is no TOML": _changed(scene="omega ="),
     "scene without a body": _changed(scene='[initial]\nomega = [1.0, 2.0, 3.0]'),

@@ -293,6 +293,15 @@ def test_a_function_may_return_an_array_of_one_number(shape: tuple[int, ...]) ->
     assert times_of(BODY, 9.0, of_one) == pytest.approx(times_of(BODY, 9.0, flip(2)))
 
 
+@pytest.mark.parametrize("end", [0.005, -0.005])
+def test_events_are_in_the_order_of_integration(end: float) -> None:
+    fast = Scene("fast", (1.0, 4e4, 1.0), moments=(1.0, 2.0, 3.0))
+    found = solve(fast, end, events=flip(1))
+    assert found.t_events is not None
+    assert len(found.t_events[0]) > 3
+    assert (np.diff(np.abs(found.t_events[0])) > 0.0).all()
+
+
 def test_function_of_one_number_alone() -> None:
     calls: list[float] = []
 

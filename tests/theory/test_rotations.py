@@ -270,6 +270,14 @@ def test_linear_picture_is_a_tenth_off_when_it_says(name: str, place: int) -> No
     assert _rotations(scene, 0.9)[place].linear_until == 0.0
 
 
+def test_linear_picture_without_terms_of_second_order_never_ends() -> None:
+    # With A = 0 the spin about the first axis is constant, and the equations are linear.
+    scene = Scene("", (1.0, 0.0, 0.0), coefficients=(0.0, 1.0, 1.0))
+    first = next(each for each in _rotations(scene) if each.omega == (1.0, 0.0, 0.0))
+    assert first.rates[0].real == pytest.approx(1.0)
+    assert first.linear_until == math.inf
+
+
 def test_linear_picture_of_what_grows_in_waves_ends_about_when_it_says() -> None:
     scene = SCENES["all"]
     each = _rotations(scene, 1e-4)[1]

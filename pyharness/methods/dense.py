@@ -115,7 +115,7 @@ def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pie
     while open_pieces:
         if len(open_pieces) + len(done) > _MOST_PIECES:
             raise InputError(
-                f"dense_output: more than {_MOST_PIECES} polynomials would be needed; use a "
+                f"dense output and events need more than {_MOST_PIECES} polynomials; use a "
                 "shorter time or a larger tolerance, or give the times of the results"
             )
         lows, highs = np.array([piece[:2] for piece in open_pieces]).T
@@ -159,7 +159,8 @@ def _of_fixed_steps(
     steps = [math.ceil(abs(end) / step) for end in ends]
     if max(steps) > _MOST_PIECES:
         raise InputError(
-            f"dense_output: more than {_MOST_PIECES} steps; use a larger step or a shorter time"
+            f"dense output and events need more than {_MOST_PIECES} steps; use a larger step or a "
+            "shorter time"
         )
     before = [-k * step for k in range(steps[0] - 1, 0, -1)] if ends[0] < 0.0 else []
     after = [k * step for k in range(1, steps[-1])] if ends[-1] > 0.0 else []

@@ -9,14 +9,12 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from pyharness.dynamics.system import with_constant_body
-from pyharness.methods import dense
-from pyharness.methods.event_functions import EventFunction, event_functions
-from pyharness.methods.events import Solution, found_events, no_events
+from pyharness.methods.continuous import solution_of, with_events, with_events_reversed
+from pyharness.methods.event_functions import event_functions
 from pyharness.methods.plan import plan
 from pyharness.methods.registry import (
     METHODS,
@@ -27,9 +25,9 @@ from pyharness.methods.registry import (
     requested_tolerance,
 )
 from pyharness.methods.scipy_ivp import finest_tolerance
+from pyharness.methods.sides import in_reverse, joined
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
-from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, unknown
 from pyharness.model.principal import in_scene_axes, principal
@@ -46,9 +44,6 @@ from pyharness.scenes.rescaled import (
     scaled,
     unscaled,
 )
-
-_ROWS = ("time", "recorded_time", "omega")
-_WORST_FIRST = ("overflow", "sensitive", "complete")
 
 
 def solve(
@@ -163,72 +158,21 @@ def solve(
     sides = (below[::-1], values[len(below) :])
     parts = [_integrate(chosen, scene, each, tolerance, effort) for each in sides if each]
     if below:
-        parts[0] = _reversed(parts[0])
-    found = parts[0] if len(parts) == 1 else _joined(*parts)
+        parts[0] = in_reverse(parts[0])
+    found = parts[0] if len(parts) == 1 else joined(*parts)
     reported = None if chosen.is_fixed_step else tolerance
     found = replace(found, moments=moments, tolerance=reported, scene=given)
     if is_full:
         found = in_scene_axes(found, axes)
+    rows = partial(_more_rows, given, method, effort, found.attitude is not None)
     if dense_output:
-        found = replace(found, sol=_dense(given, found, method, tolerance, effort))
+        found = replace(found, sol=solution_of(given, found, rows, method, tolerance))
     if functions is not None:
         ends = values[0], values[-1]
-        found = _with_events(given, found, functions, ends, method, tolerance, effort)
+        found = with_events(given, found, functions, ends, rows, method, tolerance)
         if turned or (len(values) == 1 and values[0] < 0.0):
-            found = _with_events_reversed(found)
-    return _reversed(found) if turned else found
-
-
-def _with_events(
-    scene: Scene,
-    found: Trajectory,
-    functions: list[EventFunction],
-    ends: tuple[float, float],
-    method: str,
-    tolerance: float,
-    effort: float,
-) -> Trajectory:
-    """Return a trajectory with its events, without the rows and the function after terminal ones.
-
-    `ends` are the first and the last of the requested times (s).
-    """
-    sol = found.sol or _dense(scene, found, method, tolerance, effort)
-    events = no_events(len(functions), 3 if found.attitude is None else 7)
-    if sol.t_min < sol.t_max:
-        pieces = sol.states
-        if not isinstance(pieces, Pieces):
-            rows = partial(_more_rows, scene, method, effort, found.attitude is not None)
-            pieces = dense.state_pieces(scene, found, rows, tolerance, METHODS[method].finest)
-        # A fixed step of a method has a tolerance of 1.
-        own = tolerance if tolerance < 1.0 else 0.0
-        events = found_events(functions, Solution(pieces, sol, own))
-    kept = (found.time >= events.first) & (found.time <= events.last)
-    cut: dict[str, Any] = {name: getattr(found, name)[kept] for name in _rows(found)}
-    # An overflow remains the ending if it is not beyond a terminal event.
-    overflowed = found.ended == "overflow" and (
-        (events.first == -math.inf and ends[0] < min(found.time, default=0.0))
-        or (events.last == math.inf and ends[1] > max(found.time, default=0.0))
-    )
-    if (math.isfinite(events.first) or math.isfinite(events.last)) and not overflowed:
-        cut["ended"] = "event"
-    if found.sol is not None:
-        low, high = max(sol.t_min, events.first), min(sol.t_max, events.last)
-        cut["sol"] = replace(sol, t_min=low, t_max=high)
-    return replace(found, **cut, t_events=events.times, y_events=events.states)
-
-
-def _with_events_reversed(found: Trajectory) -> Trajectory:
-    times, states = found.t_events or [], found.y_events or []
-    return replace(found, t_events=[x[::-1] for x in times], y_events=[x[::-1] for x in states])
-
-
-def _dense(
-    scene: Scene, found: Trajectory, method: str, tolerance: float, effort: float
-) -> DenseOutput:
-    """Return the solution of a scene as a function of time, between the times of `found` and 0."""
-    rows = partial(_more_rows, scene, method, effort, found.attitude is not None)
-    is_closed = not found.evaluations and method != "reference"
-    return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
+            found = with_events_reversed(found)
+    return in_reverse(found) if turned else found
 
 
 def _more_rows(
@@ -304,41 +248,6 @@ def _integrate(
         # The omega that the torque causes is larger than it was estimated to be.
         return chosen.solve(scene, times, tolerance, effort)
     return unscaled(found, times, factor)
-
-
-def _reversed(found: Trajectory) -> Trajectory:
-    return replace(found, **{name: getattr(found, name)[::-1] for name in _rows(found)})
-
-
-def _rows(found: Trajectory) -> tuple[str, ...]:
-    return _ROWS if found.attitude is None else (*_ROWS, "attitude")
-
-
-def _joined(before: Trajectory, after: Trajectory) -> Trajectory:
-    """Return the results of a backward and a forward integration from time 0 as one trajectory.
-
-    `before` is the trajectory at negative times, with its rows in ascending order of time, and
-    `after` is the trajectory from time 0. Steps and evaluations are added. The error and the error
-    amplification are the larger of the two values, and the ending is the worse of the two, where an
-    overflow is the worst.
-    """
-    both = before, after
-    rows: dict[str, Any] = {
-        name: np.concatenate([getattr(x, name) for x in both]) for name in _rows(after)
-    }
-    return replace(
-        after,
-        **rows,
-        ended=min((x.ended for x in both), key=_WORST_FIRST.index),
-        error=_larger(before.error, after.error),
-        growth=_larger(before.growth, after.growth),
-        steps=before.steps + after.steps,
-        evaluations=before.evaluations + after.evaluations,
-    )
-
-
-def _larger(first: float | None, second: float | None) -> float | None:
-    return None if first is None or second is None else max(first, second)
 
 
 def _ascending(times: object) -> tuple[list[float], bool]:

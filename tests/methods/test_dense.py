@@ -220,7 +220,7 @@ def test_the_smallest_tolerance_of_a_method_is_enough() -> None:
 def test_too_many_polynomials_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dense, "_MOST_PIECES", 5)
     for method in ("taylor", "rk4"):
-        with pytest.raises(InputError, match=r"^dense_output: more than 5 "):
+        with pytest.raises(InputError, match=r"^dense output and events need more than 5 "):
             solve(SCENES["law"], 20.0, method, dense_output=True)
 
 

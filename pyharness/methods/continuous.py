@@ -1,0 +1,69 @@
+"""What a trajectory has between its rows: dense output, and events."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from pyharness.methods import dense
+from pyharness.methods.event_functions import EventFunction
+from pyharness.methods.events import Solution, found_events, no_events
+from pyharness.methods.registry import METHODS
+from pyharness.methods.sides import row_names
+from pyharness.model.dense_output import DenseOutput, Pieces
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
+
+
+def solution_of(
+    scene: Scene, found: Trajectory, rows: dense.Rows, method: str, tolerance: float
+) -> DenseOutput:
+    """Return the solution of a scene as a function of time, between the times of `found` and 0.
+
+    `rows` is a function that returns the trajectory by the same method at given times and to a
+    given tolerance, which is 1 for a method with a fixed step.
+    """
+    is_closed = not found.evaluations and method != "reference"
+    return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
+
+
+def with_events(
+    scene: Scene,
+    found: Trajectory,
+    functions: list[EventFunction],
+    ends: tuple[float, float],
+    rows: dense.Rows,
+    method: str,
+    tolerance: float,
+) -> Trajectory:
+    """Return a trajectory with its events, without the rows and the function after terminal ones.
+
+    `ends` are the first and the last of the requested times (s). `rows` is as in `solution_of`.
+    """
+    sol = found.sol or solution_of(scene, found, rows, method, tolerance)
+    events = no_events(len(functions), 3 if found.attitude is None else 7)
+    if sol.t_min < sol.t_max:
+        pieces = sol.states
+        if not isinstance(pieces, Pieces):
+            pieces = dense.state_pieces(scene, found, rows, tolerance, METHODS[method].finest)
+        # A fixed step of a method has a tolerance of 1.
+        own = tolerance if tolerance < 1.0 else 0.0
+        events = found_events(functions, Solution(pieces, sol, own))
+    kept = (found.time >= events.first) & (found.time <= events.last)
+    cut: dict[str, Any] = {name: getattr(found, name)[kept] for name in row_names(found)}
+    # An overflow remains the ending if it is not beyond a terminal event.
+    overflowed = found.ended == "overflow" and (
+        (events.first == -math.inf and ends[0] < min(found.time, default=0.0))
+        or (events.last == math.inf and ends[1] > max(found.time, default=0.0))
+    )
+    if (math.isfinite(events.first) or math.isfinite(events.last)) and not overflowed:
+        cut["ended"] = "event"
+    if found.sol is not None:
+        low, high = max(sol.t_min, events.first), min(sol.t_max, events.last)
+        cut["sol"] = replace(sol, t_min=low, t_max=high)
+    return replace(found, **cut, t_events=events.times, y_events=events.states)
+
+
+def with_events_reversed(found: Trajectory) -> Trajectory:
+    """Return a trajectory with the events of each function in reverse order."""
+    times, states = found.t_events or [], found.y_events or []
+    return replace(found, t_events=[x[::-1] for x in times], y_events=[x[::-1] for x in states])

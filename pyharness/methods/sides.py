@@ -1,0 +1,48 @@
+"""Parts of a trajectory: its rows in reverse order, and the two sides of time 0 joined."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pyharness.model.trajectory import Trajectory
+
+_ROWS = ("time", "recorded_time", "omega")
+_WORST_FIRST = ("overflow", "sensitive", "complete")
+
+
+def row_names(found: Trajectory) -> tuple[str, ...]:
+    """Return the names of the arrays of a trajectory that have a row for each time."""
+    return _ROWS if found.attitude is None else (*_ROWS, "attitude")
+
+
+def in_reverse(found: Trajectory) -> Trajectory:
+    """Return a trajectory with its rows in reverse order."""
+    return replace(found, **{name: getattr(found, name)[::-1] for name in row_names(found)})
+
+
+def joined(before: Trajectory, after: Trajectory) -> Trajectory:
+    """Return the results of a backward and a forward integration from time 0 as one trajectory.
+
+    `before` is the trajectory at negative times, with its rows in ascending order of time, and
+    `after` is the trajectory from time 0. Steps and evaluations are added. The error and the error
+    amplification are the larger of the two values, and the ending is the worse of the two, where an
+    overflow is the worst.
+    """
+    both = before, after
+    rows: dict[str, Any] = {
+        name: np.concatenate([getattr(x, name) for x in both]) for name in row_names(after)
+    }
+    return replace(
+        after,
+        **rows,
+        ended=min((x.ended for x in both), key=_WORST_FIRST.index),
+        error=_larger(before.error, after.error),
+        growth=_larger(before.growth, after.growth),
+        steps=before.steps + after.steps,
+        evaluations=before.evaluations + after.evaluations,
+    )
+
+
+def _larger(first: float | None, second: float | None) -> float | None:
+    return None if first is None or second is None else max(first, second)

@@ -1,4 +1,4 @@
-"""What a trajectory has between its rows: dense output, and events."""
+"""Dense output and events: what is known of a solution between the rows of its trajectory."""
 
 import math
 from dataclasses import replace

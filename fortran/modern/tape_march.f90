@@ -95,7 +95,7 @@ contains
     call begin_lanes()
     scale = maxval(abs(request%omega))
     local_tolerance = max(LEAST_LOCAL_TOLERANCE, 0.125_dp*attempt%tolerance)
-    s%order = order_for(local_tolerance)
+    s%order = order_for(local_tolerance, s%powers)
     s%h = t_end
     limit = limit_of(attempt%most_steps, attempt%stride)
     tries = 0
@@ -134,7 +134,7 @@ contains
         if (.not. has_guess) then
           has_guess = .true.
           local_tolerance = local_tolerance_of(attempt%tolerance, t_end/(factor*s%h))
-          s%order = order_for(local_tolerance)
+          s%order = order_for(local_tolerance, s%powers)
           found%finest = local_tolerance <= LEAST_LOCAL_TOLERANCE
           cycle
         end if
@@ -146,7 +146,7 @@ contains
                                is_short)
       ! Perturbations may change faster than the motion, as about a steady rotation.
       if (is_short /= 0) factor = factor*fitting_lanes()
-      factor = converging(tape, s%order, s%is_squared, s%a, factor)
+      factor = converging(tape, s%order, s%powers, s%a, factor)
       arrives = abs(factor*s%h) >= abs(to_stop)*(1.0_dp - epsilon(s%h))
       if (arrives) factor = to_stop/s%h
       at_end = arrives .and. .not. abs(break_time) < abs(t_end)

@@ -1,9 +1,9 @@
 module tape_plan
   !! The order, local tolerance and step of an integration of a tape.
   use kinds, only: dp
-  use operations, only: EXPONENTIAL => EXP, QUOTIENT, SINE_COSINE, SQUARE_ROOT => SQRT, &
-                        TANGENT => TANH
+  use operations, only: EXPONENTIAL => EXP, QUOTIENT, SQUARE_ROOT => SQRT, TANGENT => TANH
   use tape, only: FIRST_UNKNOWN, tape_t
+  use tape_powers, only: INVISIBLE, powers_t, resolving
   use tape_series, only: LAST_TERM, MOST_ORDER
   implicit none(type, external)
   private
@@ -14,12 +14,6 @@ module tape_plan
   real(dp), parameter :: LONGER = 16.0_dp  ! largest factor on the step that was tried
   real(dp), parameter, public :: LEAST_LOCAL_TOLERANCE = 1e-18_dp ! below rounding
   real(dp), parameter :: WITHIN_CIRCLE = 0.9_dp ! part of the distance of a zero
-
-  ! An exponential below exp(-INVISIBLE) changes no digit of a result, unless its factor is huge.
-  real(dp), parameter :: INVISIBLE = 100.0_dp
-
-  ! Largest change over the order of an angle whose sine is squared, and perhaps again, rad.
-  real(dp), parameter :: ANGLE_OF_ORDER = 0.1_dp
 
   public :: converging, fitting, local_tolerance_of, order_for
 
@@ -55,25 +49,24 @@ contains
     end do
   end function fitting
 
-  pure real(dp) function converging(tape, order, is_squared, a, factor)
+  pure real(dp) function converging(tape, order, powers, a, factor)
     !! Return the factor on the step, reduced so that the series of every operation converges.
     !! The last terms of the unknowns alone do not show it: an exponential may be so small at the
     !! beginning of a step that it changes no digit, and large a little later. Its argument
     !! therefore changes by at most half the order, unless the exponential stays invisible; the
     !! terms of its series then decrease before the last. The derivative of a hyperbolic tangent is
     !! such a pulse too. A divisor, and the argument of a square root, has no zero in the circle
-    !! around the beginning of the step. A high power of a sine is a series of pulses, too.
+    !! around the beginning of the step. Products of many factors are in `tape_powers`.
     type(tape_t), intent(in) :: tape
     integer, intent(in) :: order
-    logical, intent(in) :: is_squared(:) !! (slots)
+    type(powers_t), intent(in) :: powers
     real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots)
     real(dp), intent(in) :: factor
     integer :: n
 
-    converging = factor
+    converging = resolving(tape, order, powers, a, factor)
     do n = 1, tape%n_operations
-      associate (first => tape%operations(2, n), second => tape%operations(3, n), &
-                 out => tape%operations(4, n))
+      associate (first => tape%operations(2, n), second => tape%operations(3, n))
         select case (tape%operations(1, n))
         case (EXPONENTIAL)
           converging = limited(first, max(0.5_dp*order, -a(0, first) - INVISIBLE), converging)
@@ -85,10 +78,6 @@ contains
           converging = limited(second, WITHIN_CIRCLE*abs(a(0, second)), converging)
         case (SQUARE_ROOT)
           converging = limited(first, WITHIN_CIRCLE*a(0, first), converging)
-        case (SINE_COSINE)
-          if (any(is_squared(out:out + 1))) then
-            converging = limited(first, ANGLE_OF_ORDER*order, converging)
-          end if
         case default
           cycle
         end select
@@ -120,11 +109,14 @@ contains
 
   end function converging
 
-  pure integer function order_for(local_tolerance)
-    !! Return the order with the least work for the requested digits (Jorba and Zou 2005).
+  pure integer function order_for(local_tolerance, powers)
+    !! Return the order with the least work for the requested digits (Jorba and Zou 2005), or the
+    !! larger one that shows powers.
     real(dp), intent(in) :: local_tolerance
+    type(powers_t), intent(in) :: powers
 
-    order_for = max(LEAST_ORDER, min(MOST_ORDER, 1 + ceiling(-0.7_dp*log(local_tolerance))))
+    order_for = max(LEAST_ORDER, powers%order, 1 + ceiling(-0.7_dp*log(local_tolerance)))
+    order_for = min(MOST_ORDER, order_for)
   end function order_for
 
   pure real(dp) function local_tolerance_of(tolerance, steps)

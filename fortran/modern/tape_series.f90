@@ -6,6 +6,7 @@ module tape_series
   use operations, only: EXPONENTIAL => EXP, LINEAR, PRODUCT, QUOTIENT, SINE_COSINE, &
                         SQUARE_ROOT => SQRT, TABLE, TANGENT => TANH
   use tape, only: arrays_of, FIRST_UNKNOWN, piece_at, tape_arrays_t, tape_t, TIME_SLOT
+  use tape_powers, only: find_powers, powers_t
   use two_words, only: sine_cosine_of
   implicit none(type, external)
   private
@@ -27,7 +28,7 @@ module tape_series
     ! (SIDE_BY_SIDE, 0:MOST_ORDER, slots): perturbations
     real(dp), pointer, contiguous :: v(:, :, :) => null()
     real(dp), allocatable :: noise(:)       !! (slots): rounding errors of terms 0, in units
-    logical, allocatable :: is_squared(:)   !! (slots): whether a product squares the slot
+    type(powers_t) :: powers
     type(tape_arrays_t) :: arrays           !! what tape_terms.c reads of the tape
   end type series_t
 
@@ -77,7 +78,7 @@ contains
     type(series_t), intent(inout) :: s
     logical, intent(out) :: fits !! whether there is enough memory
     integer(c_intptr_t) :: address ! in numbers
-    integer :: at, failed, n, n_terms, n_perturbations
+    integer :: at, failed, n_terms, n_perturbations
 
     n_terms = (LAST_TERM + 1)*tape%n_slots
     n_perturbations = SIDE_BY_SIDE*(MOST_ORDER + 1)*tape%n_slots
@@ -86,7 +87,7 @@ contains
     if (failed /= 0) return
     allocate (s%noise(tape%n_slots), stat=failed)
     if (failed /= 0) return
-    allocate (s%is_squared(tape%n_slots), stat=failed)
+    call find_powers(tape, s%powers, failed)
     if (failed /= 0) return
     ! Perturbations begin a line of the cache, and so does term 1 of each slot.
     address = transfer(c_loc(memory), address)/BYTES
@@ -94,13 +95,6 @@ contains
     s%v(1:SIDE_BY_SIDE, 0:MOST_ORDER, 1:tape%n_slots) => memory(at:at + n_perturbations - 1)
     at = at + n_perturbations + SIDE_BY_SIDE - 1
     s%a(0:LAST_TERM, 1:tape%n_slots) => memory(at:at + n_terms - 1)
-    s%is_squared = .false.
-    do n = 1, tape%n_operations
-      if (tape%operations(1, n) /= PRODUCT) cycle
-      if (tape%operations(2, n) == tape%operations(3, n)) then
-        s%is_squared(tape%operations(2, n)) = .true.
-      end if
-    end do
     s%arrays = arrays_of(tape, c_loc(s%a), c_loc(s%v))
     fits = .true.
   end subroutine allocate_series

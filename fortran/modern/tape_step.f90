@@ -47,7 +47,7 @@ contains
     allocate (weights(tape%n_unknowns), stat=failed)
     if (failed /= 0) return
     weights = 1.0_dp/request%tolerances
-    s%order = order_for(LOCAL_TOLERANCE*request%relative)
+    s%order = order_for(LOCAL_TOLERANCE*request%relative, s%powers)
     step%order = s%order
     s%h = request%trial
     is_rejected = .false.
@@ -67,7 +67,7 @@ contains
         cycle
       end if
       if (is_rejected) factor = min(1.0_dp, factor)
-      factor = converging(tape, s%order, s%is_squared, s%a, min(factor, request%longest/s%h))
+      factor = converging(tape, s%order, s%powers, s%a, min(factor, request%longest/s%h))
       step%h = factor*s%h
       ! The quotient of the two was rounded.
       if (abs(step%h) >= (1.0_dp - 4.0_dp*epsilon(s%h))*abs(request%longest)) then

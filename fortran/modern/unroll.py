@@ -27,6 +27,7 @@ MODULES = (
     "taylor_rows",
     "taylor_march",
     "taylor",
+    "tape_powers",
     "tape_series",
     "tape_growth",
     "tape_plan",

@@ -48,12 +48,15 @@ def taylor_series(
     translational velocity (m/s) is included if `velocity` is true. The attitude is included if the
     scene has one. It is a quaternion, which has the same norm as the scene's quaternion.
     `coefficients` are the Euler coefficients A, B, C of the scene, and `order` is the degree of the
-    Taylor polynomials. `tolerance` is the local tolerance, relative to omega and to the attitude.
-    `effort` is a factor on a work limit of some ten seconds; if it is None, the limit is 100 000
-    steps, and fewer if the torque depends on the state. Raise InputError if the work limit is
-    exceeded.
+    Taylor polynomials, which is larger for a torque with high powers. `tolerance` is the local
+    tolerance, relative to omega and to the attitude. `effort` is a factor on a work limit of some
+    ten seconds; if it is None, the limit is 100 000 steps, and fewer if the torque depends on the
+    state. Raise InputError if the work limit is exceeded.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
+    if equations.least_order > order:
+        # Two integrations with different orders still have different orders.
+        order = equations.least_order + order // 4
     is_recorded = isinstance(scene.torque, StateTorque)
     at_end = _Equations(scene, coefficients, velocity) if is_recorded else equations
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
@@ -329,6 +332,11 @@ class _Equations:
         if self._changing is None:
             return []
         return [[_moved(each, time) for each in row] for row in self._changing.elements]
+
+    @property
+    def least_order(self) -> int:
+        """The order that shows the powers of the torque."""
+        return 0 if self._tape is None else self._tape.least_order
 
     def reach(self, length: Decimal) -> Decimal:
         """Return the length (s) of the step, reduced so that no pulse of the torque is skipped.

@@ -5,7 +5,8 @@ all operations are computed order by order, together with those of the solution.
 """
 
 from bisect import bisect_left, bisect_right
-from decimal import Decimal
+from collections import Counter
+from decimal import Context, Decimal
 
 from pyharness.model.tape import N_INPUTS, Linear, Operation, Table, Tape
 from pyharness.truth.decimal_functions import Row, product, sine_cosine
@@ -17,11 +18,17 @@ _LARGEST_ANGLE = Decimal("1e308")
 _INVISIBLE = 400
 # Part of the distance of a divisor's zero that a step may be long.
 _WITHIN_CIRCLE = Decimal("0.9")
-# Largest change of an angle (rad) in a step, if the square of its sine or cosine is used.
-_PART_OF_TURN = Decimal(2)
+# Products of at least so many factors are checked. Those of two show in any series.
+_MANY_FACTORS = 3
+# The order is this multiple of the number of factors, so that a product shows although its factors
+# and their derivatives are 0; but at most the following order.
+_ORDER_A_FACTOR = 4
+_MOST_ORDER = 100
 # Relative accuracy with which the square of a root's polynomial must agree with its operand, so
 # that a negative value of the polynomial is not merely its truncation error.
 _TRUSTED = Decimal("1e-6")
+
+_ROUGH = Context(prec=9)
 
 # A linear combination of slots: its constant, and pairs of a coefficient and a slot.
 _Sum = tuple[Decimal, list[tuple[Decimal, int]]]
@@ -43,7 +50,7 @@ class TapeSeries:
     """The Taylor series of the operations of a tape around a time.
 
     The method `begin` starts an expansion. Each call of `next` adds one coefficient to the series
-    of every operation.
+    of every operation. `least_order` is the order that shows the powers of the tape.
     """
 
     def __init__(self, tape: Tape) -> None:
@@ -59,14 +66,8 @@ class TapeSeries:
         # The times at which a table changes. Its first piece holds before its first break too.
         changes = {time for _, breaks in self._breaks.values() for time in breaks[1:]}
         self._changes = sorted(changes)
-        # The slots of the sines and cosines of which a product is the square.
-        products = [each.operands for each in tape.operations if each.kind == "product"]
-        squared = {x for x, y in products if x == y}
-        self._powers = {
-            slot
-            for slot, each in enumerate(tape.operations, N_INPUTS)
-            if each.kind in ("sine", "cosine") and slot in squared
-        }
+        self._powers, largest = _powers(tape)
+        self.least_order = min(_MOST_ORDER, _ORDER_A_FACTOR * largest)
         self._slots: list[Row] = []
 
     def begin(
@@ -180,11 +181,12 @@ class TapeSeries:
         An exponential may be so small at the beginning of a step that it changes no digit, and
         large a little later. Therefore its argument changes by at most half the order, unless the
         exponential stays invisible. The derivative of a hyperbolic tangent is such a pulse too. A
-        divisor has no zero in the circle around the beginning of the step. A high power of a sine
-        has a pulse in every half turn, and may be invisible at both ends of a step.
+        divisor has no zero in the circle around the beginning of the step. The terms of a product
+        of many factors, such as a power, are of at most half the order in the mean, unless the
+        product stays invisible.
         """
-        for slot, (operation, _) in enumerate(self._operations, N_INPUTS):
-            most = self._largest_change(operation, slot)
+        for operation, _ in self._operations:
+            most = self._largest_change(operation)
             if most is None:
                 continue
             sizes = [Decimal(0), *map(abs, self._slots[operation.operands[-1]][1:])]
@@ -193,12 +195,28 @@ class TapeSeries:
             if change > most:
                 # The change is a convex function of the length, so that the quotient is enough.
                 length *= most / change
+        while any(self._is_hidden(*each, length) for each in self._powers):
+            length *= Decimal("0.7")
         return length
 
-    def _largest_change(self, operation: Operation, slot: int) -> Decimal | None:
+    def _is_hidden(self, factors: Counter[int], scale: Decimal, length: Decimal) -> bool:
+        """Return whether a product is visible in a step, but perhaps not in the terms computed.
+
+        `factors` counts how often each slot is a factor of the product. `scale` is the decimal
+        logarithm of the largest coefficient with which the product is used. The mean order of a
+        product's terms is the sum of those of its factors.
+        """
+        order, size = Decimal(0), scale
+        for slot, count in factors.items():
+            terms = [abs(x) * length**k for k, x in enumerate(self._slots[slot])]
+            if not (total := sum(terms)):
+                return False
+            order += count * sum(k * x for k, x in enumerate(terms)) / total
+            size += count * total.log10(_ROUGH)
+        return 2 * order > self._order and size > -_INVISIBLE * Decimal("0.4343")
+
+    def _largest_change(self, operation: Operation) -> Decimal | None:
         """Return by how much the last operand of an operation may change in a step, if limited."""
-        if slot in self._powers:
-            return _PART_OF_TURN
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
         x = self._slots[operation.operands[-1]][0]
@@ -230,6 +248,32 @@ class TapeSeries:
                 if root < 0 and abs(root * root - operand) <= _TRUSTED * abs(operand):
                     return True
         return False
+
+
+def _powers(tape: Tape) -> tuple[list[tuple[Counter[int], Decimal]], int]:
+    """Return the products of many factors that are not merely factors, and the most factors.
+
+    The factors of each product are counted by slot. A product comes with the decimal logarithm of
+    the largest coefficient with which it is used. A sum has as many factors as one of its terms.
+    """
+    factors: dict[int, Counter[int]] = {}
+    numbers: dict[int, int] = {}
+    scales: dict[int, float] = {}
+    for slot, (kind, operands, linear, _) in enumerate(tape.operations, N_INPUTS):
+        if kind == "product":
+            parts = [factors.get(each, Counter([each])) for each in operands]
+            factors[slot] = parts[0] + parts[1]
+            numbers[slot] = sum(numbers.get(each, 1) for each in operands)
+        else:
+            scales.update((each, max(1.0, scales.get(each, 0.0))) for each in operands)
+            terms = linear.terms if linear else ()
+            numbers[slot] = max((numbers.get(each, 1) for each, _ in terms), default=1)
+    sums = [each.linear for each in tape.operations if each.linear] + list(tape.outputs)
+    for each, factor in (term for linear in sums for term in linear.terms):
+        scales[each] = max(abs(factor), scales.get(each, 0.0))
+    found = [each for each in factors if numbers[each] >= _MANY_FACTORS and scales.get(each)]
+    powers = [(factors[each], Decimal(scales[each]).log10(_ROUGH)) for each in found]
+    return powers, max((numbers[each] for each in found), default=0)
 
 
 def _sum(linear: Linear | None) -> _Sum:

@@ -30,6 +30,8 @@ module tape_march
   ! over the local tolerance, and over the rounding errors at the beginning of the step.
   real(dp), parameter :: MOST_DEFECT = 4.0_dp
   real(dp), parameter :: MOST_ROUNDING = 1e3_dp
+  ! Largest sum of the terms of a step, relative, unless the tolerance allows more.
+  real(dp), parameter :: MOST_CANCELLED = 1e3_dp
 
   ! One integration of a request.
   type, public :: attempt_t
@@ -352,6 +354,7 @@ contains
       !! beginning. The change of the unknowns is computed too.
       real(dp) :: derivatives(tape%n_unknowns), slope(tape%n_unknowns)
       real(dp) :: defect(tape%n_unknowns), size_of_terms(tape%n_unknowns), rounded, allowed
+      real(dp) :: reached
       integer :: i, k
 
       change = 0.0_dp
@@ -367,6 +370,13 @@ contains
           end associate
         end do
       end do
+      ! Large terms that cancel are rounded, and a shorter step has smaller terms.
+      reached = max(scale, maxval(abs(y(:3) + change(:3))), LEAST_SCALE)
+      if (.not. max(maxval(size_of_terms(:3))/reached, 2.0_dp*sum(size_of_terms(4:))) &
+          <= max(MOST_CANCELLED, attempt%tolerance/epsilon(rounded))) then
+        is_continued = .false.
+        return
+      end if
       rounded = max(1.0_dp, maxval(weights*(size_of_terms + noise*abs(factor*s%h))))
       call derivatives_at(tape, t_next, y + (change + y_low), -s%h, s, derivatives)
       allowed = MOST_DEFECT*local_tolerance + MOST_ROUNDING*epsilon(rounded)*rounded

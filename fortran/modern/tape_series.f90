@@ -1,7 +1,8 @@
 module tape_series
   !! Taylor series of all slots of a tape (Jorba and Zou 2005, section 2), and of perturbations of
   !! the unknowns. A term includes its power of the step.
-  use, intrinsic :: iso_c_binding, only: c_int, c_intptr_t, c_loc
+  use, intrinsic :: iso_c_binding, only: c_int, c_intptr_t, c_loc, c_null_ptr, c_ptr
+  use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use operations, only: EXPONENTIAL => EXP, LINEAR, PRODUCT, QUOTIENT, SINE_COSINE, &
                         SQUARE_ROOT => SQRT, TABLE, TANGENT => TANH
@@ -71,17 +72,23 @@ module tape_series
 
 contains
 
-  subroutine allocate_series(tape, memory, s, fits)
+  subroutine allocate_series(tape, with_perturbations, memory, s, fits)
     !! Allocate the terms of all slots.
     type(tape_t), intent(in) :: tape
+    logical, intent(in) :: with_perturbations
     real(dp), allocatable, intent(inout), target :: memory(:) !! of the terms
     type(series_t), intent(inout) :: s
     logical, intent(out) :: fits !! whether there is enough memory
+    type(c_ptr) :: perturbations
     integer(c_intptr_t) :: address ! in numbers
-    integer :: at, failed, n_terms, n_perturbations
+    integer(int64) :: at, n_terms, n_perturbations
+    integer :: failed
 
-    n_terms = (LAST_TERM + 1)*tape%n_slots
-    n_perturbations = SIDE_BY_SIDE*(MOST_ORDER + 1)*tape%n_slots
+    n_terms = (LAST_TERM + 1)*int(tape%n_slots, int64)
+    n_perturbations = 0
+    if (with_perturbations) then
+      n_perturbations = SIDE_BY_SIDE*(MOST_ORDER + 1)*int(tape%n_slots, int64)
+    end if
     fits = .false.
     allocate (memory(n_perturbations + n_terms + 2*SIDE_BY_SIDE), stat=failed)
     if (failed /= 0) return
@@ -91,11 +98,15 @@ contains
     if (failed /= 0) return
     ! Perturbations begin a line of the cache, and so does term 1 of each slot.
     address = transfer(c_loc(memory), address)/BYTES
-    at = 1 + int(modulo(-address, int(SIDE_BY_SIDE, c_intptr_t)))
-    s%v(1:SIDE_BY_SIDE, 0:MOST_ORDER, 1:tape%n_slots) => memory(at:at + n_perturbations - 1)
+    at = 1 + modulo(-address, int(SIDE_BY_SIDE, c_intptr_t))
+    perturbations = c_null_ptr
+    if (with_perturbations) then
+      s%v(1:SIDE_BY_SIDE, 0:MOST_ORDER, 1:tape%n_slots) => memory(at:at + n_perturbations - 1)
+      perturbations = c_loc(s%v)
+    end if
     at = at + n_perturbations + SIDE_BY_SIDE - 1
     s%a(0:LAST_TERM, 1:tape%n_slots) => memory(at:at + n_terms - 1)
-    s%arrays = arrays_of(tape, c_loc(s%a), c_loc(s%v))
+    s%arrays = arrays_of(tape, c_loc(s%a), perturbations)
     fits = .true.
   end subroutine allocate_series
 
@@ -203,16 +214,18 @@ contains
     end do
   end function value_of
 
-  pure subroutine noise_of(tape, s, noise)
+  pure subroutine noise_of(tape, s, noise, of_unknowns)
     !! Compute bounds of the rounding errors of the derivatives of the unknowns, in units of the
     !! rounding error of 1, by running error analysis of terms 0 (Higham 2002, section 3.3). The
-    !! time and the unknowns are taken as exact.
+    !! time is taken as exact, and so are the unknowns if nothing is said of them.
     type(tape_t), intent(in) :: tape
     type(series_t), intent(inout) :: s
     real(dp), intent(out) :: noise(:)
+    real(dp), intent(in), optional :: of_unknowns(:) !! their rounding errors, in units
     integer :: i, n, out
 
     s%noise = 0.0_dp
+    if (present(of_unknowns)) s%noise(FIRST_UNKNOWN:FIRST_UNKNOWN + size(noise) - 1) = of_unknowns
     do n = 1, tape%n_operations
       associate (first => tape%operations(2, n), second => tape%operations(3, n))
         out = tape%operations(4, n)

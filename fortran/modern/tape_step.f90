@@ -6,7 +6,7 @@ module tape_step
   use statuses, only: COMPLETE, OVERFLOW
   use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
   use tape_plan, only: converging, fitting, MOST_TRIES, order_for
-  use tape_series, only: allocate_series, derivatives_at, expand, series_t
+  use tape_series, only: allocate_series, derivatives_at, expand, noise_of, series_t
   implicit none(type, external)
   private
 
@@ -42,7 +42,7 @@ contains
     call c_f_pointer(step_at, step)
     step%status = OVERFLOW
     step%expansions = 0
-    call allocate_series(tape, memory, s, fits)
+    call allocate_series(tape, .false., memory, s, fits)
     if (.not. fits) return
     allocate (weights(tape%n_unknowns), stat=failed)
     if (failed /= 0) return
@@ -52,8 +52,9 @@ contains
     s%h = request%trial
     is_rejected = .false.
     do while (step%expansions < MOST_TRIES)
-      ! The steps shrink to nothing before a singularity.
-      if (abs(s%h) <= spacing(request%t) .and. abs(s%h) < abs(request%longest)) return
+      ! The steps shrink to nothing before a singularity. The first trial may be short by chance.
+      if (step%expansions > 0 .and. abs(s%h) <= spacing(request%t) &
+          .and. abs(s%h) < abs(request%longest)) return
       s%a = 0.0_dp
       s%a(0, TIME_SLOT) = request%t
       s%a(1, TIME_SLOT) = s%h
@@ -73,6 +74,10 @@ contains
       if (abs(step%h) >= (1.0_dp - 4.0_dp*epsilon(s%h))*abs(request%longest)) then
         step%h = request%longest
       end if
+      ! The time at the end is rounded. The state belongs to that time.
+      step%h = (request%t + step%h) - request%t
+      if (.not. abs(step%h) > 0.0_dp) return
+      factor = step%h/s%h
       do i = 1, tape%n_unknowns
         step%terms(:, i) = 0.0_dp
         do k = 0, s%order
@@ -92,7 +97,9 @@ contains
     logical function is_continued()
       !! Return whether the derivatives at the end of the step are those of the series. The state at
       !! the end is computed too.
-      real(dp) :: slope(tape%n_unknowns), sizes(tape%n_unknowns), derivatives(tape%n_unknowns)
+      real(dp) :: slope(tape%n_unknowns), sizes(tape%n_unknowns)
+      real(dp) :: derivatives(tape%n_unknowns), noise(tape%n_unknowns)
+      real(dp) :: allowed(tape%n_unknowns)
       integer :: k
 
       step%state = 0.0_dp
@@ -105,10 +112,15 @@ contains
       end do
       step%state = request%state + step%state
       call derivatives_at(tape, [request%t + step%h, 0.0_dp], step%state, -s%h, s, derivatives)
+      call noise_of(tape, s, noise, abs(step%state))
       ! NaN is not allowed.
-      is_continued = all(abs(step%h*derivatives - slope) &
-                         <= MOST_DEFECT*request%tolerances &
-                         + MOST_ROUNDING*epsilon(s%h)*(sizes + maxval(abs(request%state))))
+      is_continued = all(abs(step%h*derivatives - slope) <= MOST_DEFECT*request%tolerances &
+                         + MOST_ROUNDING*epsilon(s%h)*(sizes + abs(step%h)*noise)) &
+                     .and. all(abs(step%state) <= huge(s%h))
+      ! Large terms that cancel are rounded, and a shorter step has smaller terms.
+      allowed = MOST_ROUNDING*epsilon(s%h)*max(abs(request%state), abs(step%state))
+      is_continued = is_continued &
+                     .and. all(epsilon(s%h)*sizes <= max(request%tolerances, allowed))
     end function is_continued
 
   end subroutine step_tape

@@ -16,7 +16,7 @@ from pyharness.model.state_torque import StateTorque, of_law, torque_of
 from pyharness.model.symbols import MOST_OPERATIONS, Recorder
 from pyharness.model.tape import FLOATS, Tape, evaluate
 from pyharness.model.trajectory import Array
-from pyharness.model.values import finite, three_floats, tolerance_of
+from pyharness.model.values import finite, number, three_floats, tolerance_of
 
 _FINEST = 1e-14
 _DEFAULT = 1e-9
@@ -51,7 +51,8 @@ class Stepper:
         The quaternion from body to space at this time, scalar first. It may be set.
     held_torque : ndarray, shape (3,)
         A torque about the body axes (N m) that is added to that of the scene and held until it is
-        set again; 0 at first.
+        set again, even if the scene is; 0 at first. For a scene with Euler coefficients instead of
+        moments it is an angular acceleration (1/s^2).
     scene : Scene
         The scene. Another one may be set, with another torque or body; time, omega and attitude
         continue.
@@ -65,18 +66,24 @@ class Stepper:
 
     Examples
     --------
-    A speed of 2 rad/s is reduced by a brake that is switched off once it is below 1 rad/s:
+    A brake reduces a speed of 2 rad/s, until it is 1 rad/s:
 
     >>> from pyharness import Scene, Stepper
     >>> wheel = Stepper(Scene("wheel", (0.0, 0.0, 2.0), moments=(1.0, 1.0, 2.0)))
     >>> wheel.held_torque = (0.0, 0.0, -0.5)
-    >>> while wheel.omega[2] > 1.001:
+    >>> while wheel.omega[2] > 1.0 + 1e-6:
     ...     wheel.until(wheel.time + 0.25)
     >>> wheel.held_torque = (0.0, 0.0, 0.0)
     >>> wheel.until(10.0)
     >>> wheel.omega.round(6)
     array([0., 0., 1.])
     """
+
+    # Another name that is set, such as `torque`, is an error.
+    __slots__ = (
+        "_begin", "_breaks", "_largest", "_last", "_n", "_scene", "_state", "_tape", "_tolerance",
+        "_trial", "steps", "time",
+    )  # fmt: skip
 
     def __init__(
         self, scene: Scene, tolerance: float = _DEFAULT, *, attitude: bool = False
@@ -108,7 +115,7 @@ class Stepper:
     @property
     def omega(self) -> Array:
         """The angular velocity (rad/s), shape (3,)."""
-        return self._state[:3].copy()
+        return _fixed(self._state[:3])
 
     @omega.setter
     def omega(self, values: Sequence[float] | Array) -> None:
@@ -117,7 +124,7 @@ class Stepper:
     @property
     def attitude(self) -> Array | None:
         """The quaternion from body to space, scalar first, shape (4,); None if not computed."""
-        return self._state[3:7].copy() if self._n == 7 else None
+        return _fixed(self._state[3:7]) if self._n == 7 else None
 
     @attitude.setter
     def attitude(self, values: Sequence[float] | Array) -> None:
@@ -128,7 +135,7 @@ class Stepper:
     @property
     def held_torque(self) -> Array:
         """The torque that is added to that of the scene (N m, body axes), shape (3,)."""
-        return self._state[self._n :].copy()
+        return _fixed(self._state[self._n :])
 
     @held_torque.setter
     def held_torque(self, values: Sequence[float] | Array) -> None:
@@ -138,33 +145,50 @@ class Stepper:
         """Take one step, as long as the tolerance allows, and return the new time (s).
 
         `longest` is the longest step that is allowed (s); a negative one leads to earlier times. A
-        step ends where a table of the torque changes. Raise InputError if `longest` is 0 or not a
-        number, and ArithmeticError if the motion or its torque is singular.
+        step ends where a table of the torque changes. Raise InputError if `longest` is too small to
+        change the time, or not a number, and ArithmeticError if the motion or its torque is
+        singular.
         """
-        if math.isnan(longest) or longest == 0.0:
-            raise InputError(f"longest is {longest:g}; allowed: a positive or negative number of s")
+        longest = number("longest", longest)
         end = self.time + longest
+        if not abs(end - self.time) > 0.0:
+            least = 0.5 * math.ulp(self.time)
+            raise InputError(
+                f"longest is {longest:g} s; allowed: a positive or negative number, larger than "
+                f"{least:g} at this time"
+            )
         stop = self._next_break(longest > 0.0)
         if stop is not None and abs(stop - self.time) < abs(longest):
             end, longest = stop, stop - self.time
-        scale = self._scale()
-        tolerances = np.full(len(self._state), math.inf)
-        tolerances[:3] = self._tolerance * scale
-        tolerances[3 : self._n] = 0.5 * self._tolerance
-        trial = math.copysign(min(self._trial, abs(longest)), longest)
-        taken = taylor_step(
-            self._tape, self.time, self._state, tolerances, self._tolerance, trial, longest
-        )
-        if taken.h == 0.0 or not np.isfinite(taken.state).all():
-            raise ArithmeticError(f"no step is short enough at t = {self.time:g} s")
+        taken = self._taken(longest)
         self._begin, self._last = self.time, taken
-        self._trial = abs(taken.h)
-        self.time = end if taken.h == longest else self.time + taken.h
+        is_cut = self.time + taken.h == self.time + longest
+        # A step that was cut says nothing of the next one.
+        self._trial = max(self._trial, abs(taken.h)) if is_cut else abs(taken.h)
+        self.time = end if is_cut else self.time + taken.h
         self._state = taken.state.copy()
         self._state[3 : self._n] = _normalised(self._state[3 : self._n])
         self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
         self.steps += 1
         return self.time
+
+    def _taken(self, longest: float) -> Step:
+        scale = self._scale()
+        while True:
+            tolerances = np.full(len(self._state), math.inf)
+            tolerances[:3] = self._tolerance * scale
+            tolerances[3 : self._n] = 0.5 * self._tolerance
+            trial = math.copysign(min(self._trial, abs(longest)), longest)
+            taken = taylor_step(
+                self._tape, self.time, self._state, tolerances, self._tolerance, trial, longest
+            )
+            if taken.h == 0.0:
+                raise ArithmeticError(f"no step is short enough at t = {self.time:g} s")
+            # The omega that a body at rest is about to reach was a guess.
+            reached = float(np.abs(taken.state[:3]).max())
+            if self._largest > 0.0 or not 0.0 < reached < 0.5 * scale:
+                return taken
+            scale, self._trial = reached, abs(taken.h)
 
     def until(self, time: float) -> None:
         """Take steps until `time` (s), which is later or earlier than now.
@@ -185,12 +209,15 @@ class Stepper:
         give one column for each time. What was set after the step is not included. Raise
         InputError for a time outside the last step.
         """
-        given: Array = np.asarray(times, dtype=float)
+        try:
+            given: Array = np.asarray(times, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"times are {times!r}; allowed: numbers") from None
         low, high = sorted((self._begin, self._begin + self._last.h))
         # The end of a step is rounded.
         slack = 4.0 * math.ulp(max(abs(low), abs(high)))
         if not np.all((given >= low - slack) & (given <= high + slack)):
-            raise InputError(f"t is outside the last step; allowed: {low:g} to {high:g} s")
+            raise InputError(f"t is outside the last step; allowed: {low!r} to {high!r} s")
         share: Any = (given - self._begin) / (self._last.h or 1.0)
         state: Array = polyval(share, self._last.terms[:, : self._n])
         state[3:] = _normalised(state[3:])
@@ -216,6 +243,8 @@ class Stepper:
     def _set(self, place: slice, values: Sequence[float]) -> None:
         self._state = self._state.copy()
         self._state[place] = values
+        if self.steps == 0:
+            self._last = Step(0.0, self._state[None], self._state, 0)
 
     def _scale(self) -> float:
         """Return the omega to which errors are relative."""
@@ -264,6 +293,13 @@ def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
 
 def _three(name: str, values: object) -> tuple[float, ...]:
     return tuple(finite(name, each) for each in three_floats(name, values))
+
+
+def _fixed(values: Array) -> Array:
+    """Return a copy that can't be changed, because a change of it would not change the motion."""
+    found = values.copy()
+    found.setflags(write=False)
+    return found
 
 
 def _normalised(q: Array) -> Array:

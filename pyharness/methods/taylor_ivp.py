@@ -18,10 +18,13 @@ from pyharness.model.errors import InputError
 from pyharness.model.symbols import Recorder, called_once
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Array
+from pyharness.model.values import number
 
 _MOST_OPERATIONS = 20_000
 # The least relative tolerance that SciPy's methods allow.
 _LEAST_RTOL = 100.0 * np.finfo(float).eps
+# The least error that is distinguished from 0; its reciprocal is a number too.
+_LEAST_SCALE = 2.0**-1000
 
 
 class Taylor(OdeSolver):  # type: ignore[misc]
@@ -121,9 +124,13 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         self.nfev += step.expansions
         if step.h == 0.0:
             return False, self.TOO_SMALL_STEP
+        end = self.t + step.h
+        is_cut = end == self.t + self.direction * longest
         self._terms = step.terms
-        self._trial, self._longest = abs(step.h), math.inf
-        self.t = self.t_bound if abs(step.h) == rest else self.t + step.h
+        # A step that was cut says nothing of the next one.
+        self._trial = max(self._trial, abs(step.h)) if is_cut else abs(step.h)
+        self._longest = math.inf
+        self.t = self.t_bound if is_cut and longest == rest else end
         self.y = step.state
         return True, None
 
@@ -132,7 +139,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         scale = self.atol + self.rtol * sizes
         # Without an absolute tolerance, a component that is 0 is compared with the largest.
         missing = float(self.rtol.min()) * float(sizes.max(initial=0.0)) or 1.0
-        return np.where(scale > 0.0, scale, missing)
+        return np.maximum(np.where(scale > 0.0, scale, missing), _LEAST_SCALE)
 
     def _dense_output_impl(self) -> DenseOutput:
         assert self.t_old is not None
@@ -160,24 +167,31 @@ def recorded_equation(fun: Callable[..., Any], n: int) -> Tape:
     recorder = Recorder(_MOST_OPERATIONS, n + 1, "fun", instead)
     time, *state = recorder.inputs()
     given = (time, np.array(state, dtype=object))
-    rates = called_once(fun, given, recorder, f"a function of (t, y) that returns {n} numbers")
-    rates = list(np.array(rates, dtype=object).ravel())
+    # A single equation may return a number.
+    rates = called_once(
+        lambda t, y: np.ravel(np.array(fun(t, y), dtype=object)),
+        given, recorder, f"a function of (t, y) that returns {n} numbers",
+    )  # fmt: skip
     if len(rates) != n:
-        raise InputError(f"fun returned {len(rates)} numbers; allowed: as many as y0 has, {n}")
+        raise InputError(f"fun returned {len(rates)} values; allowed: {n}, the length of y0")
     return recorder.tape(rates)
 
 
 def _positive(name: str, value: Any) -> float:
-    if not value > 0.0:
-        raise InputError(f"{name} is {value:g}; allowed: a positive number")
-    return float(value)
+    found = number(name, value)
+    if not found > 0.0:
+        raise InputError(f"{name} is {found:g}; allowed: a positive number")
+    return found
 
 
 def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
     """Return checked tolerances, each of shape (n,)."""
     found = []
     for name, value in (("rtol", rtol), ("atol", atol)):
-        given = np.asarray(value, dtype=float)
+        try:
+            given = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"{name} is {value!r}; allowed: a number, or {n} numbers") from None
         if given.shape not in ((), (n,)):
             raise InputError(f"{name} has shape {given.shape}; allowed: a number, or shape ({n},)")
         if not np.all(given >= 0.0):

@@ -17,9 +17,9 @@ LONGEST_TRIAL = 1e3
 class Step(NamedTuple):
     """A step that was taken, or tried: its length `h` is 0 if no step is short enough.
 
-    `terms` are the terms of the series, shape (order + 1, n); a term includes its power of `h`.
-    `state` is their sum, the state at the end, shape (n,). `expansions` counts the series that were
-    computed for it.
+    The sum of the time at its beginning and `h` is not rounded. `terms` are the terms of the
+    series, shape (order + 1, n); a term includes its power of `h`. `state` is their sum, the state
+    at the end, shape (n,). `expansions` counts the series that were computed for it.
     """
 
     h: float
@@ -41,11 +41,12 @@ def taylor_step(
 
     The step is as long as `tolerances` allow, shape (n,): the largest errors of the components in
     this step. `relative` is the relative tolerance that decides the order. `trial` is a first guess
-    of the step. It has the sign of `longest`, the longest step that is allowed.
+    of the step, with the sign of `longest`, the longest step that is allowed. A step as long as
+    that ends at t + longest, which is rounded.
     """
     h, terms, end, order, expansions, status = extension().tape_step(
         kernel_tape(tape), t, state, tolerances, relative, trial, longest, _N_TERMS
     )
-    if status != COMPLETE or t + h == t:
+    if status != COMPLETE:
         h = 0.0
     return Step(h, terms[: order + 1], end, expansions)

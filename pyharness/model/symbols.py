@@ -332,7 +332,8 @@ class Symbol:
 
     def __getattr__(self, name: str) -> Any:
         """Refuse functions that can't be recorded; NumPy looks them up by name."""
-        if name.startswith("_"):
+        # The mean of an array asks for the `dtype` of the sum, and does without.
+        if name.startswith("_") or name == "dtype":
             raise AttributeError(name)
         raise self.recorder.refusal(f"{name} of the state")
 

@@ -2,13 +2,16 @@
 
 import math
 from collections.abc import Callable
+from fractions import Fraction
+from functools import partial
 from random import Random
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import quad, solve_ivp
 
-from pyharness import Scene, solve
+from pyharness import Scene, Stepper, Taylor, solve
 from pyharness.scenes.state_scenes import SUDDEN, draw
 from pyharness.truth.reference import reference
 
@@ -83,24 +86,92 @@ def test_a_sudden_change_with_omega_is_not_missed(name: str, number: int) -> Non
         assert np.abs(found.omega - truth.omega).max() <= limit * scale
 
 
-@pytest.mark.parametrize("power", [8, 12, 16, 24, 32])
-def test_a_power_of_a_sine_is_a_series_of_pulses(power: int) -> None:
-    # Each full turn of the sine adds the same integral, a quotient of double factorials.
+def _of_sine(power: int) -> float:
+    """Return the integral of sin(x)**power over a full turn, a quotient of double factorials."""
+    return 2.0 * math.pi * float(Fraction(math.comb(power, power // 2), 2**power))
+
+
+def _of_parabola(power: int) -> float:
+    """Return the integral of (1 - x**2)**power from -1 to 1."""
+    return 2.0 * float(Fraction(4**power, (2 * power + 1) * math.comb(2 * power, power)))
+
+
+def _sine(n: int, t: Any) -> Any:
+    return np.sin(t) ** n
+
+
+def _versine(n: int, t: Any) -> Any:
+    return (0.5 - 0.5 * np.cos(t)) ** n
+
+
+def _parabola(n: int, t: Any) -> Any:
+    return (t * (4.0 - t) / 4.0) ** n
+
+
+_TURNS = (1, 5, 20)
+# Functions of time, ends of time spans, and the integrals from 0 to there: powers, whose pulses
+# change no digit where they begin.
+POWERS: dict[str, tuple[Callable[[Any], Any], list[tuple[float, float]]]] = {
+    **{
+        f"sine**{n}": (partial(_sine, n), [(2.0 * math.pi * k, k * _of_sine(n)) for k in _TURNS])
+        for n in (6, 8, 12, 16, 24, 32, 200)
+    },
+    **{
+        f"versine**{n}": (partial(_versine, n), [(2.0 * math.pi, _of_sine(2 * n))])
+        for n in (4, 7, 100)
+    },
+    **{
+        f"parabola**{n}": (partial(_parabola, n), [(4.0, 2.0 * _of_parabola(n))])
+        for n in (7, 20, 300)
+    },
+    "product of sine and cosine": (
+        lambda t: (2.0 * np.sin(t) * np.cos(t)) ** 64,
+        [(3.0 * math.pi, 1.5 * _of_sine(64))],
+    ),
+    "far parabola": (
+        lambda t: (1.0 - ((t - 50.0) / 50.0) ** 2) ** 1000,
+        [(100.0, 50.0 * _of_parabola(1000))],
+    ),
+    "chain of products": (
+        lambda t: math.prod([np.sin(t)] * 64),
+        [(2.0 * math.pi, _of_sine(64))],
+    ),
+    "power of a sum of powers": (
+        lambda t: (np.sin(t) ** 14 + np.cos(t) ** 14) ** 6,
+        [(2.0 * math.pi, 0.0)],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", POWERS)
+def test_a_high_power_is_a_series_of_pulses(name: str) -> None:
+    value, rows = POWERS[name]
     scene = Scene(
         "pulses",
         (0.1, 0.2, 0.3),
         moments=SPHERE,
-        torque=lambda t, omega: [2.0 * np.sin(t) ** power + 0.0 * omega[0], 0.0, 0.0],
+        torque=lambda t, omega: [2.0 * value(t) + 0.0 * omega[0], 0.0, 0.0],
     )
-    turns = [1, 5, 20]
-    share = math.comb(power, power // 2) / 2.0**power
-    wanted = [0.1 + 2.0 * math.pi * n * share for n in turns]
+    times = [t for t, _ in rows]
+    change = np.array([each for _, each in rows])
+    if not change.all():
+        found = quad(value, 0.0, times[-1], epsabs=1e-13, epsrel=1e-13, limit=1000)
+        change = np.array([found[0]])
+    scale = max(0.3, 0.1 + change[-1])
     for tolerance in (1e-3, 1e-6, 1e-9, 1e-12):
-        found = solve(scene, [2.0 * math.pi * n for n in turns], "taylor", tolerance)
-        error = np.abs(found.omega[:, 0] - wanted).max() / max(wanted)
-        assert error <= tolerance + 4e-15
-    true = reference(scene, [2.0 * math.pi])
-    assert true.omega[0, 0] == pytest.approx(wanted[0], rel=1e-15)
+        solution = solve(scene, times, "taylor", tolerance)
+        assert np.abs(solution.omega[:, 0] - 0.1 - change).max() <= (tolerance + 4e-15) * scale
+        stepper = Stepper(scene, tolerance)
+        stepper.until(times[-1])
+        allowed = tolerance * stepper.steps * scale
+        assert abs(stepper.omega[0] - 0.1 - change[-1]) <= allowed + 1e-14
+        step = solve_ivp(
+            lambda t, y: value(t), (0.0, times[-1]), [0.0],
+            method=Taylor, rtol=max(tolerance, 1e-13), atol=tolerance,
+        )  # fmt: skip
+        assert abs(step.y[0, -1] - change[-1]) <= allowed + 1e-14
+    true = reference(scene, times[:1])
+    assert true.omega[0, 0] - 0.1 == pytest.approx(change[0], abs=4e-15 * scale)
 
 
 @pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-8, 1e-300])

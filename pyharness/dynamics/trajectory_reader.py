@@ -10,6 +10,7 @@ import json
 import math
 import os
 import zipfile
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -29,6 +30,7 @@ from pyharness.model.trajectory_file import AXES, EVENTS, KIND, ROWS, TEXTS, che
 from pyharness.model.values import three_floats
 
 _WRITTEN = "a file that Trajectory.save wrote"
+_MOST_FUNCTIONS = 10_000  # of events; each has arrays of its own
 _CHANGING = {each.place: each for each in (ChangingMoments, ChangingInertia)}
 
 
@@ -66,14 +68,19 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
     where = f"trajectory file '{name}'"
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     content = read_input(name, where, memory // 4, _WRITTEN)
+    damaged = InputError(f"{where}: not a trajectory, or damaged; give {_WRITTEN}")
     try:
-        arrays = _arrays(content)
-        header = json.loads(_text(arrays, "header"))
+        header = json.loads(_text(_arrays(content, ["header"]), "header"))
         if header["kind"] != KIND:
             raise ValueError("another kind of file")
     except Exception:  # the packages that read archives raise errors of many types
-        raise InputError(f"{where}: not a trajectory, or damaged; give {_WRITTEN}") from None
+        raise damaged from None
+    # Another version may have other arrays.
     check_schema(where, "trajectory file", header.get("schema"), "take a version that reads it")
+    try:
+        arrays = _arrays(content)
+    except Exception:
+        raise damaged from None
     try:
         return _trajectory(arrays, header, where)
     except InputError as error:
@@ -83,12 +90,13 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
         raise InputError(f"{where}: a value is missing or damaged; give {_WRITTEN}") from None
 
 
-def _arrays(content: bytes) -> dict[str, Any]:
-    """Return the arrays in the content of a file by their names."""
+def _arrays(content: bytes, names: Sequence[str] = ()) -> dict[str, Any]:
+    """Return the arrays of some names in the content of a file, or all arrays if none is given."""
     found = {}
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         allowed = {f"{name}.npy" for name in (*TEXTS, *ROWS, AXES, *EVENTS)}
-        for each in archive.infolist():
+        entries = [archive.getinfo(f"{name}.npy") for name in names] or archive.infolist()
+        for each in entries:
             allowed.remove(each.filename)  # an error if the name is unknown, or occurs twice
             if each.compress_type != zipfile.ZIP_STORED or each.file_size > len(content):
                 raise ValueError("an entry is compressed")
@@ -162,10 +170,14 @@ def _events(arrays: dict[str, Any], width: int) -> tuple[list[Array] | None, lis
     if found != [("i8", (len(counts),)), ("f8", (n,)), ("f8", (n, width))]:
         raise ValueError("events of another type or shape")
     lengths = counts.tolist()
-    if min(lengths, default=0) < 0 or sum(lengths) != n:
+    if len(lengths) > _MOST_FUNCTIONS or min(lengths, default=0) < 0 or sum(lengths) != n:
         raise ValueError("other numbers of events")
     ends = list(itertools.accumulate(lengths))
     parts = [slice(end - length, end) for end, length in zip(ends, lengths, strict=True)]
+    for part in parts:
+        changes = np.diff(times[part])
+        if not (np.isfinite(times[part]).all() and ((changes >= 0).all() or (changes <= 0).all())):
+            raise ValueError("times of events that are not finite, or not in order")
     return [times[part] for part in parts], [states[part] for part in parts]
 
 

@@ -111,7 +111,7 @@ class Trajectory(Mechanics, Conversions):
         The solution as a function of time, if it was requested. It is not saved in a file.
     t_events : list of ndarray, or None
         For each function of events the times (s) of its events, in the order of `time`; None if no
-        events were requested. Events are not saved in a file.
+        events were requested.
     y_events : list of ndarray, or None
         For each function of events omega (rad/s), and the attitude if it was requested, with one
         row for each event: shape (k, 3) or (k, 7).

@@ -364,6 +364,14 @@ FOREIGN: dict[str, Callable[[], bytes]] = {
     "a negative number of events": _changed(**EVENT | {"event_counts": np.array([3, -1])}),
     "events without attitudes": _changed(**EVENT | {"event_states": np.zeros((2, 3))}),
     "an event without a state": _changed(**EVENT | {"event_states": np.zeros((1, 7))}),
+    "events at no time": _changed(**EVENT | {"event_times": np.array([0.5, np.nan])}),
+    "events in no order": _changed(
+        event_counts=np.array([3]), event_times=np.array([0.5, 0.7, 0.6]),
+        event_states=np.ones((3, 7)),
+    ),
+    "functions without number": _changed(
+        event_counts=np.zeros(20_000, "i8"), event_times=np.zeros(0), event_states=np.zeros((0, 7))
+    ),
     "an infinity of events": _changed(**EVENT | {"event_counts": np.array([1e300])}),
     "scene of numbers": _changed(scene=np.zeros(3)),
     "scene that is no TOML": _changed(scene="omega ="),
@@ -403,6 +411,15 @@ def test_foreign_file_is_refused_in_a_line(
     if not name.startswith("scene"):
         assert words.endswith("; give a file that Trajectory.save wrote")
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_file_of_another_version_is_not_called_damaged(tmp_path: Path) -> None:
+    """A later version may write other arrays."""
+    path = tmp_path / "found.npz"
+    header = json.dumps({"kind": "pyharness trajectory", "schema": 99})
+    path.write_bytes(_changed(header=header, another=np.zeros(3))())
+    with pytest.raises(InputError, match=r"99"):
+        load(path)
 
 
 def test_file_of_another_kind_or_size_is_refused_at_once(

@@ -11,7 +11,7 @@ module tape_powers
 
   integer, parameter :: MANY = 3                  ! factors
   integer, parameter :: MOST_FACTORS = 1000       ! that are counted
-  real(dp), parameter :: PART_OF_ORDER = 0.75_dp  ! largest mean order, over that of the series
+  real(dp), parameter :: PART_OF_ORDER = 0.6_dp  ! largest mean order, over that of the series
   real(dp), parameter :: SMALLEST = 1e-300_dp     ! whose logarithm is computed
 
   ! What is below exp(-INVISIBLE) changes no digit of a result, unless its factor is huge.
@@ -37,7 +37,9 @@ contains
     integer, intent(out) :: failed !! not 0 if there is not enough memory
     integer :: i, n
 
-    allocate (powers%factors(tape%n_slots), powers%scales(tape%n_slots), stat=failed)
+    allocate (powers%factors(tape%n_slots), stat=failed)
+    if (failed /= 0) return
+    allocate (powers%scales(tape%n_slots), stat=failed)
     if (failed /= 0) return
     powers%factors = 1
     powers%scales = -huge(powers%scales)
@@ -102,29 +104,29 @@ contains
     type(powers_t), intent(in) :: powers
     real(dp), intent(in) :: a(0:, :)   !! (terms, slots)
     real(dp), intent(in) :: factor
-    real(dp), allocatable :: logarithms(:), means(:) ! of the sums of absolute terms; mean orders
+    ! (2, slots): logarithm of the sum of the absolute terms, and their mean order
+    real(dp), allocatable :: shown(:, :)
     real(dp) :: largest
     integer :: failed, n
 
     resolving = factor
     if (powers%order == 0) return
-    allocate (logarithms(tape%n_slots), means(tape%n_slots), stat=failed)
+    allocate (shown(2, tape%n_slots), stat=failed)
     if (failed /= 0) resolving = 0.0_dp
     do while (resolving > 0.0_dp)
       do n = 1, tape%n_slots
         if (powers%factors(n) == 0) cycle
-        call measure(a(:order - 1, n), resolving, logarithms(n), means(n))
+        shown(:, n) = size_and_mean(a(:order - 1, n), resolving)
       end do
       largest = 0.0_dp
       do n = 1, tape%n_operations
         associate (first => tape%operations(2, n), second => tape%operations(3, n), &
                    out => tape%operations(4, n))
           if (tape%operations(1, n) /= PRODUCT .or. powers%factors(out) == 0) cycle
-          logarithms(out) = logarithms(first) + logarithms(second)
-          means(out) = means(first) + means(second)
-          if (logarithms(out) <= -INVISIBLE - powers%scales(out)) cycle
+          shown(:, out) = shown(:, first) + shown(:, second)
+          if (shown(1, out) <= -INVISIBLE - powers%scales(out)) cycle
           ! NaN must not be lost in the maximum.
-          if (.not. means(out) <= largest) largest = means(out)
+          if (.not. shown(2, out) <= largest) largest = shown(2, out)
         end associate
       end do
       largest = largest/(PART_OF_ORDER*order)
@@ -133,11 +135,11 @@ contains
     end do
   end function resolving
 
-  pure subroutine measure(terms, factor, logarithm_of_sum, mean)
-    !! Sum the terms of a slot, and the terms times their orders.
+  pure function size_and_mean(terms, factor)
+    !! Return the logarithm of the sum of the absolute terms, and their mean order.
     real(dp), intent(in) :: terms(0:)
     real(dp), intent(in) :: factor !! on the step
-    real(dp), intent(out) :: logarithm_of_sum, mean
+    real(dp) :: size_and_mean(2)
     real(dp) :: total, weighted
     integer :: k
 
@@ -147,9 +149,8 @@ contains
       weighted = factor*weighted + total
       total = factor*total + abs(terms(k))
     end do
-    logarithm_of_sum = logarithm(total)
-    mean = factor*weighted/max(SMALLEST, total)
-  end subroutine measure
+    size_and_mean = [logarithm(total), factor*weighted/max(SMALLEST, total)]
+  end function size_and_mean
 
   pure real(dp) function logarithm(x)
     real(dp), intent(in) :: x

@@ -40,7 +40,8 @@ class Taylor(OdeSolver):  # type: ignore[misc]
     fun : callable
         The right-hand side ``fun(t, y)``, where `t` is a number and `y` has shape (n,). It returns
         n numbers. Its arithmetic is + - * /, integer powers, and sqrt, sin, cos, tan, exp, sinh,
-        cosh and tanh of NumPy, without any branch that depends on `t` or `y`.
+        cosh and tanh of NumPy, without any branch that depends on `t` or `y`. Up to 20,000
+        operations are recorded.
     t0 : float
         The time of the initial state.
     y0 : array_like, shape (n,)
@@ -52,7 +53,8 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         roots of an event function within a step are missed, unless the step is made shorter.
     rtol, atol : float or array_like, shape (n,), optional
         Relative and absolute tolerances. The largest local error of component k of y in a step is
-        below ``atol[k] + rtol[k] * abs(y[k])``. Defaults are 1e-3 and 1e-6.
+        below ``atol[k] + rtol[k] * abs(y[k])``. A component that is 0 is compared with the largest
+        if `atol` is 0. Defaults are 1e-3 and 1e-6.
     vectorized : bool, optional
         Ignored, because `fun` is called only once.
     first_step : float, optional

@@ -68,8 +68,9 @@ class Recorder:
         """Return the slot of the result of `operation`, which is recorded if it is new."""
         if operation not in self._slots:
             if len(self._operations) == self._most:
+                most = self._most
                 raise InputError(
-                    f"{self.place}: more than {self._most} operations; use fewer, or a table"
+                    f"{self.place}: more than {most} operations; use fewer, or {self._instead}"
                 )
             self._slots[operation] = self._n_inputs + len(self._operations)
             self._operations.append(operation)
@@ -332,7 +333,7 @@ class Symbol:
 
     def __getattr__(self, name: str) -> Any:
         """Refuse functions that can't be recorded; NumPy looks them up by name."""
-        # The mean of an array asks for the `dtype` of the sum, and does without.
+        # The mean of an array does without the `dtype` of its sum.
         if name.startswith("_") or name == "dtype":
             raise AttributeError(name)
         raise self.recorder.refusal(f"{name} of the state")

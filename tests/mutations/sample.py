@@ -165,9 +165,16 @@ _BEGIN = {
     text_source.FORTRAN: re.compile(
         r"^\s*(?!end )[\w() =,]*?\b(?:subroutine|function) (\w+)", re.I
     ),
-    text_source.C: re.compile(r"^(?:[\w*]+ )+\*?(\w+)\([^;]*$"),
+    text_source.C: re.compile(r"^(?:[\w*]+ )+\*?(?:OF_LEVEL\()?(\w+)(?:, LEVEL\))?\([^;]*$"),
     text_source.JAVASCRIPT: re.compile(r"^(?:export )?function (\w+)"),
 }
+
+
+def functions_in(file: str) -> set[str]:
+    """Return the names of all functions in a file that is not in Python."""
+    text, language = (ROOT / file).read_text(), language_of(file)
+    lines = text_source.blanked(text, language).split("\n")
+    return {found[1].lower() for each in lines if (found := _BEGIN[language].match(each))}
 
 
 def _other_function(text: str, line: int, language: str) -> str | None:

@@ -178,6 +178,24 @@ def test_tests_of_a_module_that_is_compiled_for_each_instruction_set_are_near(
     assert [each.name for each in near(mutation, [other, entered])] == ["a"]
 
 
+@pytest.mark.parametrize(
+    ("file", "function", "entered"),
+    [
+        ("tape_step.f90", "step_tape", ":step_tape_avx512"),
+        # A function that is inlined, and therefore entered by no test.
+        ("tape_step.f90", "is_continued", ":step_tape_plain"),
+        ("tape_terms.c", "expand_tape", ":expand_tape_avx2"),
+    ],
+)
+def test_tests_of_a_function_with_the_name_of_an_instruction_set_are_near(
+    file: str, function: str, entered: str
+) -> None:
+    changes = mutations(f"fortran/modern/{file}")
+    mutation = next(each for each in changes if each.function() == function)
+    checks = [Check("a", 1.0, frozenset({entered})), Check("b", 1.0, frozenset({":weigh"}))]
+    assert [each.name for each in near(mutation, checks)] == ["a"]
+
+
 def test_planted_mutations_and_their_tests_are_there() -> None:
     """The mutations of `--ci`; if a line changes, choose another one that a short test catches."""
     for file, id, test in PLANTED:

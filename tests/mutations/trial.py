@@ -2,11 +2,12 @@
 
 import re
 import sys
+from collections.abc import Set
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
 from tests.mutations.reach import PYTEST, Check, command_of, files_of_tests
-from tests.mutations.sample import Mutation
+from tests.mutations.sample import Mutation, functions_in
 from tests.mutations.tree import ROOT, Tree
 
 # Recorded time of the tests of the changed file that are run first; of the first tier of other
@@ -15,6 +16,7 @@ from tests.mutations.tree import ROOT, Tree
 OWN, FIRST, SECOND, VERIFY = 10.0, 20.0, 60.0, 60.0  # s
 # Tests that passed without a mutation since the run began.
 _PASS: set[str] = set()
+_LEVEL = re.compile("_(plain|avx2|avx512)$")
 # A trial may take this many times its recorded time, and some seconds to start.
 SLOWER, START = 6.0, 60.0  # s
 
@@ -93,20 +95,23 @@ def near(mutation: Mutation, checks: list[Check]) -> list[Check]:
     else:
         # A module that is expanded for each instruction set has its library's name after its own.
         found = re.search(r"^\s*module (\w+?)_?(?:\$|$)", (ROOT / mutation.file).read_text(), re.M)
-        modules = (
-            {f"{found[1].lower()}{of}" for of in ("", "_bodies", "_hot", "_many", "_tapes")}
-            if found
-            else set()
-        )
-        ends = {f"{module}:{function}" for module in (*modules, "")}
-        entered = [each for each in checks if not ends.isdisjoint(each.functions)]
+        libraries = ("", "_bodies", "_hot", "_many", "_tapes")
+        modules = {f"{found[1].lower()}{of}" for of in libraries} if found else set()
+        entered = _entering({function}, modules, checks)
         if not entered:
-            entered = [e for e in checks if modules & {n.partition(":")[0] for n in e.functions}]
+            entered = _entering(functions_in(mutation.file), modules, checks)
         mention = re.compile(rf"\btest_{stem}\b")
     named = {path for path in files_of_tests() if mention.search(path + (ROOT / path).read_text())}
     chosen = {each.name for each in entered}
     more = [e for e in checks if e.name.partition("::")[0] in named and e.name not in chosen]
     return [each for group in (entered, more) for each in sorted(group, key=lambda e: e.seconds)]
+
+
+def _entering(functions: Set[str | None], modules: set[str], checks: list[Check]) -> list[Check]:
+    """Return the checks that enter one of some compiled functions."""
+    ends = {f"{module}:{function}" for module in (*modules, "") for function in functions}
+    # A function that C calls has the name of its instruction set after its own.
+    return [e for e in checks if not ends.isdisjoint(_LEVEL.sub("", n) for n in e.functions)]
 
 
 def _tiers(mutation: Mutation, checks: list[Check]) -> list[list[Check]]:

@@ -70,10 +70,19 @@ def _by_tape(scene: Scene, state: Sequence[Any]) -> list[Any]:
             "heyoka can't evaluate an opaque torque; allowed: a torque that can be recorded"
         )
 
+    # The inputs without attitude are not read.
+    inputs = [heyoka.time, *state, *[None] * (7 - len(state))]
+    return evaluate(system_of(scene, scene.attitude is not None), inputs, heyoka_functions())
+
+
+def heyoka_functions() -> Functions[Any]:
+    """Return the functions with which a tape is evaluated in the arithmetic of heyoka."""
+    import heyoka
+
     def table(_: Table, time: Any) -> Any:
         raise InputError("heyoka can't evaluate a table; allowed: a torque without tables")
 
-    functions: Functions[Any] = Functions(
+    return Functions(
         heyoka.expression,
         heyoka.sqrt,
         heyoka.exp,
@@ -82,6 +91,3 @@ def _by_tape(scene: Scene, state: Sequence[Any]) -> list[Any]:
         heyoka.cos,
         table,
     )
-    # The inputs without attitude are not read.
-    inputs = [heyoka.time, *state, *[None] * (7 - len(state))]
-    return evaluate(system_of(scene, scene.attitude is not None), inputs, functions)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
+from pyharness.methods.recorded import kernel_tape
 from pyharness.methods.taylor_step import LONGEST_TRIAL, Step, taylor_step
 from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
 from pyharness.model.errors import InputError
@@ -81,8 +82,8 @@ class Stepper:
 
     # Another name that is set, such as `torque`, is an error.
     __slots__ = (
-        "_begin", "_breaks", "_largest", "_last", "_n", "_scene", "_state", "_tape", "_tolerance",
-        "_trial", "steps", "time",
+        "_begin", "_breaks", "_largest", "_last", "_n", "_packed", "_scene", "_state", "_tape",
+        "_tolerance", "_trial", "steps", "time",
     )  # fmt: skip
 
     def __init__(
@@ -180,7 +181,7 @@ class Stepper:
             tolerances[3 : self._n] = 0.5 * self._tolerance
             trial = math.copysign(min(self._trial, abs(longest)), longest)
             taken = taylor_step(
-                self._tape, self.time, self._state, tolerances, self._tolerance, trial, longest
+                self._packed, self.time, self._state, tolerances, self._tolerance, trial, longest
             )
             if taken.h == 0.0:
                 raise ArithmeticError(f"no step is short enough at t = {self.time:g} s")
@@ -236,6 +237,7 @@ class Stepper:
         if torque.needs_attitude and self._n == 3:
             raise InputError("the torque depends on the attitude; give attitude=True")
         self._tape = _equations(scene, torque.tape, self._n == 7)
+        self._packed = kernel_tape(self._tape)
         tables = [each.table for each in self._tape.operations if each.table is not None]
         self._breaks = sorted({time for table in tables for time in table.breaks[1:]})
         self._scene = scene

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 from scipy.integrate import DenseOutput, OdeSolver
 
+from pyharness.methods.recorded import kernel_tape
 from pyharness.methods.taylor_step import LONGEST_TRIAL, taylor_step
 from pyharness.model.errors import InputError
 from pyharness.model.symbols import Recorder, called_once
@@ -101,7 +102,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
             names = ", ".join(f"`{name}`" for name in extraneous)
             warnings.warn(f"the method Taylor ignores {names}", stacklevel=3)
         super().__init__(fun, t0, y0, t_bound, vectorized)
-        self._tape = recorded_equation(fun, self.n)
+        self._tape = kernel_tape(recorded_equation(fun, self.n))
         self.nfev = 1
         self.max_step = _positive("max_step", max_step)
         self.rtol, self.atol = _tolerances(rtol, atol, self.n)
@@ -138,7 +139,9 @@ class Taylor(OdeSolver):  # type: ignore[misc]
 
     def _scale(self) -> Array:
         sizes = np.abs(self.y)
-        scale = self.atol + self.rtol * sizes
+        scale: Array = self.atol + self.rtol * sizes
+        if scale.min(initial=math.inf) >= _LEAST_SCALE:
+            return scale
         # Without an absolute tolerance, a component that is 0 is compared with the largest.
         missing = float(self.rtol.min()) * float(sizes.max(initial=0.0)) or 1.0
         return np.maximum(np.where(scale > 0.0, scale, missing), _LEAST_SCALE)

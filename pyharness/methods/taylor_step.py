@@ -2,9 +2,7 @@
 
 from typing import NamedTuple
 
-from pyharness.methods.recorded import kernel_tape
 from pyharness.model.extension import COMPLETE, extension
-from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Array
 
 # The largest order, of fortran/modern/tape_series.f90, plus 1.
@@ -29,7 +27,7 @@ class Step(NamedTuple):
 
 
 def taylor_step(
-    tape: Tape,
+    tape: Array,
     t: float,
     state: Array,
     tolerances: Array,
@@ -39,13 +37,13 @@ def taylor_step(
 ) -> Step:
     """Return a step of the equation y' = tape(t, y) from the time `t` and the state, shape (n,).
 
-    The step is as long as `tolerances` allow, shape (n,): the largest errors of the components in
-    this step. `relative` is the relative tolerance that decides the order. `trial` is a first guess
-    of the step, with the sign of `longest`, the longest step that is allowed. A step as long as
-    that ends at t + longest, which is rounded.
+    `tape` is the array that `kernel_tape` returns. The step is as long as `tolerances` allow, shape
+    (n,): the largest errors of the components in this step. `relative` is the relative tolerance
+    that decides the order. `trial` is a first guess of the step, with the sign of `longest`, the
+    longest step that is allowed. A step as long as that ends at t + longest, which is rounded.
     """
     h, terms, end, order, expansions, status = extension().tape_step(
-        kernel_tape(tape), t, state, tolerances, relative, trial, longest, _N_TERMS
+        tape, t, state, tolerances, relative, trial, longest, _N_TERMS
     )
     if status != COMPLETE:
         h = 0.0

@@ -220,13 +220,15 @@ def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.Monk
         (off_by_one_bit, "runge-kutta corrected: Fortran and twin differ in omega"),
         (
             wrong,
-            "runge-kutta corrected: does not converge to the reference as the step is halved",
+            "runge-kutta corrected: does not converge to the reference as the step is halved: "
+            "order",
         ),
     ):
         monkeypatch.setattr(Program, "run", planted)
         found = compare_programs(case_scene(3), [Listing.corrected("runge-kutta")])
         assert len(found.unexpected) == 1
         assert found.unexpected[0].startswith(words)
+        assert found.unexpected[0].endswith(", due 4") == (planted is wrong)
         assert found.programs[0].ulps == (planted is off_by_one_bit)
         assert "UNEXPECTED" in _text(found)
 

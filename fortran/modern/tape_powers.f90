@@ -39,26 +39,44 @@ contains
 
     allocate (powers%factors(tape%n_slots), stat=failed)
     if (failed /= 0) return
+    powers%factors = 1
+    do n = 1, tape%n_operations
+      associate (first => tape%operations(2, n), second => tape%operations(3, n), &
+                 factors => powers%factors(tape%operations(4, n)))
+        if (tape%operations(1, n) == PRODUCT) then
+          factors = min(MOST_FACTORS, powers%factors(first) + powers%factors(second))
+        else if (tape%operations(1, n) == LINEAR) then
+          do i = tape%starts(first), tape%starts(first + 1) - 1
+            factors = max(factors, powers%factors(tape%slots(i)))
+          end do
+        end if
+      end associate
+    end do
+    ! Most torques have no such product, and need nothing else.
+    if (maxval(powers%factors) < MANY) return
     allocate (powers%scales(tape%n_slots), stat=failed)
     if (failed /= 0) return
-    powers%factors = 1
-    powers%scales = -huge(powers%scales)
+    call find_scales(tape, powers%scales)
+    call keep_many(tape, powers)
+  end subroutine find_powers
+
+  pure subroutine find_scales(tape, scales)
+    !! Find the logarithm of the largest coefficient with which each slot is added to others, or 0
+    !! where it is the argument of a function; -huge if it is a factor of products alone.
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(out) :: scales(:) !! (slots)
+    integer :: i, n
+
+    scales = -huge(scales)
     do i = 1, size(tape%slots)
-      associate (scale => powers%scales(tape%slots(i)))
+      associate (scale => scales(tape%slots(i)))
         scale = max(scale, logarithm(abs(tape%coefficients(i))))
       end associate
     end do
     do n = 1, tape%n_operations
-      associate (first => tape%operations(2, n), second => tape%operations(3, n), &
-                 factors => powers%factors(tape%operations(4, n)), scales => powers%scales)
+      associate (first => tape%operations(2, n), second => tape%operations(3, n))
         select case (tape%operations(1, n))
-        case (PRODUCT)
-          factors = min(MOST_FACTORS, powers%factors(first) + powers%factors(second))
-        case (LINEAR)
-          do i = tape%starts(first), tape%starts(first + 1) - 1
-            factors = max(factors, powers%factors(tape%slots(i)))
-          end do
-        case (TABLE)
+        case (PRODUCT, LINEAR, TABLE)
           cycle
         case (QUOTIENT)
           scales(first) = max(0.0_dp, scales(first))
@@ -68,8 +86,7 @@ contains
         end select
       end associate
     end do
-    call keep_many(tape, powers)
-  end subroutine find_powers
+  end subroutine find_scales
 
   pure subroutine keep_many(tape, powers)
     !! Set the number of factors of all others than products of many factors, and their factors, to

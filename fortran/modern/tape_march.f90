@@ -9,7 +9,7 @@ module tape_march
   use step_limit, only: check_steps, limit_of, step_limit_t
   use tape, only: FIRST_UNKNOWN, next_break, tape_t, TIME_SLOT
   use tape_growth, only: begin, count_step, growth_of, MOST_UNKNOWNS, transitions_t
-  use tape_plan, only: converging, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
+  use tape_plan, only: converge, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
                        MOST_TRIES, order_for
   use tape_series, only: derivatives_at, expand, noise_of, perturb_tape, series_t, SIDE_BY_SIDE, &
                          sum_perturbations, VARIATION_TOLERANCE
@@ -148,7 +148,7 @@ contains
                                is_short)
       ! Perturbations may change faster than the motion, as about a steady rotation.
       if (is_short /= 0) factor = factor*fitting_lanes()
-      factor = converging(tape, s%order, s%powers, s%a, factor)
+      call converge(tape, s%order, max(scale, LEAST_SCALE), s%a, s%powers, factor)
       arrives = abs(factor*s%h) >= abs(to_stop)*(1.0_dp - epsilon(s%h))
       if (arrives) factor = to_stop/s%h
       at_end = arrives .and. .not. abs(break_time) < abs(t_end)

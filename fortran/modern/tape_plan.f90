@@ -3,7 +3,7 @@ module tape_plan
   use kinds, only: dp
   use operations, only: EXPONENTIAL => EXP, QUOTIENT, SQUARE_ROOT => SQRT, TANGENT => TANH
   use tape, only: FIRST_UNKNOWN, tape_t
-  use tape_powers, only: INVISIBLE, powers_t, resolving
+  use tape_powers, only: INVISIBLE, powers_t, resolve
   use tape_series, only: LAST_TERM, MOST_ORDER
   implicit none(type, external)
   private
@@ -15,7 +15,7 @@ module tape_plan
   real(dp), parameter, public :: LEAST_LOCAL_TOLERANCE = 1e-18_dp ! below rounding
   real(dp), parameter :: WITHIN_CIRCLE = 0.9_dp ! part of the distance of a zero
 
-  public :: converging, fitting, local_tolerance_of, order_for
+  public :: converge, fitting, local_tolerance_of, order_for
 
 contains
 
@@ -49,35 +49,35 @@ contains
     end do
   end function fitting
 
-  pure real(dp) function converging(tape, order, powers, a, factor)
-    !! Return the factor on the step, reduced so that the series of every operation converges.
-    !! The last terms of the unknowns alone do not show it: an exponential may be so small at the
-    !! beginning of a step that it changes no digit, and large a little later. Its argument
-    !! therefore changes by at most half the order, unless the exponential stays invisible; the
-    !! terms of its series then decrease before the last. The derivative of a hyperbolic tangent is
-    !! such a pulse too. A divisor, and the argument of a square root, has no zero in the circle
-    !! around the beginning of the step. Products of many factors are in `tape_powers`.
+  pure subroutine converge(tape, order, smallest, a, powers, factor)
+    !! Reduce the factor on the step so that the series of every operation converges. The last terms
+    !! of the unknowns alone do not show it: an exponential may be so small at the beginning of a
+    !! step that it changes no digit, and large a little later. Its argument therefore changes by at
+    !! most half the order, unless the exponential stays invisible; the terms of its series then
+    !! decrease before the last. The derivative of a hyperbolic tangent is such a pulse too. A
+    !! divisor, and the argument of a square root, has no zero in the circle around the beginning of
+    !! the step. Products of many factors are in `tape_powers`.
     type(tape_t), intent(in) :: tape
     integer, intent(in) :: order
-    type(powers_t), intent(in) :: powers
+    real(dp), intent(in) :: smallest !! unknown that matters
     real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots)
-    real(dp), intent(in) :: factor
+    type(powers_t), intent(inout) :: powers
+    real(dp), intent(inout) :: factor
     integer :: n
 
-    converging = resolving(tape, order, powers, a, factor)
+    call resolve(tape, order, smallest, a, powers, factor)
     do n = 1, tape%n_operations
       associate (first => tape%operations(2, n), second => tape%operations(3, n))
         select case (tape%operations(1, n))
         case (EXPONENTIAL)
-          converging = limited(first, max(0.5_dp*order, -a(0, first) - INVISIBLE), converging)
+          factor = limited(first, max(0.5_dp*order, -a(0, first) - INVISIBLE), factor)
         case (TANGENT)
           ! The derivative decreases as exp(-2 abs(x)).
-          converging = limited(first, max(0.25_dp*order, abs(a(0, first)) - 0.5_dp*INVISIBLE), &
-                               converging)
+          factor = limited(first, max(0.25_dp*order, abs(a(0, first)) - 0.5_dp*INVISIBLE), factor)
         case (QUOTIENT)
-          converging = limited(second, WITHIN_CIRCLE*abs(a(0, second)), converging)
+          factor = limited(second, WITHIN_CIRCLE*abs(a(0, second)), factor)
         case (SQUARE_ROOT)
-          converging = limited(first, WITHIN_CIRCLE*a(0, first), converging)
+          factor = limited(first, WITHIN_CIRCLE*a(0, first), factor)
         case default
           cycle
         end select
@@ -86,15 +86,15 @@ contains
 
   contains
 
-    pure real(dp) function limited(slot, most, factor)
+    pure real(dp) function limited(slot, most, whole)
       !! Return the factor, reduced until a slot changes by at most `most` in the step's circle.
       integer, intent(in) :: slot
       real(dp), intent(in) :: most
-      real(dp), intent(in) :: factor
+      real(dp), intent(in) :: whole
       real(dp) :: change
       integer :: k
 
-      limited = factor
+      limited = whole
       do
         change = 0.0_dp
         do k = order - 1, 1, -1
@@ -107,7 +107,7 @@ contains
       end do
     end function limited
 
-  end function converging
+  end subroutine converge
 
   pure integer function order_for(local_tolerance, powers)
     !! Return the order with the least work for the requested digits (Jorba and Zou 2005), or the

@@ -4,7 +4,7 @@ module tape_powers
   !! therefore so short that the mean order of a product's terms is below that of the series, unless
   !! the product stays invisible. The mean order of a product is the sum of those of its factors.
   use kinds, only: dp
-  use operations, only: LINEAR, PRODUCT, QUOTIENT, TABLE
+  use operations, only: LINEAR, PRODUCT, QUOTIENT, SQUARE_ROOT => SQRT, TABLE
   use tape, only: tape_t
   implicit none(type, external)
   private
@@ -12,9 +12,12 @@ module tape_powers
   integer, parameter :: MANY = 3                  ! factors
   integer, parameter :: MOST_FACTORS = 1000       ! that are counted
   real(dp), parameter :: PART_OF_ORDER = 0.6_dp  ! largest mean order, over that of the series
-  real(dp), parameter :: SMALLEST = 1e-300_dp     ! whose logarithm is computed
+  real(dp), parameter :: LEAST_NUMBER = 1e-300_dp ! whose logarithm is computed
 
-  ! What is below exp(-INVISIBLE) changes no digit of a result, unless its factor is huge.
+  integer, parameter :: NONE = 0, SEVERAL = huge(1) ! divisors
+
+  ! What is below exp(-INVISIBLE), relative to the unknowns or to a divisor, changes no digit of a
+  ! result, unless its factor is huge.
   real(dp), parameter, public :: INVISIBLE = 100.0_dp
 
   type, public :: powers_t
@@ -23,10 +26,16 @@ module tape_powers
     ! (slots): logarithm of the largest coefficient with which a product of many factors is added
     ! to others; -huge if it is a factor of other products alone
     real(dp), allocatable :: scales(:)
-    integer :: order = 0 !! that shows the products where a factor or its first derivative is 0
+    ! (slots): the divisor, or the argument of a square root, that the slot is a part of
+    integer, allocatable :: divisors(:)
+    real(dp), allocatable :: least(:) !! (slots): logarithm of the least product that matters
+    ! (2, slots): logarithm of the sum of the absolute terms, and their mean order
+    real(dp), allocatable :: shown(:, :)
+    ! that shows the products of few factors where a factor and its first derivative are 0
+    integer :: order = 0
   end type powers_t
 
-  public :: find_powers, resolving
+  public :: find_powers, resolve
 
 contains
 
@@ -56,7 +65,14 @@ contains
     if (maxval(powers%factors) < MANY) return
     allocate (powers%scales(tape%n_slots), stat=failed)
     if (failed /= 0) return
+    allocate (powers%divisors(tape%n_slots), stat=failed)
+    if (failed /= 0) return
+    allocate (powers%least(tape%n_slots), stat=failed)
+    if (failed /= 0) return
+    allocate (powers%shown(2, tape%n_slots), stat=failed)
+    if (failed /= 0) return
     call find_scales(tape, powers%scales)
+    call find_divisors(tape, powers%divisors)
     call keep_many(tape, powers)
   end subroutine find_powers
 
@@ -88,6 +104,45 @@ contains
     end do
   end subroutine find_scales
 
+  pure subroutine find_divisors(tape, divisors)
+    !! Find the divisor of the quotient that each slot is a part of, as in x**20/(k + x**20), where
+    !! x**20 may be as small as k. The argument of a square root has the same role.
+    type(tape_t), intent(in) :: tape
+    integer, intent(out) :: divisors(:) !! (slots)
+    integer :: i, n
+
+    divisors = NONE
+    do n = tape%n_operations, 1, -1
+      associate (first => tape%operations(2, n), second => tape%operations(3, n), &
+                 of_result => divisors(tape%operations(4, n)))
+        select case (tape%operations(1, n))
+        case (QUOTIENT)
+          divisors(first) = merged(divisors(first), second)
+          divisors(second) = merged(divisors(second), second)
+        case (SQUARE_ROOT)
+          divisors(first) = merged(divisors(first), first)
+        case (PRODUCT)
+          divisors(first) = merged(divisors(first), of_result)
+          divisors(second) = merged(divisors(second), of_result)
+        case (LINEAR)
+          do i = tape%starts(first), tape%starts(first + 1) - 1
+            divisors(tape%slots(i)) = merged(divisors(tape%slots(i)), of_result)
+          end do
+        case default
+          cycle
+        end select
+      end associate
+    end do
+  end subroutine find_divisors
+
+  pure integer function merged(one, other)
+    !! Return the divisor of a slot that is a part of two quotients.
+    integer, intent(in) :: one, other
+
+    merged = max(one, other)
+    if (one /= NONE .and. other /= NONE .and. one /= other) merged = SEVERAL
+  end function merged
+
   pure subroutine keep_many(tape, powers)
     !! Set the number of factors of all others than products of many factors, and their factors, to
     !! 0.
@@ -114,43 +169,55 @@ contains
     where (.not. is_part) powers%factors = 0
   end subroutine keep_many
 
-  pure real(dp) function resolving(tape, order, powers, a, factor)
-    !! Return the factor on the step, reduced so that products of many factors are resolved.
+  pure subroutine resolve(tape, order, smallest, a, powers, factor)
+    !! Reduce the factor on the step so that products of many factors are resolved.
     type(tape_t), intent(in) :: tape
     integer, intent(in) :: order
-    type(powers_t), intent(in) :: powers
-    real(dp), intent(in) :: a(0:, :)   !! (terms, slots)
-    real(dp), intent(in) :: factor
-    ! (2, slots): logarithm of the sum of the absolute terms, and their mean order
-    real(dp), allocatable :: shown(:, :)
-    real(dp) :: largest
-    integer :: failed, n
+    real(dp), intent(in) :: smallest !! unknown that matters
+    real(dp), intent(in) :: a(0:, :) !! (terms, slots)
+    type(powers_t), intent(inout) :: powers
+    real(dp), intent(inout) :: factor
+    real(dp) :: largest, visible
+    integer :: n
 
-    resolving = factor
     if (powers%order == 0) return
-    allocate (shown(2, tape%n_slots), stat=failed)
-    if (failed /= 0) resolving = 0.0_dp
-    do while (resolving > 0.0_dp)
+    visible = min(0.0_dp, logarithm(smallest)) - INVISIBLE
+    do n = 1, tape%n_slots
+      associate (divisor => powers%divisors(n), least => powers%least(n))
+        least = visible
+        if (divisor == SEVERAL) then
+          least = log(LEAST_NUMBER)
+        else if (divisor /= NONE) then
+          least = min(visible, logarithm(abs(a(0, divisor))) - INVISIBLE)
+        end if
+        least = max(log(LEAST_NUMBER), least) - powers%scales(n)
+      end associate
+    end do
+    do while (factor > 0.0_dp)
       do n = 1, tape%n_slots
-        if (powers%factors(n) == 0) cycle
-        shown(:, n) = size_and_mean(a(:order - 1, n), resolving)
+        if (powers%factors(n) > 0) powers%shown(:, n) = size_and_mean(a(:order - 1, n), factor)
       end do
       largest = 0.0_dp
       do n = 1, tape%n_operations
         associate (first => tape%operations(2, n), second => tape%operations(3, n), &
-                   out => tape%operations(4, n))
+                   out => tape%operations(4, n), shown => powers%shown)
           if (tape%operations(1, n) /= PRODUCT .or. powers%factors(out) == 0) cycle
           shown(:, out) = shown(:, first) + shown(:, second)
-          if (shown(1, out) <= -INVISIBLE - powers%scales(out)) cycle
           ! NaN must not be lost in the maximum.
-          if (.not. shown(2, out) <= largest) largest = shown(2, out)
+          if (shown(1, out) > powers%least(out) .and. .not. shown(2, out) <= largest) then
+            largest = shown(2, out)
+          end if
         end associate
       end do
       largest = largest/(PART_OF_ORDER*order)
       if (largest <= 1.0_dp) return
-      resolving = resolving*max(0.5_dp, min(0.9_dp, 1.0_dp/largest))
+      if (largest <= 2.0_dp) then
+        factor = factor*min(0.9_dp, 1.0_dp/largest)
+      else
+        factor = 0.5_dp*factor
+      end if
     end do
-  end function resolving
+  end subroutine resolve
 
   pure function size_and_mean(terms, factor)
     !! Return the logarithm of the sum of the absolute terms, and their mean order.
@@ -166,13 +233,13 @@ contains
       weighted = factor*weighted + total
       total = factor*total + abs(terms(k))
     end do
-    size_and_mean = [logarithm(total), factor*weighted/max(SMALLEST, total)]
+    size_and_mean = [logarithm(total), factor*weighted/max(LEAST_NUMBER, total)]
   end function size_and_mean
 
   pure real(dp) function logarithm(x)
     real(dp), intent(in) :: x
 
-    logarithm = log(max(SMALLEST, x))
+    logarithm = log(max(LEAST_NUMBER, x))
   end function logarithm
 
 end module tape_powers

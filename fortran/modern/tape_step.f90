@@ -5,7 +5,7 @@ module tape_step
   use problem, only: step_request_t, step_t
   use statuses, only: COMPLETE, OVERFLOW
   use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
-  use tape_plan, only: converging, fitting, MOST_TRIES, order_for
+  use tape_plan, only: converge, fitting, MOST_TRIES, order_for
   use tape_series, only: allocate_series, derivatives_at, expand, noise_of, series_t
   implicit none(type, external)
   private
@@ -16,6 +16,8 @@ module tape_step
   ! in tolerances, and over the rounding errors.
   real(dp), parameter :: MOST_DEFECT = 1.0_dp
   real(dp), parameter :: MOST_ROUNDING = 1e3_dp
+  ! Tolerance whose reciprocal is a number.
+  real(dp), parameter :: LEAST_TOLERANCE = 2.0_dp**(-1000)
 
   public :: step_tape
 
@@ -30,7 +32,7 @@ contains
     type(step_request_t), pointer :: request
     type(step_t), pointer :: step
     real(dp), allocatable, target :: memory(:)
-    real(dp), allocatable :: weights(:)
+    real(dp), allocatable :: tolerances(:)
     type(series_t) :: s
     real(dp) :: factor
     integer :: failed, i, k
@@ -44,9 +46,9 @@ contains
     step%expansions = 0
     call allocate_series(tape, .false., memory, s, fits)
     if (.not. fits) return
-    allocate (weights(tape%n_unknowns), stat=failed)
+    allocate (tolerances(tape%n_unknowns), stat=failed)
     if (failed /= 0) return
-    weights = 1.0_dp/request%tolerances
+    tolerances = max(LEAST_TOLERANCE, request%tolerances)
     s%order = order_for(LOCAL_TOLERANCE*request%relative, s%powers)
     step%order = s%order
     s%h = request%trial
@@ -61,14 +63,15 @@ contains
       s%a(0, FIRST_UNKNOWN:FIRST_UNKNOWN + tape%n_unknowns - 1) = request%state
       call expand(tape, 0.0_dp, .false., s)
       step%expansions = step%expansions + 1
-      factor = fitting(tape, s%order, LOCAL_TOLERANCE, weights, s%a)
+      factor = fitting(tape, s%order, LOCAL_TOLERANCE, 1.0_dp/tolerances, s%a)
       if (.not. factor > 0.0_dp) then
         ! The terms are not finite.
         s%h = 0.0625_dp*s%h
         cycle
       end if
       if (is_rejected) factor = min(1.0_dp, factor)
-      factor = converging(tape, s%order, s%powers, s%a, min(factor, request%longest/s%h))
+      factor = min(factor, request%longest/s%h)
+      call converge(tape, s%order, minval(tolerances), s%a, s%powers, factor)
       step%h = factor*s%h
       ! The quotient of the two was rounded.
       if (abs(step%h) >= (1.0_dp - 4.0_dp*epsilon(s%h))*abs(request%longest)) then
@@ -114,13 +117,13 @@ contains
       call derivatives_at(tape, [request%t + step%h, 0.0_dp], step%state, -s%h, s, derivatives)
       call noise_of(tape, s, noise, abs(step%state))
       ! NaN is not allowed.
-      is_continued = all(abs(step%h*derivatives - slope) <= MOST_DEFECT*request%tolerances &
+      is_continued = all(abs(step%h*derivatives - slope) <= MOST_DEFECT*tolerances &
                          + MOST_ROUNDING*epsilon(s%h)*(sizes + abs(step%h)*noise)) &
                      .and. all(abs(step%state) <= huge(s%h))
       ! Large terms that cancel are rounded, and a shorter step has smaller terms.
       allowed = MOST_ROUNDING*epsilon(s%h)*max(abs(request%state), abs(step%state))
       is_continued = is_continued &
-                     .and. all(epsilon(s%h)*sizes <= max(request%tolerances, allowed))
+                     .and. all(epsilon(s%h)*sizes <= max(tolerances, allowed))
     end function is_continued
 
   end subroutine step_tape

@@ -4,7 +4,7 @@ The command is ``python -m tests.methods.time_ivp``. For ten textbook problems, 
 tolerances 1e-6, 1e-9 and 1e-12 (rtol and atol), the table has the largest error of a component at
 the end over the largest component, and the run time, which is the least of several calls of all in
 turn. If heyoka is installed, its integrators get the same operations. They are compiled before the
-time is measured; the last column has the time of this.
+time is measured. The last column has the time of this, if heyoka's cache on the disk is empty.
 """
 
 import importlib.util

@@ -26,11 +26,18 @@ from pyharness.model.schema import check_schema
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape_record import tape_of
 from pyharness.model.trajectory import ENDINGS, STOP_VARIABLES, Array, Stop, Trajectory
-from pyharness.model.trajectory_file import AXES, EVENTS, KIND, ROWS, TEXTS, checked_path
+from pyharness.model.trajectory_file import (
+    AXES,
+    EVENTS,
+    KIND,
+    MOST_FUNCTIONS,
+    ROWS,
+    TEXTS,
+    checked_path,
+)
 from pyharness.model.values import three_floats
 
 _WRITTEN = "a file that Trajectory.save wrote"
-_MOST_FUNCTIONS = 10_000  # of events; each has arrays of its own
 _CHANGING = {each.place: each for each in (ChangingMoments, ChangingInertia)}
 
 
@@ -139,7 +146,7 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
         raise ValueError("no omega, or axes of another type or shape")
     if header["ended"] not in ENDINGS:
         raise ValueError("an unknown ending")
-    t_events, y_events = _events(arrays, 3 if rows["attitude"] is None else 7)
+    t_events, y_events = _events(arrays, rows["time"], 3 if rows["attitude"] is None else 7)
     scene = None
     if header["scene"] is not None:
         scene = _scene(_text(arrays, "scene"), header["scene"], where)
@@ -160,7 +167,9 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
     )
 
 
-def _events(arrays: dict[str, Any], width: int) -> tuple[list[Array] | None, list[Array] | None]:
+def _events(
+    arrays: dict[str, Any], rows: Array, width: int
+) -> tuple[list[Array] | None, list[Array] | None]:
     """Return the times of the events of each function, and the states there, or None twice."""
     if not any(name in arrays for name in EVENTS):
         return None, None
@@ -170,14 +179,16 @@ def _events(arrays: dict[str, Any], width: int) -> tuple[list[Array] | None, lis
     if found != [("i8", (len(counts),)), ("f8", (n,)), ("f8", (n, width))]:
         raise ValueError("events of another type or shape")
     lengths = counts.tolist()
-    if len(lengths) > _MOST_FUNCTIONS or min(lengths, default=0) < 0 or sum(lengths) != n:
+    if len(lengths) > MOST_FUNCTIONS or min(lengths, default=0) < 0 or sum(lengths) != n:
         raise ValueError("other numbers of events")
     ends = list(itertools.accumulate(lengths))
     parts = [slice(end - length, end) for end, length in zip(ends, lengths, strict=True)]
-    for part in parts:
-        changes = np.diff(times[part])
-        if not (np.isfinite(times[part]).all() and ((changes >= 0).all() or (changes <= 0).all())):
-            raise ValueError("times of events that are not finite, or not in order")
+    if not np.isfinite(times).all():
+        raise ValueError("times of events that are not finite")
+    # The motion begins at time 0, and a terminal event may be before the first row.
+    away = rows[-1] - rows[0] if len(rows) > 1 else rows.sum() or times.sum()
+    if any((np.diff(math.copysign(1.0, away) * times[part]) < 0.0).any() for part in parts):
+        raise ValueError("times of events that are not in order")
     return [times[part] for part in parts], [states[part] for part in parts]
 
 

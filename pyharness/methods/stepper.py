@@ -82,15 +82,15 @@ class Stepper:
 
     # Another name that is set, such as `torque`, is an error.
     __slots__ = (
-        "_begin", "_breaks", "_largest", "_last", "_n", "_packed", "_scene", "_state", "_tape",
-        "_tolerance", "_trial", "steps", "time",
+        "_begin", "_breaks", "_largest", "_last", "_n", "_packed", "_scene", "_state", "_steps",
+        "_tape", "_time", "_tolerance", "_trial",
     )  # fmt: skip
 
     def __init__(
         self, scene: Scene, tolerance: float = _DEFAULT, *, attitude: bool = False
     ) -> None:
-        self.time = 0.0
-        self.steps = 0
+        self._time = 0.0
+        self._steps = 0
         self._tolerance = tolerance_of(tolerance, _FINEST)
         if not _FINEST <= self._tolerance <= 1.0:
             raise InputError(f"tolerance is {self._tolerance:g}; allowed: {_FINEST:g} to 1")
@@ -103,6 +103,16 @@ class Stepper:
         self._trial, self._largest = LONGEST_TRIAL, 0.0
         self._last = Step(0.0, self._state[None], self._state, 0)
         self._begin = 0.0
+
+    @property
+    def time(self) -> float:
+        """The time (s)."""
+        return self._time
+
+    @property
+    def steps(self) -> int:
+        """The number of steps so far."""
+        return self._steps
 
     @property
     def scene(self) -> Scene:
@@ -151,27 +161,27 @@ class Stepper:
         singular.
         """
         longest = number("longest", longest)
-        end = self.time + longest
-        if not abs(end - self.time) > 0.0:
-            least = 0.5 * math.ulp(self.time)
+        end = self._time + longest
+        if not abs(end - self._time) > 0.0:
+            least = 0.5 * math.ulp(self._time)
             raise InputError(
                 f"longest is {longest:g} s; allowed: a positive or negative number, larger than "
                 f"{least:g} at this time"
             )
         stop = self._next_break(longest > 0.0)
-        if stop is not None and abs(stop - self.time) < abs(longest):
-            end, longest = stop, stop - self.time
+        if stop is not None and abs(stop - self._time) < abs(longest):
+            end, longest = stop, stop - self._time
         taken = self._taken(longest)
-        self._begin, self._last = self.time, taken
-        is_cut = self.time + taken.h == self.time + longest
+        self._begin, self._last = self._time, taken
+        is_cut = self._time + taken.h == self._time + longest
         # A step that was cut says nothing of the next one.
         self._trial = max(self._trial, abs(taken.h)) if is_cut else abs(taken.h)
-        self.time = end if is_cut else self.time + taken.h
+        self._time = end if is_cut else self._time + taken.h
         self._state = taken.state.copy()
         self._state[3 : self._n] = _normalised(self._state[3 : self._n])
         self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
-        self.steps += 1
-        return self.time
+        self._steps += 1
+        return self._time
 
     def _taken(self, longest: float) -> Step:
         scale = self._scale()
@@ -181,10 +191,10 @@ class Stepper:
             tolerances[3 : self._n] = 0.5 * self._tolerance
             trial = math.copysign(min(self._trial, abs(longest)), longest)
             taken = taylor_step(
-                self._packed, self.time, self._state, tolerances, self._tolerance, trial, longest
+                self._packed, self._time, self._state, tolerances, self._tolerance, trial, longest
             )
             if taken.h == 0.0:
-                raise ArithmeticError(f"no step is short enough at t = {self.time:g} s")
+                raise ArithmeticError(f"no step is short enough at t = {self._time:g} s")
             # The omega that a body at rest is about to reach was a guess.
             reached = float(np.abs(taken.state[:3]).max())
             if self._largest > 0.0 or not 0.0 < reached < 0.5 * scale:
@@ -197,11 +207,11 @@ class Stepper:
         Raise InputError if `time` is not a finite number, and ArithmeticError as `step` does.
         """
         end = finite("time", time)
-        while self.time != end:
-            self.step(end - self.time)
+        while self._time != end:
+            self.step(end - self._time)
             # The sum of time and difference is rounded.
-            if abs(self.time - end) <= math.ulp(end):
-                self.time = end
+            if abs(self._time - end) <= math.ulp(end):
+                self._time = end
 
     def at(self, times: float | Sequence[float] | Array) -> Array:
         """Return the state at times (s) within the last step.
@@ -212,7 +222,7 @@ class Stepper:
         """
         try:
             given: Array = np.asarray(times, dtype=float)
-        except (TypeError, ValueError):
+        except (OverflowError, TypeError, ValueError):
             raise InputError(f"times are {times!r}; allowed: numbers") from None
         low, high = sorted((self._begin, self._begin + self._last.h))
         # The end of a step is rounded.
@@ -245,7 +255,7 @@ class Stepper:
     def _set(self, place: slice, values: Sequence[float]) -> None:
         self._state = self._state.copy()
         self._state[place] = values
-        if self.steps == 0:
+        if self._steps == 0:
             self._last = Step(0.0, self._state[None], self._state, 0)
 
     def _scale(self) -> float:
@@ -255,16 +265,16 @@ class Stepper:
             return self._largest
         # The omega that a body at rest is about to reach.
         try:
-            rates = evaluate(self._tape, [self.time, *self._state.tolist()], FLOATS)
+            rates = evaluate(self._tape, [self._time, *self._state.tolist()], FLOATS)
         except ArithmeticError:
             return 1.0
         return math.sqrt(max(map(abs, rates[:3]))) or 1.0
 
     def _next_break(self, forward: bool) -> float | None:
         if forward:
-            place = bisect_right(self._breaks, self.time)
+            place = bisect_right(self._breaks, self._time)
             return self._breaks[place] if place < len(self._breaks) else None
-        place = bisect_left(self._breaks, self.time)
+        place = bisect_left(self._breaks, self._time)
         return self._breaks[place - 1] if place else None
 
 

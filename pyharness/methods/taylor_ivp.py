@@ -102,19 +102,32 @@ class Taylor(OdeSolver):  # type: ignore[misc]
             names = ", ".join(f"`{name}`" for name in extraneous)
             warnings.warn(f"the method Taylor ignores {names}", stacklevel=3)
         super().__init__(fun, t0, y0, t_bound, vectorized)
+        if math.isnan(self.t_bound) or not math.isfinite(self.t):
+            raise InputError(
+                f"the time span is {t0} to {t_bound}; allowed: finite times, or to inf"
+            )
         self._tape = kernel_tape(recorded_equation(fun, self.n))
         self.nfev = 1
-        self.max_step = _positive("max_step", max_step)
+        self.max_step = self._longer_than_spacing("max_step", max_step)
         self.rtol, self.atol = _tolerances(rtol, atol, self.n)
         longest = np.abs(self.y).max(initial=0.0)
         share = self.atol.min(initial=math.inf) / longest if longest else 0.0
         self._relative = min(1.0, float(self.rtol.min(initial=1.0) + share))
         span = abs(self.t_bound - self.t)
-        self._longest = span if first_step is None else _positive("first_step", first_step)
+        self._longest = (
+            span if first_step is None else (self._longer_than_spacing("first_step", first_step))
+        )
         if self._longest > span:
             raise InputError(f"first_step is {first_step}; allowed: up to {span:g}, the time span")
         self._trial = min(self._longest, LONGEST_TRIAL)
         self._terms = np.zeros((1, self.n))
+
+    def _longer_than_spacing(self, name: str, value: Any) -> float:
+        found = number(name, value)
+        if self.t + self.direction * found == self.t or not found > 0.0:
+            least = 0.5 * math.ulp(self.t)
+            raise InputError(f"{name} is {found:g}; allowed: a number larger than {least:g} at t0")
+        return found
 
     def _step_impl(self) -> tuple[bool, str | None]:
         rest = abs(self.t_bound - self.t)
@@ -182,26 +195,21 @@ def recorded_equation(fun: Callable[..., Any], n: int) -> Tape:
     return recorder.tape(rates)
 
 
-def _positive(name: str, value: Any) -> float:
-    found = number(name, value)
-    if not found > 0.0:
-        raise InputError(f"{name} is {found:g}; allowed: a positive number")
-    return found
-
-
 def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
     """Return checked tolerances, each of shape (n,)."""
     found = []
     for name, value in (("rtol", rtol), ("atol", atol)):
         try:
             given = np.asarray(value, dtype=float)
-        except (TypeError, ValueError):
+        except (OverflowError, TypeError, ValueError):
             raise InputError(f"{name} is {value!r}; allowed: a number, or {n} numbers") from None
         if given.shape not in ((), (n,)):
             raise InputError(f"{name} has shape {given.shape}; allowed: a number, or shape ({n},)")
         if not np.all(given >= 0.0):
             raise InputError(f"{name} is {value}; allowed: numbers of at least 0")
         found.append(np.broadcast_to(given, (n,)))
+    if not np.isfinite(found[0]).all():
+        raise InputError(f"rtol is {rtol}; allowed: finite numbers")
     if np.any(found[0] < _LEAST_RTOL):
         warnings.warn(f"`rtol` is too small; {_LEAST_RTOL:.2g} is used", stacklevel=4)
     return np.maximum(found[0], _LEAST_RTOL), found[1]

@@ -41,6 +41,7 @@ ROWS: dict[str, tuple[str, tuple[int, ...]]] = {
 AXES = "axes"  # an array without rows, shape (3, 3)
 # For all events: their number for each function, their times, and the states there.
 EVENTS = ("event_counts", "event_times", "event_states")
+MOST_FUNCTIONS = 10_000  # of events; each has arrays of its own
 _TAPED = "The torque was recorded from a function. Its operations are in the header."
 
 
@@ -83,6 +84,11 @@ def file_content(found: "Trajectory") -> bytes:
     if found.axes is not None:
         arrays[AXES] = found.axes
     if found.t_events is not None and found.y_events is not None:
+        if len(found.t_events) > MOST_FUNCTIONS:
+            raise InputError(
+                f"the trajectory has the events of {len(found.t_events)} functions; allowed in a "
+                f"file: up to {MOST_FUNCTIONS}"
+            )
         counts = np.array([len(times) for times in found.t_events], "i8")
         width = 3 if found.attitude is None else 7
         times = np.concatenate([np.zeros(0), *found.t_events])

@@ -7,6 +7,7 @@ all operations are computed order by order, together with those of the solution.
 from bisect import bisect_left, bisect_right
 from collections import Counter
 from decimal import Context, Decimal
+from typing import NamedTuple
 
 from pyharness.model.tape import N_INPUTS, Linear, Operation, Table, Tape
 from pyharness.truth.decimal_functions import Row, product, sine_cosine
@@ -29,6 +30,20 @@ _MOST_ORDER = 100
 _TRUSTED = Decimal("1e-6")
 
 _ROUGH = Context(prec=9)
+
+
+class _Power(NamedTuple):
+    """A product of many factors.
+
+    `factors` counts how often each slot is a factor. `scale` is the decimal logarithm of the
+    largest coefficient with which the product is used. `divisors` are the slots beside which it is
+    small or large.
+    """
+
+    factors: Counter[int]
+    scale: Decimal
+    divisors: set[int]
+
 
 # A linear combination of slots: its constant, and pairs of a coefficient and a slot.
 _Sum = tuple[Decimal, list[tuple[Decimal, int]]]
@@ -195,25 +210,26 @@ class TapeSeries:
             if change > most:
                 # The change is a convex function of the length, so that the quotient is enough.
                 length *= most / change
-        while any(self._is_hidden(*each, length) for each in self._powers):
+        while any(self._is_hidden(each, length) for each in self._powers):
             length *= Decimal("0.7")
         return length
 
-    def _is_hidden(self, factors: Counter[int], scale: Decimal, length: Decimal) -> bool:
+    def _is_hidden(self, power: _Power, length: Decimal) -> bool:
         """Return whether a product is visible in a step, but perhaps not in the terms computed.
 
-        `factors` counts how often each slot is a factor of the product. `scale` is the decimal
-        logarithm of the largest coefficient with which the product is used. The mean order of a
-        product's terms is the sum of those of its factors.
+        The mean order of a product's terms is the sum of those of its factors.
         """
-        order, size = Decimal(0), scale
-        for slot, count in factors.items():
+        order, size = Decimal(0), power.scale
+        for slot, count in power.factors.items():
             terms = [abs(x) * length**k for k, x in enumerate(self._slots[slot])]
             if not (total := sum(terms)):
                 return False
             order += count * sum(k * x for k, x in enumerate(terms)) / total
             size += count * total.log10(_ROUGH)
-        return 2 * order > self._order and size > -_INVISIBLE * Decimal("0.4343")
+        # A divisor that is 0 has no series.
+        divisors = [abs(self._slots[slot][0]).log10(_ROUGH) for slot in power.divisors]
+        least = min([Decimal(0), *divisors]) - _INVISIBLE * Decimal("0.4343")
+        return 2 * order > self._order and size > least
 
     def _largest_change(self, operation: Operation) -> Decimal | None:
         """Return by how much the last operand of an operation may change in a step, if limited."""
@@ -250,11 +266,10 @@ class TapeSeries:
         return False
 
 
-def _powers(tape: Tape) -> tuple[list[tuple[Counter[int], Decimal]], int]:
+def _powers(tape: Tape) -> tuple[list[_Power], int]:
     """Return the products of many factors that are not merely factors, and the most factors.
 
-    The factors of each product are counted by slot. A product comes with the decimal logarithm of
-    the largest coefficient with which it is used. A sum has as many factors as one of its terms.
+    A sum has as many factors as one of its terms.
     """
     factors: dict[int, Counter[int]] = {}
     numbers: dict[int, int] = {}
@@ -271,9 +286,29 @@ def _powers(tape: Tape) -> tuple[list[tuple[Counter[int], Decimal]], int]:
     sums = [each.linear for each in tape.operations if each.linear] + list(tape.outputs)
     for each, factor in (term for linear in sums for term in linear.terms):
         scales[each] = max(abs(factor), scales.get(each, 0.0))
+    divisors = _divisors(tape)
     found = [each for each in factors if numbers[each] >= _MANY_FACTORS and scales.get(each)]
-    powers = [(factors[each], Decimal(scales[each]).log10(_ROUGH)) for each in found]
+    powers = [
+        _Power(factors[each], Decimal(scales[each]).log10(_ROUGH), divisors.get(each, set()))
+        for each in found
+    ]
     return powers, max((numbers[each] for each in found), default=0)
+
+
+def _divisors(tape: Tape) -> dict[int, set[int]]:
+    """Return the divisors of the quotients that each slot is a part of, and arguments of roots."""
+    found: dict[int, set[int]] = {}
+    for slot, (kind, operands, linear, _) in reversed([*enumerate(tape.operations, N_INPUTS)]):
+        parts = operands if linear is None else [each for each, _ in linear.terms]
+        if kind in ("quotient", "sqrt"):
+            passed = {operands[-1]}
+        elif kind in ("product", "linear"):
+            passed = found.get(slot, set())
+        else:
+            continue
+        for part in parts:
+            found[part] = found.get(part, set()) | passed
+    return found
 
 
 def _sum(linear: Linear | None) -> _Sum:

@@ -369,6 +369,7 @@ FOREIGN: dict[str, Callable[[], bytes]] = {
         event_counts=np.array([3]), event_times=np.array([0.5, 0.7, 0.6]),
         event_states=np.ones((3, 7)),
     ),
+    "events backwards": _changed(**EVENT | {"event_times": np.array([0.7, 0.5])}),
     "functions without number": _changed(
         event_counts=np.zeros(20_000, "i8"), event_times=np.zeros(0), event_states=np.zeros((0, 7))
     ),

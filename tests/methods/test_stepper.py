@@ -163,6 +163,9 @@ def test_results_cannot_be_changed() -> None:
             values[0] = 7.0
     with pytest.raises(AttributeError):
         stepper.torque = (1.0, 0.0, 0.0)  # type: ignore[attr-defined]
+    for name in ("time", "steps"):
+        with pytest.raises(AttributeError):
+            setattr(stepper, name, 1)
     # What was set before the first step is the state of time 0.
     stepper.omega = (3.0, 2.0, 1.0)
     assert stepper.at(0.0)[:3].tolist() == [3.0, 2.0, 1.0]
@@ -181,6 +184,13 @@ def test_errors_from_rest_are_relative_to_the_omega_that_is_reached(size: float)
         truth = size * quad(lambda t: math.cos(t * t), 0.0, stepper.time, epsrel=1e-12)[0]
         largest = max(largest, abs(truth))
         assert abs(stepper.omega[0] - truth) <= 1e-8 * stepper.steps * largest
+
+
+def test_the_least_omega_is_stepped() -> None:
+    for omega in ((0.0, 0.0, 1e-300), (1e-300, 2e-300, 3e-300)):
+        stepper = Stepper(Scene("", omega, moments=(1.0, 1.0, 1.0)), 1e-14)
+        stepper.until(1.0)
+        assert stepper.omega.tolist() == pytest.approx(omega, rel=1e-12)
 
 
 def test_a_tiny_step_does_not_shorten_the_next() -> None:
@@ -225,6 +235,7 @@ def test_a_singular_torque_ends_the_steps() -> None:
         (lambda: Stepper(BRICK).step(0.0), "longest is 0 s; allowed: a positive or"),
         (lambda: Stepper(BRICK).step(math.nan), "longest is nan s; allowed: a positive or"),
         (lambda: Stepper(BRICK).step(cast("Any", "a")), "longest: text where a number belongs"),
+        (lambda: Stepper(BRICK).at(10**400), "times are 1000"),
         (lambda: Stepper(BRICK).at(cast("Any", "x")), "times are 'x'; allowed: numbers"),
         (
             lambda: Stepper(BRICK).until(math.inf),

@@ -174,6 +174,29 @@ def test_a_high_power_is_a_series_of_pulses(name: str) -> None:
     assert true.omega[0, 0] - 0.1 == pytest.approx(change[0], abs=4e-15 * scale)
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e-9, 1e-12])
+def test_a_power_beside_a_divisor_of_its_size_is_not_missed(unit: float) -> None:
+    """The unit of a length changes no Hill function of it."""
+
+    def hill(t: Any, unit: float = unit) -> Any:
+        x = unit * (1.0 - np.cos(t)) / 2.0
+        return x**20 / ((0.9 * unit) ** 20 + x**20)
+
+    scene = Scene(
+        "switch", (0.0, 0.0, 0.1), moments=(1.0, 2.0, 3.0),
+        torque=lambda t, omega: [0.0, 0.0, 3.0 * hill(t) + 0.0 * omega[0]],
+    )  # fmt: skip
+    end = 7
+    truth = math.fsum(quad(hill, k, k + 1, args=(1.0,), epsabs=1e-14)[0] for k in range(end))
+    for tolerance in (1e-3, 1e-6, 1e-12):
+        found = solve(scene, [end], "taylor", tolerance)
+        assert abs(found.omega[0, 2] - 0.1 - truth) <= (tolerance + 4e-15) * (0.1 + truth)
+        stepper = Stepper(scene, tolerance)
+        stepper.until(end)
+        assert abs(stepper.omega[2] - 0.1 - truth) <= tolerance * stepper.steps
+    assert reference(scene, [end]).omega[0, 2] - 0.1 == pytest.approx(truth, rel=1e-14)
+
+
 @pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-8, 1e-300])
 def test_a_tangent_of_any_argument_is_finite(width: float) -> None:
     """A saturated brake is a constant torque until omega is near 0."""

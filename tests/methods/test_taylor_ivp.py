@@ -227,12 +227,14 @@ def test_an_assignment_to_an_array_of_floats_is_refused_with_its_name() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"max_step": -1.0}, "max_step is -1; allowed: a positive number"),
-        ({"first_step": 0.0}, "first_step is 0; allowed: a positive number"),
+        ({"max_step": -1.0}, "max_step is -1; allowed: a number larger than 0 at t0"),
+        ({"first_step": 0.0}, "first_step is 0; allowed: a number larger than 0 at t0"),
         ({"first_step": 5.0}, "first_step is 5.0; allowed: up to 1, the time span"),
         ({"rtol": -1e-3}, "rtol is -0.001; allowed: numbers of at least 0"),
         ({"atol": [1e-3, math.nan]}, "atol is [0.001, nan]; allowed: numbers of at least 0"),
         ({"max_step": None}, "max_step: nothing where a number belongs"),
+        ({"rtol": math.inf}, "rtol is inf; allowed: finite numbers"),
+        ({"rtol": 10**400}, "rtol is 1000"),
         ({"atol": "x"}, "atol is 'x'; allowed: a number, or 2 numbers"),
         ({"atol": [1e-3]}, "atol has shape (1,); allowed: a number, or shape (2,)"),
     ],
@@ -241,6 +243,16 @@ def test_options_are_checked(options: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as caught:
         solve_ivp(pendulum, (0.0, 1.0), [1.0, 2.0], method=Taylor, **options)
     assert str(caught.value).startswith(message)
+
+
+@pytest.mark.parametrize("option", ["first_step", "max_step"])
+def test_a_step_below_the_spacing_of_time_is_refused(option: str) -> None:
+    with pytest.raises(
+        InputError, match=rf"^{option} is 1e-17; allowed: .* larger than 1.1.*e-16 "
+    ):
+        solve_ivp(pendulum, (1.0, 2.0), [1.0, 2.0], method=Taylor, **{option: 1e-17})
+    with pytest.raises(InputError, match=r"^the time span is 0.0 to nan; allowed: finite times"):
+        Taylor(pendulum, 0.0, [1.0, 2.0], math.nan)
 
 
 @pytest.mark.parametrize(

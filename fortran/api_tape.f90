@@ -70,3 +70,39 @@ subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, tria
   expansions = taken%expansions
   status = taken%status
 end subroutine tape_step
+
+subroutine tape_derivatives(n_numbers, numbers, n, state, n_columns, starts, forcings, n_times, &
+                            times, tolerance, effort, rows, n_rows, status, steps)
+  ! Compute the derivatives of the solution of a tape with respect to parameters, the columns, at
+  ! `times`, which have one sign and are ordered away from 0.
+  !f2py threadsafe
+  use levels, only: tape_variation
+  use problem, only: variation_request_t, variation_t
+  use tape, only: tape_of
+  implicit none
+  integer(4), intent(in) :: n_numbers
+  real(8), intent(in), target :: numbers(n_numbers) ! the tape, as tape.f90 describes it
+  integer(4), intent(in) :: n
+  real(8), intent(in), target :: state(n)       ! at time 0
+  integer(4), intent(in) :: n_columns
+  real(8), intent(in), target :: starts(n, n_columns) ! derivatives at time 0
+  integer(4), intent(in), target :: forcings(n, n_columns) ! combinations that are partial
+  ! derivatives of the rates; 0 for none
+  integer(4), intent(in) :: n_times
+  real(8), intent(in), target :: times(n_times) ! s
+  real(8), intent(in) :: tolerance              ! relative
+  real(8), intent(in) :: effort                 ! factor on the work limit
+  real(8), intent(out), target :: rows(n, n_columns, n_times) ! n_rows times are set
+  integer(4), intent(out) :: n_rows
+  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 work limit
+  integer(8), intent(out) :: steps
+  type(variation_t) :: variation
+
+  variation%rows => rows
+  call tape_variation(tape_of(numbers), &
+                      variation_request_t(tolerance, effort, state, starts, forcings, times), &
+                      variation)
+  n_rows = variation%n_rows
+  status = variation%status
+  steps = variation%steps
+end subroutine tape_derivatives

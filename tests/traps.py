@@ -72,7 +72,7 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
         found = dict(zip(results, answer if isinstance(answer, tuple) else (answer,), strict=True))
         packed = name in ("solve_packed", "solve_packed_attitude")
         method = args[0][Places.METHOD] if packed else None
-        is_tape = name in ("tape_rows", "tape_step") or method == Methods.TAPE
+        is_tape = name in ("tape_rows", "tape_step", "tape_derivatives") or method == Methods.TAPE
         # A tape has integers in the places of numbers.
         numbers = args[1:] if is_tape else args
         has_infinity = bool(raised & TOO_LARGE) or not _finite((*numbers, *named.values()))

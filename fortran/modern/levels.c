@@ -19,11 +19,12 @@ typedef void runner(void *ensemble);
   fixed_solver solve_many_fixed_##level;                                                       \
   runner run_lanes_##level;                                                                    \
   solver solve_tape_##level;                                                                   \
-  solver step_tape_##level;
+  solver step_tape_##level;                                                                    \
+  solver vary_solution_##level;
 #define TAKEN(level)                                                                           \
   {taylor_solve_##level,       quick_solve_##level,      solve_many_free_##level,              \
    solve_many_taylor_##level,  solve_many_fixed_##level, run_lanes_##level,                    \
-   solve_tape_##level,         step_tape_##level}
+   solve_tape_##level,         step_tape_##level,        vary_solution_##level}
 
 DECLARED(plain)
 #ifdef WITH_LEVELS
@@ -40,6 +41,7 @@ static struct {
   runner *lanes;
   solver *tape;
   solver *step;
+  solver *vary;
 } chosen, known[] = {
   TAKEN(plain),
 #ifdef WITH_LEVELS
@@ -106,6 +108,11 @@ void tape_solve(const void *tape, const void *request, void *solution)
 void tape_step(const void *tape, const void *request, void *step)
 {
   chosen.step(tape, request, step);
+}
+
+void tape_variation(const void *tape, const void *request, void *variation)
+{
+  chosen.vary(tape, request, variation);
 }
 
 void run_lanes(void *ensemble) { chosen.lanes(ensemble); }

@@ -7,7 +7,7 @@ module levels
   private
 
   public :: choose_level, many_fixed, many_free, many_taylor, quick_solve, run_lanes, &
-            tape_solve, tape_step, taylor_solve
+            tape_solve, tape_step, tape_variation, taylor_solve
 
   interface
     integer(c_int) function choose_level(highest) bind(c, name="choose_level")
@@ -37,6 +37,13 @@ module levels
       type(*), intent(in) :: tape, request
       type(*), intent(inout) :: step
     end subroutine tape_step
+
+    subroutine tape_variation(tape, request, variation) bind(c, name="tape_variation")
+      !! Call vary_solution of tape_variation.f90 at the chosen level.
+      implicit none(type, external)
+      type(*), intent(in) :: tape, request
+      type(*), intent(inout) :: variation
+    end subroutine tape_variation
 
     subroutine quick_solve(problem, request, contest, solution) bind(c, name="quick_solve")
       !! Call quick_solve of scaled_runge_kutta.f90 at the chosen level.

@@ -42,6 +42,24 @@ module problem
     real(dp), pointer, contiguous :: state(:)
   end type step_t
 
+  type, public :: variation_request_t
+    !! Derivatives of a solution with respect to parameters, the columns.
+    real(dp) :: tolerance                       !! relative
+    real(dp) :: effort                          !! factor on the work limit
+    real(dp), pointer, contiguous :: state(:)   !! at time 0
+    real(dp), pointer, contiguous :: starts(:, :) !! (unknowns, columns): derivatives at time 0
+    !! (unknowns, columns): the combination that is the partial derivative of a rate; 0 for none
+    integer, pointer, contiguous :: forcings(:, :)
+    real(dp), pointer, contiguous :: times(:)   !! s
+  end type variation_request_t
+
+  type, public :: variation_t
+    !! The derivatives at the first n_rows times.
+    real(dp), pointer, contiguous :: rows(:, :, :) !! (unknowns, columns, times)
+    integer :: n_rows, status                   !! status of the module statuses
+    integer(int64) :: steps
+  end type variation_t
+
   type, public :: solution_t
     !! What was computed. A kernel sets the components that it has.
     real(dp), pointer, contiguous :: rows(:, :)    !! omega at the first n_rows times, rad/s

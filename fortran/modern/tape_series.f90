@@ -57,6 +57,24 @@ module tape_series
       integer(c_int), intent(out) :: is_short  !! not 0: all terms do not suffice
     end function perturb_tape
 
+    integer(c_int) function vary_tape(tape, h, order, factor, weights, tolerance, forcings, &
+                                      sizes, excess) bind(c, name="vary_tape_level")
+      !! Compute the terms of derivatives with respect to parameters, as many as they need, and
+      !! return the last one's number.
+      import :: c_int, dp, SIDE_BY_SIDE, tape_arrays_t
+      implicit none(type, external)
+      type(tape_arrays_t), intent(in) :: tape
+      real(dp), intent(in), value :: h
+      integer(c_int), intent(in), value :: order
+      real(dp), intent(in), value :: factor    !! the step over h
+      real(dp), intent(in) :: weights(tape%n_unknowns) !! make the unknowns comparable
+      real(dp), intent(in), value :: tolerance !! of the terms that are left out, relative
+      !! Combinations that are partial derivatives of the rates; 0 for none.
+      integer(c_int), intent(in) :: forcings(SIDE_BY_SIDE, tape%n_unknowns)
+      real(dp), intent(inout) :: sizes(SIDE_BY_SIDE) !! largest values so far
+      real(dp), intent(out) :: excess          !! above 1: all terms do not suffice
+    end function vary_tape
+
     subroutine sum_perturbations(tape, last, factor, sums) bind(c, name="sum_perturbations_level")
       !! Sum the terms of the perturbations of the unknowns up to the last.
       import :: c_int, dp, SIDE_BY_SIDE, tape_arrays_t
@@ -68,7 +86,8 @@ module tape_series
     end subroutine sum_perturbations
   end interface
 
-  public :: allocate_series, derivatives_at, expand, noise_of, perturb_tape, sum_perturbations
+  public :: allocate_series, derivatives_at, expand, noise_of, perturb_tape, sum_perturbations, &
+            vary_tape
 
 contains
 

@@ -19,7 +19,7 @@ module tape_step
   ! Tolerance whose reciprocal is a number.
   real(dp), parameter :: LEAST_TOLERANCE = 2.0_dp**(-1000)
 
-  public :: step_tape
+  public :: step_tape, take_step
 
 contains
 
@@ -32,12 +32,8 @@ contains
     type(step_request_t), pointer :: request
     type(step_t), pointer :: step
     real(dp), allocatable, target :: memory(:)
-    real(dp), allocatable :: tolerances(:)
     type(series_t) :: s
-    real(dp) :: factor
-    integer :: failed, i, k
     logical :: fits
-    logical :: is_rejected ! whether a longer step was rejected
 
     call c_f_pointer(tape_at, tape)
     call c_f_pointer(request_at, request)
@@ -45,7 +41,22 @@ contains
     step%status = OVERFLOW
     step%expansions = 0
     call allocate_series(tape, .false., memory, s, fits)
-    if (.not. fits) return
+    if (fits) call take_step(tape, request, s, step)
+  end subroutine step_tape
+
+  subroutine take_step(tape, request, s, step)
+    !! Compute the terms of a step as `step_tape` does, in the working storage of the caller.
+    type(tape_t), intent(in) :: tape
+    type(step_request_t), intent(in) :: request
+    type(series_t), intent(inout) :: s
+    type(step_t), intent(inout) :: step
+    real(dp), allocatable :: tolerances(:)
+    real(dp) :: factor
+    integer :: failed, i, k
+    logical :: is_rejected ! whether a longer step was rejected
+
+    step%status = OVERFLOW
+    step%expansions = 0
     allocate (tolerances(tape%n_unknowns), stat=failed)
     if (failed /= 0) return
     tolerances = max(LEAST_TOLERANCE, request%tolerances)
@@ -126,6 +137,6 @@ contains
                      .and. all(epsilon(s%h)*sizes <= max(tolerances, allowed))
     end function is_continued
 
-  end subroutine step_tape
+  end subroutine take_step
 
 end module tape_step

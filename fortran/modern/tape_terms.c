@@ -24,6 +24,7 @@ struct tape {
   series *a;        /* terms of each slot */
   perturbations *v; /* terms of the perturbations of each slot */
 };
+enum { FIRST_TERMS = 3, SMALL_TERMS = 3 }; /* that decide the size, and the end, of derivatives */
 enum { FIRST_UNKNOWN = 1 }; /* the slot of omega's first component, from 0 */
 
 /* The same at any address. */
@@ -185,17 +186,18 @@ static inline lanes perturbed(const struct tape *tape, int n, int k, const pertu
   return sum;
 }
 
-/* Compute term k of eight perturbations of all slots, and term k + 1 of those of the unknowns. */
-static void perturb(const struct tape *tape, double h, int k)
+/* Compute term k of eight perturbations of all slots, and term k + 1 of those of the unknowns. Where
+   they are forced, the terms of the unknowns have a part of their own already. */
+static inline void perturb(const struct tape *tape, double h, int k, int is_forced)
 {
   const series *const a = (const series *)tape->a;
   perturbations *const v = tape->v;
   const int derivatives = tape->n_combinations - tape->n_unknowns;
+  lanes x;
 
   for (int n = 0; n < tape->n_operations; n++) {
     const int *operation = tape->operations[n];
     const int first = operation[1] - 1, second = operation[2] - 1, out = operation[3] - 1;
-    lanes x;
     switch (operation[0]) {
     case LINEAR:
       x = perturbed(tape, first, k, (const perturbations *)v);
@@ -228,13 +230,29 @@ static void perturb(const struct tape *tape, double h, int k)
     }
     store(v[out][k], x);
   }
-  for (int i = 0; i < tape->n_unknowns; i++)
-    store(v[FIRST_UNKNOWN + i][k + 1],
-          h / (k + 1) * perturbed(tape, derivatives + i, k, (const perturbations *)v));
+  for (int i = 0; i < tape->n_unknowns; i++) {
+    double *to = v[FIRST_UNKNOWN + i][k + 1];
+    x = h / (k + 1) * perturbed(tape, derivatives + i, k, (const perturbations *)v);
+    store(to, is_forced ? loaded(to) + x : x);
+  }
 }
 
-/* Return the largest term k of the perturbations of the unknowns, with weights that make the unknowns
-   comparable. `units` makes the perturbations comparable. */
+/* Return the largest term k of each perturbation of the unknowns, with weights that make the unknowns
+   comparable. */
+static inline lanes largest_terms(const struct tape *tape, int k, const double *weights)
+{
+  const bits magnitude = ~(bits)(-(lanes){0.0});
+  lanes most = {0.0};
+  for (int i = 0; i < tape->n_unknowns; i++) {
+    lanes x = weights[i] * (lanes)((bits)loaded(tape->v[FIRST_UNKNOWN + i][k]) & magnitude);
+    /* NaN is not lost. */
+    bits is_smaller = x <= most;
+    most = (lanes)(((bits)most & is_smaller) | ((bits)x & ~is_smaller));
+  }
+  return most;
+}
+
+/* Return the largest term k of all perturbations of the unknowns. `units` makes them comparable. */
 static inline double largest(const struct tape *tape, int k, const double *weights, lanes units)
 {
   const bits magnitude = ~(bits)(-(lanes){0.0});
@@ -264,7 +282,7 @@ int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, double h, int order, 
   double before = first, power = 1.0;
   int k = 0;
   do {
-    perturb(tape, h, k++);
+    perturb(tape, h, k++, 0);
     power *= factor;
     const double size = power * largest(tape, k, weights, units);
     /* Every other term may be zero. */
@@ -272,6 +290,52 @@ int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, double h, int order, 
     before = size;
   } while (*is_short && k < order);
   return k;
+}
+
+/* Add the terms of combination n of the series, times h, to the next terms of one derivative. */
+static void force(const struct tape *tape, int n, double h, int order, double (*to)[SIDE_BY_SIDE])
+{
+  series sum = {tape->constants[n]};
+  for (int i = tape->starts[n] - 1; i < tape->starts[n + 1] - 1; i++) {
+    const double coefficient = tape->coefficients[i], *from = tape->a[tape->slots[i] - 1];
+    for (int k = 0; k < order; k++) sum[k] += coefficient * from[k];
+  }
+  for (int k = 0; k < order; k++) to[k + 1][0] = h / (k + 1) * sum[k];
+}
+
+/* Compute the terms of eight derivatives of the unknowns with respect to parameters, whose terms 0 are
+   inputs, to as many as they need for the part `factor` of the step. Return the number of the last
+   one. Where the derivative of unknown i depends on the parameter itself, combination
+   forcings[i][lane] of the series is the partial derivative; 0 stands for none. `sizes` are the
+   largest values so far, and `excess` is the largest of the last terms relative to them, in
+   tolerances. */
+int OF_LEVEL(vary_tape, LEVEL)(const struct tape *tape, double h, int order, double factor,
+                               const double *weights, double tolerance,
+                               const int (*forcings)[SIDE_BY_SIDE], double *sizes, double *excess)
+{
+  double power = 1.0;
+  int k = 0, small = 0;
+  for (int i = 0; i < tape->n_unknowns; i++) {
+    double(*terms)[SIDE_BY_SIDE] = tape->v[FIRST_UNKNOWN + i];
+    memset(terms[1], 0, order * sizeof terms[1]);
+    for (int lane = 0; lane < SIDE_BY_SIDE; lane++)
+      if (forcings[i][lane])
+        force(tape, forcings[i][lane] - 1, h, order, (double(*)[SIDE_BY_SIDE])(terms[0] + lane));
+  }
+  do {
+    if (k > 0) perturb(tape, h, k - 1, 1);
+    const lanes most = largest_terms(tape, k, weights);
+    *excess = 0.0;
+    for (int lane = 0; lane < SIDE_BY_SIDE; lane++) {
+      const double size = power * most[lane];
+      if (k <= FIRST_TERMS && !(size <= sizes[lane])) sizes[lane] = size;
+      if (!(size <= *excess * tolerance * sizes[lane])) *excess = size / (tolerance * sizes[lane]);
+    }
+    power *= factor;
+    /* One or two terms may be zero between others. */
+    small = *excess <= 1.0 ? small + 1 : 0;
+  } while (small < SMALL_TERMS && k++ < order);
+  return k < order ? k : order;
 }
 
 /* Sum the terms of the perturbations of each unknown up to `last` for the part `factor` of the

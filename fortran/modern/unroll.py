@@ -34,6 +34,7 @@ MODULES = (
     "tape_march",
     "tape_solve",
     "tape_step",
+    "tape_variation",
     "many_circular",
     "many_columns",
     "many_free",

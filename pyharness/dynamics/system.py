@@ -63,19 +63,21 @@ def with_constant_body(scene: Scene) -> Scene:
     tape = torque.tape
     if tape is not None:
         found = replayed(
-            lambda time, omega, q: _rates(changing, time, omega, torque_of(tape, time, omega, q))
+            lambda time, omega, q: rates_of_changing(
+                changing, time, omega, torque_of(tape, time, omega, q)
+            )
         )
     else:
         found = replace(
             torque,
-            function=lambda time, omega, q=IDENTITY: _rates(
+            function=lambda time, omega, q=IDENTITY: rates_of_changing(
                 changing, time, omega, torque.at(time, omega, q)
             ),
         )
     return replace(scene, changing=None, coefficients=(0.0, 0.0, 0.0), torque=found)
 
 
-def _rates(changing: Changing, time: Any, omega: Any, torque: Any) -> list[Any]:
+def rates_of_changing(changing: Changing, time: Any, omega: Any, torque: Any) -> list[Any]:
     """Return the derivative of omega for an inertia that changes; all others may be symbols."""
     matrix, rate, (x, y, z) = changing.matrix(time), changing.matrix_rate(time), omega
     if isinstance(changing, ChangingMoments):
@@ -86,9 +88,14 @@ def _rates(changing: Changing, time: Any, omega: Any, torque: Any) -> list[Any]:
             (torque[k] - rate[k][k] * omega[k] + products[k]) / moment
             for k, moment in enumerate((a, b, c))
         ]
-    u, v, w = (_dot(row, omega) for row in matrix)
+    return rates_of_inertia(matrix, omega, [torque[k] - _dot(rate[k], omega) for k in range(3)])
+
+
+def rates_of_inertia(matrix: Any, omega: Any, torque: Any) -> list[Any]:
+    """Return the derivative of omega for a full inertia matrix; all may be symbols."""
+    (x, y, z), (u, v, w) = omega, (_dot(row, omega) for row in matrix)
     products = z * v - y * w, x * w - z * u, y * u - x * v
-    return _solved(matrix, [torque[k] - _dot(rate[k], omega) + products[k] for k in range(3)])
+    return _solved(matrix, [torque[k] + products[k] for k in range(3)])
 
 
 def _dot(first: Any, second: Any) -> Any:

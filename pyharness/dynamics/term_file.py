@@ -1,6 +1,7 @@
 """Ready terms in scene files: the tables [[torque.terms]]."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from inspect import Parameter, signature
 from typing import Any
 
@@ -17,7 +18,6 @@ from pyharness.model.changing import Changing
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.scene_file import MOST_TERMS, check_keys, law_of_table
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import boolean
 
 Function = Callable[..., StateTorque]
@@ -103,7 +103,7 @@ def _argument(where: str, value: object, key: str, frame: str | None) -> object:
     if isinstance(value, dict):
         check_keys(value, _LAW, where)
         try:
-            return TorqueLaw(**{**vars(law_of_table(value)), "frame": frame})
+            return replace(law_of_table(value), frame=frame)
         except InputError as error:
             raise _placed(error, where) from None
     if not isinstance(value, list):

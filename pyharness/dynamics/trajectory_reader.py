@@ -32,6 +32,7 @@ from pyharness.model.trajectory_file import (
     KIND,
     MOST_FUNCTIONS,
     ROWS,
+    SENSITIVITIES,
     TEXTS,
     checked_path,
 )
@@ -101,7 +102,7 @@ def _arrays(content: bytes, names: Sequence[str] = ()) -> dict[str, Any]:
     """Return the arrays of some names in the content of a file, or all arrays if none is given."""
     found = {}
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        allowed = {f"{name}.npy" for name in (*TEXTS, *ROWS, AXES, *EVENTS)}
+        allowed = {f"{name}.npy" for name in (*TEXTS, *ROWS, AXES, *EVENTS, SENSITIVITIES)}
         entries = [archive.getinfo(f"{name}.npy") for name in names] or archive.infolist()
         for each in entries:
             allowed.remove(each.filename)  # an error if the name is unknown, or occurs twice
@@ -164,7 +165,22 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
         tolerance=_estimate(header["tolerance"]),
         t_events=t_events,
         y_events=y_events,
+        sensitivities=_sensitivities(arrays, header[SENSITIVITIES], rows),
     )
+
+
+def _sensitivities(
+    arrays: dict[str, Any], names: Any, rows: dict[str, Any]
+) -> dict[str, Array] | None:
+    """Return the sensitivities by the name of the parameter, or None if there are none."""
+    if names is None:
+        return None
+    array, counts = arrays[SENSITIVITIES], [_count(count) for _, count in names]
+    shape = (len(rows["time"]), 3 if rows["attitude"] is None else 7, sum(counts))
+    if (array.dtype, array.shape) != ("f8", shape) or not all(type(x) is str for x, _ in names):
+        raise ValueError("sensitivities of another type or shape")
+    parts = np.split(array, np.cumsum(counts)[:-1], axis=2) if counts else []
+    return dict(zip((name for name, _ in names), parts, strict=True))
 
 
 def _events(

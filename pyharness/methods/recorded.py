@@ -77,9 +77,10 @@ def system(scene: Scene) -> Tape:
 
 
 @lru_cache(maxsize=64)
-def kernel_tape(tape: Tape) -> Array:
+def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
     """Return a tape as the array that the kernel reads; fortran/modern/tape.f90 describes it.
 
+    The last `n_unknowns` outputs, by default all of them, are the derivatives of the unknowns.
     Sine and cosine of one angle become one operation, because each recurrence needs the other.
     """
     places = {slot: slot + 1 for slot in range(tape.n_inputs)}
@@ -124,8 +125,8 @@ def kernel_tape(tape: Tape) -> Array:
     breaks = [time for each in tables for time in each.breaks] or [0.0]
     pieces = [number for each in tables for piece in each.pieces for number in piece] or [0.0] * 4
     counts = [
-        len(tape.outputs), n_slots, len(operations), len(combinations), len(terms), len(tables),
-        len(breaks),
+        n_unknowns or len(tape.outputs), n_slots, len(operations), len(combinations), len(terms),
+        len(tables), len(breaks),
     ]  # fmt: skip
     packed = np.concatenate(
         [

@@ -15,6 +15,7 @@ import numpy as np
 from pyharness.dynamics.system import with_constant_body
 from pyharness.methods.continuous import solution_of, with_events, with_events_reversed
 from pyharness.methods.event_functions import event_functions
+from pyharness.methods.parameter_sensitivity import checked_names, sensitivities_at
 from pyharness.methods.plan import plan
 from pyharness.methods.registry import (
     METHODS,
@@ -56,6 +57,7 @@ def solve(
     attitude: bool = False,
     dense_output: bool = False,
     events: object = None,
+    sensitivities: Iterable[str] | None = None,
 ) -> Trajectory:
     """Solve a scene at given times.
 
@@ -91,6 +93,16 @@ def solve(
         have the attributes `terminal` and `direction`, as in SciPy's `solve_ivp`. It is called with
         arrays of many times if it accepts them. The attributes `t_events` and `y_events` of the
         trajectory are the events. Rows after a terminal event are removed.
+    sensitivities : iterable of str
+        Names of parameters; the attribute `sensitivities` of the trajectory has the derivatives of
+        omega, and of the attitude's quaternion if it is computed, with respect to each. Names are
+        `omega0`, the initial omega; `moments`, `coefficients`, or `inertia`, whose columns are I11,
+        I22, I33, I12, I13, I23; `attitude`, small rotations (rad) of the initial attitude about the
+        three body axes; and for the torque, `torque.NAME`. NAME is a constant of the expressions in
+        a scene file, or a keyword argument of a function, with a number as its default, or
+        `constant`, `rate`, `sines`, `cosines` of a TorqueLaw; a wave has four columns, its
+        amplitude and its frequency. They are computed by Taylor series for the methods `auto`,
+        `taylor` and `closed-form`.
 
     Returns
     -------
@@ -107,7 +119,8 @@ def solve(
         that needs the attitude comes without it; if the times are not in order; if a moment that
         changes with time reaches 0 before a time; if the method can't meet the tolerance, or needs
         more work for it than `effort` allows; if dense output would need too many polynomials; if
-        an event is not a function with the right arguments, or does not return finite numbers.
+        an event is not a function with the right arguments, or does not return finite numbers; if a
+        parameter is unknown, or sensitivities can't be computed.
     NotBuiltError
         If the method needs the extension, and it is not built.
 
@@ -134,6 +147,7 @@ def solve(
         )
     check_torque(scene, method, attitude)
     functions = None if events is None else event_functions(events, attitude)
+    names = None if sensitivities is None else checked_names(scene, sensitivities, method, attitude)
     if attitude:
         check_attitude(method, scene)
     given = scene
@@ -172,7 +186,11 @@ def solve(
         found = with_events(given, found, functions, ends, rows, method, tolerance)
         if turned or (len(values) == 1 and values[0] < 0.0):
             found = with_events_reversed(found)
-    return in_reverse(found) if turned else found
+    found = in_reverse(found) if turned else found
+    if names is not None:
+        slopes = sensitivities_at(given, found, names, tolerance, effort)
+        found = replace(found, sensitivities=slopes)
+    return found
 
 
 def _more_rows(

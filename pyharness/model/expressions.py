@@ -11,7 +11,7 @@ import math
 import operator
 import re
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from keyword import iskeyword
 from typing import Any
 
@@ -67,14 +67,23 @@ def parsed(expressions: object, constants: object) -> StateTorque | TorqueLaw:
     values = _checked_constants(constants)
     texts = _three_texts(expressions)
     recorder = Recorder()
-    inputs = dict(zip(INPUTS, recorder.inputs(), strict=True))
-    names = {**inputs, "pi": math.pi, **values}
-    components = [_component(text, names, place) for place, text in texts.items()]
-    tape = recorder.tape(components)
+    tape = recorder.tape(components(texts, recorder.inputs(), values))
     torque = StateTorque(
         tape, None, tape.needs_attitude, tuple(texts.values()), tuple(values.items())
     )
     return law_of(torque) or torque
+
+
+def components(
+    texts: Mapping[str, str], inputs: Sequence[Any], constants: Mapping[str, Any]
+) -> list[Any]:
+    """Return the values of three checked expressions; `texts` has them by place.
+
+    `inputs` are the time, omega and the attitude, in this order. They are symbols, and so may be
+    the values of `constants`.
+    """
+    names = {**dict(zip(INPUTS, inputs, strict=True)), "pi": math.pi, **constants}
+    return [_component(text, names, place) for place, text in texts.items()]
 
 
 def _checked_constants(constants: object) -> dict[str, float]:

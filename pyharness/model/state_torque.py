@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from inspect import Parameter, signature
 from typing import Any
 
@@ -12,10 +13,10 @@ from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.law_symbols import body_torque
-from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, called_once
+from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder, Symbol, called_once
 from pyharness.model.tape import FLOATS, N_INPUTS, TIME, Tape, evaluate
 from pyharness.model.torque_law import FRAMES, TorqueLaw
-from pyharness.model.values import Triple, three_floats
+from pyharness.model.values import Triple, converted, three_floats
 
 Function = Callable[..., Any]
 _ARGUMENTS = "allowed: a function of (t, omega), or of (t, omega, attitude)"
@@ -45,6 +46,11 @@ class StateTorque:
         The other summands as data of a scene file: at most one `TorqueLaw`, and then the ready
         terms. A term is a tuple of pairs of keys and values, of which the first is its kind. Empty
         for an expression alone, and if no scene file can describe the torque.
+    parameters : tuple of pairs
+        The names and values of the keyword arguments of the function from which the tape was
+        recorded, if it has such arguments with numbers as defaults.
+    varied : Tape or None
+        The function with these parameters as further inputs; None without parameters.
     parts : tuple
         The torques and torque laws of a sum; empty for a torque that is no sum.
     is_zero, varies, in_space : bool
@@ -57,6 +63,8 @@ class StateTorque:
     expression: tuple[str, ...] = ()
     constants: tuple[tuple[str, float], ...] = ()
     terms: tuple[TorqueLaw | tuple[tuple[str, Any], ...], ...] = ()
+    parameters: tuple[tuple[str, float], ...] = field(default=(), compare=False, repr=False)
+    varied: Tape | None = field(default=None, compare=False, repr=False)
     parts: "tuple[StateTorque | TorqueLaw, ...]" = field(default=(), compare=False, repr=False)
     # A torque law has these attributes too.
     is_zero: bool = field(default=False, init=False, repr=False)
@@ -154,7 +162,9 @@ def recorded(function: Function) -> StateTorque:
     ----------
     function : callable
         A function of (t, omega) or of (t, omega, attitude) that returns the three components of the
-        torque about the body axes (N m). It is called once.
+        torque about the body axes (N m). It is called once, and once more if it has keyword
+        arguments whose defaults are numbers: these are parameters, and `solve` computes
+        sensitivities to them.
 
     Returns
     -------
@@ -176,15 +186,16 @@ def recorded(function: Function) -> StateTorque:
     """
     takes_attitude = _takes_attitude(function)
 
-    def called(time: Symbol, omega: Any, attitude: Any) -> list[Any]:
+    def called(time: Symbol, omega: Any, attitude: Any, **values: Symbol) -> list[Any]:
         given = (time, omega, attitude) if takes_attitude else (time, omega)
         allowed = "a function that returns three components in N m"
-        components = called_once(function, given, time.recorder, allowed)
+        with_values = partial(function, **values) if values else function
+        components = called_once(with_values, given, time.recorder, allowed)
         if len(components) != 3:
             raise InputError(f"[torque]: {len(components)} components; allowed: three")
         return components
 
-    return replayed(called)
+    return _with_parameters(replayed(called), function, called)
 
 
 def opaque(function: Function) -> StateTorque:
@@ -264,7 +275,34 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
         return [(amplitude(slot), f) for slot, (kind, f) in waves.items() if kind == wanted]
 
     constant = [output.constant for output in tape.outputs]
-    return TorqueLaw(constant, amplitude(TIME), those("sine"), those("cosine"))
+    law = TorqueLaw(constant, amplitude(TIME), those("sine"), those("cosine"))
+    if torque.parameters or torque.constants:
+        object.__setattr__(law, "named", torque)
+    return law
+
+
+def _with_parameters(torque: StateTorque, function: Function, called: Function) -> StateTorque:
+    """Return a torque with its parameters, the numbers among its function's keyword arguments.
+
+    They are no parameters if the function does anything with them that can't be recorded.
+    """
+    pairs = {
+        each.name: converted(each.default)
+        for each in signature(function).parameters.values()
+        if each.kind is Parameter.KEYWORD_ONLY and type(each.default) is not bool
+    }
+    values = {name: value for name, value in pairs.items() if isinstance(value, float)}
+    if not values or not all(map(math.isfinite, values.values())):
+        return torque
+    recorder = Recorder(MOST_OPERATIONS, N_INPUTS + len(values))
+    time, *state = recorder.inputs()
+    omega, attitude = (np.array(x, dtype=object) for x in (state[:3], state[3:7]))
+    try:
+        outputs = called(time, omega, attitude, **dict(zip(values, state[7:], strict=True)))
+        tape = recorder.tape(list(outputs))
+    except InputError:
+        return torque
+    return replace(torque, parameters=tuple(values.items()), varied=tape)
 
 
 def _parts(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, ...]":

@@ -1,4 +1,4 @@
-"""Derivatives of a tape with respect to its inputs, as another tape."""
+"""Derivatives of a tape with respect to its inputs or to parameters, as another tape."""
 
 import math
 from collections.abc import Sequence
@@ -29,6 +29,24 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
     found = [_dual(each, len(slots)) for each in evaluate(tape, inputs, _DUALS)]
     values, slopes = [each.value for each in found], [each.slopes for each in found]
     return recorder.tape([*values, *(slope for row in slopes for slope in row)])
+
+
+def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
+    """Return a tape with partial derivatives, for an equation that depends on parameters.
+
+    The last inputs of `tape` are m parameters, with these `values`. The other inputs are those of
+    the returned tape. Its outputs are the derivatives of the first output with respect to each
+    parameter, then those of the second output, and so on, and then the outputs of `tape`.
+    """
+    count = len(values)
+    instead = "fewer parameters"
+    recorder = Recorder(_MORE * MOST_OPERATIONS, tape.n_inputs - count, "sensitivities", instead)
+    inputs = [_Dual(symbol, [0.0] * count) for symbol in recorder.inputs()]
+    inputs += [
+        _Dual(value, [float(k == each) for k in range(count)]) for each, value in enumerate(values)
+    ]
+    found = [_dual(each, count) for each in evaluate(tape, inputs, _DUALS)]
+    return recorder.tape([*(slope for x in found for slope in x.slopes), *(x.value for x in found)])
 
 
 class _Dual:

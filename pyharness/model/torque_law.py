@@ -2,8 +2,8 @@
 
 import itertools
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.functions import cosine, sine
@@ -55,6 +55,9 @@ class TorqueLaw:
     sines: tuple[Wave, ...] = ()
     cosines: tuple[Wave, ...] = ()
     frame: str = "body"
+    # The torque with names for its numbers, a `StateTorque`, from which the law was recognised. A
+    # copy with other numbers has none.
+    named: Any = field(default=None, init=False, compare=False, repr=False)
 
     if TYPE_CHECKING:
 

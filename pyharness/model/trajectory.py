@@ -115,6 +115,10 @@ class Trajectory(Mechanics, Conversions):
     y_events : list of ndarray, or None
         For each function of events omega (rad/s), and the attitude if it was requested, with one
         row for each event: shape (k, 3) or (k, 7).
+    sensitivities : dict of ndarray, or None
+        The derivatives of omega (rad/s), and of the attitude's quaternion if it was requested, at
+        `time` with respect to parameters. For each requested name the array has shape (n, 3, m) or
+        (n, 7, m), where m is the number of values of the parameter.
 
     Examples
     --------
@@ -144,6 +148,7 @@ class Trajectory(Mechanics, Conversions):
     sol: "DenseOutput | None" = field(default=None, repr=False)
     t_events: list[Array] | None = field(default=None, repr=False)
     y_events: list[Array] | None = field(default=None, repr=False)
+    sensitivities: dict[str, Array] | None = field(default=None, repr=False)
 
     __repr__ = short_repr
 

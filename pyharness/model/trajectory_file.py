@@ -41,6 +41,7 @@ ROWS: dict[str, tuple[str, tuple[int, ...]]] = {
 AXES = "axes"  # an array without rows, shape (3, 3)
 # For all events: their number for each function, their times, and the states there.
 EVENTS = ("event_counts", "event_times", "event_states")
+SENSITIVITIES = "sensitivities"  # columns of all parameters; the header has their names and numbers
 MOST_FUNCTIONS = 10_000  # of events; each has arrays of its own
 _TAPED = "The torque was recorded from a function. Its operations are in the header."
 
@@ -71,11 +72,11 @@ def file_content(found: "Trajectory") -> bytes:
     header |= {name: int(getattr(found, name)) for name in ("steps", "evaluations")}
     header["stop"] = None if found.stop is None else asdict(found.stop)
     header["moments"] = _moments_record(found.moments)
+    header[SENSITIVITIES] = None
     header["scene"] = None
     arrays: dict[str, Any] = {}
     if found.scene is not None:
         header["scene"], arrays["scene"] = _scene_record(found.scene)
-    arrays["header"] = json.dumps(header)
     for name, (kind, _) in ROWS.items():
         # For methods, the recorded time is the time itself.
         if name != "recorded_time" or found.recorded_time is not found.time:
@@ -94,6 +95,13 @@ def file_content(found: "Trajectory") -> bytes:
         times = np.concatenate([np.zeros(0), *found.t_events])
         states = np.concatenate([np.zeros((0, width)), *found.y_events])
         arrays |= dict(zip(EVENTS, (counts, times, states), strict=True))
+    if found.sensitivities is not None:
+        columns = found.sensitivities
+        header[SENSITIVITIES] = [[name, each.shape[2]] for name, each in columns.items()]
+        width = 3 if found.attitude is None else 7
+        none = np.zeros((len(found.time), width, 0))
+        arrays[SENSITIVITIES] = np.concatenate([none, *columns.values()], axis=2)
+    arrays["header"] = json.dumps(header)
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, array in arrays.items():

@@ -1,0 +1,230 @@
+"""Parameters of a scene, and its equations of motion with their partial derivatives."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.dynamics.system import rates_of_changing, rates_of_inertia
+from pyharness.model.array_type import Array
+from pyharness.model.attitude import IDENTITY, product, quaternion_rates
+from pyharness.model.changing import Changing
+from pyharness.model.expressions import components
+from pyharness.model.law_symbols import body_torque
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque, torque_of
+from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder
+from pyharness.model.tape import N_INPUTS, Tape, evaluate
+from pyharness.model.tape_derivative import with_parameters
+from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.values import Triple
+
+OMEGA0, ATTITUDE = "omega0", "attitude"
+# The elements of an inertia matrix that are parameters, in this order.
+_ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+class _Body(NamedTuple):
+    """The inertia of a scene."""
+
+    moments: Triple | None
+    coefficients: Triple | None
+    inertia: tuple[Triple, ...] | None
+    changing: Changing | None
+
+
+class _Recorded(NamedTuple):
+    """A summand of the torque that is no law, with all that its derivatives depend on."""
+
+    tape: Tape
+    expression: tuple[str, ...]
+    constants: tuple[tuple[str, float], ...]
+    parameters: tuple[tuple[str, float], ...]
+    varied: Tape | None
+
+
+@dataclass(frozen=True)
+class VariedEquations:
+    """The equations of motion of a scene, and how they depend on parameters.
+
+    `tape` has the partial derivatives of the rates with respect to the parameters as outputs, and
+    then the rates of omega and, if it is computed, of the attitude. `forcings`, shape (n, m), are
+    for n rates and m columns the numbers of the outputs, from 1, that are the partial derivatives;
+    0 stands for a derivative that is 0. `columns` are those of each name.
+    """
+
+    tape: Tape
+    forcings: NDArray[np.int32]
+    columns: dict[str, slice]
+
+
+def is_opaque(scene: Scene) -> bool:
+    """Return whether the derivatives of the torque are unknown, because it can't be recorded."""
+    return isinstance(scene.torque, StateTorque) and scene.torque.tape is None
+
+
+def parameters_of(scene: Scene) -> dict[str, list[float]]:
+    """Return the values of the parameters of a scene by name, without those of its initial state.
+
+    A name that stands for two parameters of a torque is not among them.
+    """
+    found: dict[str, list[float]] = {}
+    if scene.moments is not None:
+        found["moments"] = list(scene.moments)
+    if scene.coefficients is not None:
+        found["coefficients"] = list(scene.coefficients)
+    if scene.inertia is not None:
+        found["inertia"] = [scene.inertia[i][j] for i, j in _ELEMENTS]
+    given = [each for part in _parts(scene.torque) for each in _parameters_of(part).items()]
+    names = [name for name, _ in given]
+    return found | {name: values for name, values in given if names.count(name) == 1}
+
+
+def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> VariedEquations:
+    """Return the equations of motion of a scene with their derivatives with respect to parameters.
+
+    `names` are those of parameters, or "omega0", or "attitude". The torque must not be opaque.
+    """
+    body = _Body(scene.moments, scene.coefficients, scene.inertia, scene.changing)
+    known = parameters_of(scene)
+    values = tuple((name, tuple(known.get(name, ()))) for name in names)
+    return _equations(body, tuple(map(_summand, _parts(scene.torque))), values, attitude)
+
+
+def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Array]:
+    """Return the state at time 0, shape (n,), and its derivatives by column, shape (n, m)."""
+    n, m = equations.forcings.shape
+    start = scene.attitude or IDENTITY
+    state = np.array([*scene.omega, *start])[:n]
+    slopes = np.zeros((n, m), order="F")
+    for name, columns in equations.columns.items():
+        if name == OMEGA0:
+            slopes[:3, columns] = np.eye(3)
+        elif name == ATTITUDE:
+            turns = [product(start, (0.0, *axis)) for axis in np.eye(3)]
+            slopes[3:, columns] = 0.5 * np.array(turns).T
+    return state, slopes
+
+
+@lru_cache(maxsize=64)
+def _equations(
+    body: _Body,
+    torque: tuple[TorqueLaw | _Recorded, ...],
+    values: tuple[tuple[str, tuple[float, ...]], ...],
+    attitude: bool,
+) -> VariedEquations:
+    """Return the equations for parameters, pairs of a name and values, in the order of columns.
+
+    A name without values is one of the initial state, with three columns.
+    """
+    n = 7 if attitude else 3
+    flat = [each for _, listed in values for each in listed]
+    recorder = Recorder(
+        2 * MOST_OPERATIONS, N_INPUTS + len(flat), "sensitivities", "fewer parameters"
+    )
+    time, *inputs = recorder.inputs()
+    state, rest = inputs[: N_INPUTS - 1], iter(inputs[N_INPUTS - 1 :])
+    omega, q = np.array(state[:3], dtype=object), state[3:]
+    given = {name: [next(rest) for _ in listed] for name, listed in values if listed}
+    total = sum(_torque(part, time, omega, q, given) for part in torque)
+    rates = list(_rates(body, time, omega, total, given))
+    if attitude:
+        rates += quaternion_rates((omega[0], omega[1], omega[2]), q)
+    tape = with_parameters(recorder.tape(rates), flat)
+    # The derivatives of a rate with respect to all parameters are outputs in a row.
+    forcings, columns = [], {}
+    parameter = first = 0
+    for name, listed in values:
+        m = len(listed) or 3
+        outputs = np.zeros((n, m), dtype=np.int32)
+        if listed:
+            outputs += len(flat) * np.arange(n)[:, None] + np.arange(parameter, parameter + m) + 1
+            is_zero = [[not any(tape.outputs[k - 1]) for k in row] for row in outputs.tolist()]
+            outputs[is_zero] = 0
+        forcings.append(outputs)
+        columns[name] = slice(first, first + m)
+        parameter += len(listed)
+        first += m
+    return VariedEquations(tape, np.asfortranarray(np.hstack(forcings)), columns)
+
+
+def _parts(torque: StateTorque | TorqueLaw) -> Sequence[StateTorque | TorqueLaw]:
+    """Return the summands of a torque; one that has names for its numbers is preferred to a law."""
+    if isinstance(torque, TorqueLaw):
+        return [torque if torque.named is None else torque.named]
+    return torque.parts or [torque]
+
+
+def _parameters_of(part: StateTorque | TorqueLaw) -> dict[str, list[float]]:
+    if isinstance(part, StateTorque):
+        pairs = (*part.constants, *part.parameters)
+        return {f"torque.{name}": [value] for name, value in pairs}
+    found = {"torque.constant": list(part.constant), "torque.rate": list(part.rate)}
+    for name in ("sines", "cosines"):
+        if waves := getattr(part, name):
+            found[f"torque.{name}"] = [x for amplitude, f in waves for x in (*amplitude, f)]
+    return found
+
+
+def _summand(part: StateTorque | TorqueLaw) -> TorqueLaw | _Recorded:
+    if isinstance(part, TorqueLaw):
+        return part
+    assert part.tape is not None
+    return _Recorded(part.tape, part.expression, part.constants, part.parameters, part.varied)
+
+
+def _torque(
+    part: TorqueLaw | _Recorded, time: Any, omega: Any, q: Any, given: Mapping[str, list[Any]]
+) -> Any:
+    """Return a summand of the torque in symbols, with symbols for the parameters in `given`."""
+    if isinstance(part, TorqueLaw):
+        law: Any = SimpleNamespace(in_space=part.frame == "space")
+        for name in ("constant", "rate"):
+            setattr(law, name, given.get(f"torque.{name}", getattr(part, name)))
+        for name in ("sines", "cosines"):
+            values = given.get(f"torque.{name}")
+            waves = getattr(part, name)
+            if values is not None:
+                waves = [(values[k : k + 3], values[k + 3]) for k in range(0, len(values), 4)]
+            setattr(law, name, waves)
+        return body_torque(law, time, q)
+    if any(f"torque.{name}" in given for name, _ in part.constants):
+        constants = {
+            name: given.get(f"torque.{name}", [value])[0] for name, value in part.constants
+        }
+        places = {f"[torque] expression {k}": text for k, text in enumerate(part.expression, 1)}
+        return np.array(components(places, (time, *omega, *q), constants), dtype=object)
+    others = [(f"torque.{name}", value) for name, value in part.parameters]
+    if part.varied is not None and any(name in given for name, _ in others):
+        numbers = [given.get(name, [value])[0] for name, value in others]
+        return np.array(evaluate(part.varied, [time, *omega, *q, *numbers], SYMBOLS), dtype=object)
+    return torque_of(part.tape, time, omega, q)
+
+
+def _rates(
+    body: _Body, time: Any, omega: Any, torque: Any, given: Mapping[str, list[Any]]
+) -> Sequence[Any]:
+    """Return the derivative of omega in symbols, with symbols for the parameters in `given`."""
+    if body.changing is not None:
+        return rates_of_changing(body.changing, time, omega, torque)
+    x, y, z = omega
+    if body.inertia is not None:
+        matrix = [list(row) for row in body.inertia]
+        for (i, j), value in zip(_ELEMENTS, given.get("inertia", ()), strict=False):
+            matrix[i][j] = matrix[j][i] = value
+        return rates_of_inertia(matrix, omega, torque)
+    products = y * z, z * x, x * y
+    if body.moments is None:
+        factors = given.get("coefficients", body.coefficients)
+        assert factors is not None
+        return [c * p + n for c, p, n in zip(factors, products, torque, strict=True)]
+    a, b, c = given.get("moments", body.moments)
+    differences = b - c, c - a, a - b
+    return [
+        (difference / moment) * p + n / moment
+        for difference, moment, p, n in zip(differences, (a, b, c), products, torque, strict=True)
+    ]

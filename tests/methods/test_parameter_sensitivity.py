@@ -1,0 +1,302 @@
+"""Sensitivities: derivatives with respect to parameters, against solutions of 40 digits."""
+
+import decimal
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import InputError, Scene, TorqueLaw, load, solve
+from pyharness.dynamics.parameters import parameters_of
+from pyharness.dynamics.scene_reader import scene_of_file
+from pyharness.events import crosses
+from pyharness.model.attitude import product
+from pyharness.model.changing import ChangingMoments
+from pyharness.torques import damping, opaque, recorded, table
+from tests.methods import parameter_campaign
+from tests.methods.parameter_campaign import KINDS, LIMIT, random_scene
+
+LAW = TorqueLaw((0.1, -0.2, 0.05), sines=[((0.1, 0.2, 0.3), 1.3)])
+BRICK = Scene("brick", (0.3, 1.1, -0.7), moments=(3.0, 2.0, 1.2))
+MATRIX = ((3.0, 0.2, -0.1), (0.2, 2.0, 0.3), (-0.1, 0.3, 1.2))
+
+
+def slopes(scene: Scene, times: Any, *names: str, **options: Any) -> Any:
+    found = solve(scene, times, **options, sensitivities=names)
+    assert found.sensitivities is not None
+    if len(names) == 1:
+        return found.sensitivities[names[0]]
+    return found.sensitivities
+
+
+def differences(
+    made: Callable[[Any], Scene], values: list[float], times: Any, attitude: bool = False
+) -> Any:
+    """Return derivatives of order four from solutions at a tolerance of 1e-15."""
+
+    def rows(k: int, size: float) -> Any:
+        changed = [x + size * (k == j) for j, x in enumerate(values)]
+        found = solve(made(changed), times, "taylor", 1e-15, attitude=attitude)
+        return found.y.T
+
+    h = 2.0**-9
+    columns = [
+        (8.0 * (rows(k, h) - rows(k, -h)) - (rows(k, 2.0 * h) - rows(k, -2.0 * h))) / (12.0 * h)
+        for k in range(len(values))
+    ]
+    return np.stack(columns, axis=2)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_errors_are_within_the_limit(kind: str) -> None:
+    scene, time, names = random_scene(Random(f"tested {kind}"), kind)
+    # Few columns and a short time suffice here; the campaign has all.
+    found = parameter_campaign.error_of(scene, np.copysign(1.5, time), names[::2])
+    assert found is not None
+    assert found[0] <= LIMIT / 100.0
+
+
+@pytest.mark.parametrize("times", [[1.0, 4.0], [-3.0, -1.0, 0.0, 2.0], [2.0, 1.0, -1.0]])
+def test_every_parameter_of_a_law_on_both_sides_of_0(times: list[float]) -> None:
+    scene = replace(BRICK, torque=LAW, attitude=(0.6, 0.0, 0.8, 0.0))
+    names = ["moments", "torque.constant", "omega0", "attitude", "torque.rate", "torque.sines"]
+    found = slopes(scene, times, *names, attitude=True)
+    assert list(found) == names
+    assert {name: found[name].shape for name in names} == {
+        name: (len(times), 7, 4 if name == "torque.sines" else 3) for name in names
+    }
+
+    def turned(angles: Any) -> Scene:
+        # To first order in the angles, and so are differences of the fourth order.
+        half = np.array(angles) / 2.0
+        size = np.sqrt(half @ half)
+        turn = (np.cos(size), *(half * np.sinc(size / np.pi)))
+        return replace(scene, attitude=product((0.6, 0.0, 0.8, 0.0), turn))
+
+    made: dict[str, tuple[Callable[[Any], Scene], list[float]]] = {
+        "moments": (lambda x: replace(scene, moments=x), [3.0, 2.0, 1.2]),
+        "omega0": (lambda x: replace(scene, omega=x), [0.3, 1.1, -0.7]),
+        "attitude": (turned, [0.0, 0.0, 0.0]),
+        "torque.constant": (
+            lambda x: replace(scene, torque=replace(LAW, constant=x)), [0.1, -0.2, 0.05]
+        ),
+        "torque.rate": (lambda x: replace(scene, torque=replace(LAW, rate=x)), [0.0, 0.0, 0.0]),
+        "torque.sines": (
+            lambda x: replace(scene, torque=TorqueLaw(LAW.constant, sines=[(x[:3], x[3])])),
+            [0.1, 0.2, 0.3, 1.3],
+        ),
+    }  # fmt: skip
+    for name, (scene_of, values) in made.items():
+        expected = differences(scene_of, values, times, attitude=True)
+        assert np.abs(found[name] - expected).max() <= 2e-8 * np.abs(expected).max()
+
+
+def test_rows_at_time_0_are_the_derivatives_of_the_initial_state() -> None:
+    found = slopes(BRICK, [-1.0, 0.0, 1.0], "omega0", "moments", "attitude", attitude=True)
+    assert np.array_equal(found["omega0"][1], np.eye(7, 3))
+    assert not found["moments"][1].any()
+    assert np.array_equal(found["attitude"][1][3:], 0.5 * np.eye(4, 3, -1))
+    assert np.array_equal(slopes(BRICK, 0.0, "omega0")[0], np.eye(3))
+
+
+def test_times_in_any_number_have_the_same_derivatives() -> None:
+    times = np.linspace(0.0, 9.0, 300)
+    many = slopes(BRICK, times, "omega0", "moments")
+    one = slopes(BRICK, 9.0, "moments")
+    assert np.array_equal(many["moments"][-1], one[0])
+    few = slopes(BRICK, times[::50], "omega0")
+    assert np.abs(few - many["omega0"][::50]).max() <= 1e-12 * np.abs(few).max()
+
+
+def test_more_columns_than_lanes() -> None:
+    law = LAW + TorqueLaw(cosines=[((0.3, 0.2, 0.1), 0.7), ((0.1, 0.1, 0.1), 2.0)])
+    scene = replace(BRICK, torque=law)
+    names = ("omega0", "moments", "torque.cosines", "torque.sines", "torque.constant")
+    together = slopes(scene, [2.0, 5.0], *names)
+    for name in names:
+        alone = slopes(scene, [2.0, 5.0], name)
+        assert np.abs(together[name] - alone).max() <= 1e-12 * np.abs(alone).max()
+
+
+def test_a_full_inertia_has_six_elements() -> None:
+    scene = Scene("full", (0.3, 1.1, -0.7), inertia=MATRIX, torque=LAW)
+    places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+    def made(values: Any) -> Scene:
+        matrix: Any = np.zeros((3, 3))
+        for (i, j), value in zip(places, values, strict=True):
+            matrix[i, j] = matrix[j, i] = value
+        return replace(scene, inertia=matrix)
+
+    found = slopes(scene, [1.0, 3.0], "inertia", attitude=True)
+    expected = differences(made, [MATRIX[i][j] for i, j in places], [1.0, 3.0], attitude=True)
+    assert np.abs(found - expected).max() <= 1e-8 * np.abs(expected).max()
+
+
+def test_coefficients_and_an_inertia_that_changes() -> None:
+    body = Scene("body", (0.3, 1.1, -0.7), coefficients=(0.3, -0.6, 0.4), torque=LAW)
+    found = slopes(body, [1.0, 3.0], "coefficients")
+    expected = differences(
+        lambda x: replace(body, coefficients=x), [0.3, -0.6, 0.4], [1.0, 3.0]
+    )  # fmt: skip
+    assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
+    changing = Scene(
+        "booms", (0.3, 1.1, -0.7), ChangingMoments([(3.0, 0.1), (2.0, 0.2), (1.2,)]), torque=LAW
+    )
+    assert "moments" not in parameters_of(changing)
+    found = slopes(changing, [1.0, 3.0], "torque.constant")
+    expected = differences(
+        lambda x: replace(changing, torque=replace(LAW, constant=x)), [0.1, -0.2, 0.05], [1.0, 3.0]
+    )
+    assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
+
+
+def test_a_table_ends_steps_and_a_body_starts_from_rest() -> None:
+    held = table([0.0, 1.0, 2.0], [(0.1, 0.0, 0.2), (-0.3, 0.2, 0.0), (0.0, 0.0, 0.1)], "held")
+    scene = Scene("thruster", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.2), torque=held)
+    times = [0.5, 1.0, 1.5, 2.5]
+    found = slopes(scene, times, "omega0", "moments")
+    expected = differences(lambda x: replace(scene, omega=x), [0.0, 0.0, 0.0], times)
+    assert np.abs(found["omega0"] - expected).max() <= 1e-9 * np.abs(expected).max()
+    expected = differences(lambda x: replace(scene, moments=x), [3.0, 2.0, 1.2], times)
+    assert np.abs(found["moments"] - expected).max() <= 1e-9 * np.abs(expected).max()
+
+
+def _decay(t: Any, omega: Any, *, rate: float = 0.1, on: bool = True) -> Any:
+    return [-rate * w for w in omega]
+
+
+def test_parameters_of_functions_expressions_and_sums() -> None:
+    brake: Any = _decay
+    single = replace(BRICK, torque=brake)
+    assert parameters_of(single) == {"moments": [3.0, 2.0, 1.2], "torque.rate": [0.1]}
+    other: Any = partial(_decay, rate=0.3)
+    assert parameters_of(replace(BRICK, torque=other))["torque.rate"] == [0.3]
+    expected = differences(
+        lambda x: replace(BRICK, torque=partial(_decay, rate=x[0])), [0.1], [2.0]  # type: ignore[arg-type]
+    )  # fmt: skip
+    found = slopes(single, [2.0], "torque.rate")
+    assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
+    # The name of two parameters is the name of none.
+    twice = replace(BRICK, torque=recorded(brake) + recorded(other) + LAW + damping(0.1))
+    assert list(parameters_of(twice)) == ["moments", "torque.constant", "torque.sines"]
+    assert np.array_equal(
+        slopes(twice, [2.0], "torque.sines"),
+        slopes(replace(BRICK, torque=twice.torque), [2.0], "torque.sines"),
+    )
+
+
+def test_a_function_that_branches_has_no_parameters() -> None:
+    def torque(t: Any, omega: Any, *, sign: float = 1.0, gain: float = 0.5) -> Any:
+        return [-(gain if sign > 0 else -gain) * w for w in omega]
+
+    given: Any = torque
+    assert list(parameters_of(replace(BRICK, torque=given))) == ["moments"]
+
+
+@pytest.mark.parametrize("expression", ['["a*w1", "b", "0"]', '["a", "b*sin(t)", "0"]'])
+def test_constants_of_a_scene_file(expression: str) -> None:
+    text = (
+        'name = "named"\n[body]\nmoments = [3.0, 2.0, 1.2]\n'
+        "[initial]\nomega = [0.3, 1.1, -0.7]\n"
+        f"[torque]\nexpression = {expression}\n[torque.constants]\na = 0.2\nb = -0.1\n"
+    )
+
+    def scene(values: list[float]) -> Scene:
+        given = text.replace("0.2\n", f"{values[0]!r}\n").replace("-0.1\n", f"{values[1]!r}\n")
+        return scene_of_file(given.encode(), "", "scene file")
+
+    found = slopes(scene([0.2, -0.1]), [2.0], "torque.a", "torque.b")
+    expected = differences(scene, [0.2, -0.1], [2.0])
+    for k, name in enumerate(("torque.a", "torque.b")):
+        assert np.abs(found[name][..., 0] - expected[..., k]).max() <= 1e-9
+
+
+def test_a_function_that_is_a_law_keeps_its_names_until_its_numbers_change() -> None:
+    def push(t: Any, omega: Any, *, size: float = 0.3) -> Any:
+        return [size, 0.0, size * np.sin(t)]
+
+    given: Any = push
+    scene = replace(BRICK, torque=given)
+    assert isinstance(scene.torque, TorqueLaw)
+    assert list(parameters_of(replace(scene, omega=(1.0, 2.0, 3.0)))) == ["moments", "torque.size"]
+    other = replace(scene, torque=replace(scene.torque, rate=(0.0, 1.0, 0.0)))
+    assert list(parameters_of(other)) == [
+        "moments", "torque.constant", "torque.rate", "torque.sines",
+    ]  # fmt: skip
+
+
+def test_rows_that_are_removed_have_no_derivatives() -> None:
+    found = solve(
+        BRICK, np.linspace(0.0, 20.0, 101), events=crosses(1, 0.0, terminal=True),
+        sensitivities=["omega0"],
+    )  # fmt: skip
+    assert found.sensitivities is not None
+    assert 0 < len(found.time) < 101
+    assert found.sensitivities["omega0"].shape == (len(found.time), 3, 3)
+
+
+def test_saved_and_loaded(tmp_path: Path) -> None:
+    found = solve(BRICK, [0.0, 1.0], sensitivities=["moments", "omega0"])
+    found.save(tmp_path / "found.npz")
+    again = load(tmp_path / "found.npz")
+    assert again.sensitivities is not None
+    assert found.sensitivities is not None
+    assert list(again.sensitivities) == ["moments", "omega0"]
+    for name, array in found.sensitivities.items():
+        assert again.sensitivities[name].tobytes() == np.ascontiguousarray(array).tobytes()
+    assert solve(BRICK, 1.0, sensitivities=[]).sensitivities == {}
+    assert solve(BRICK, 1.0).sensitivities is None
+
+
+def _absolute(t: Any, omega: Any) -> Any:
+    return [-abs(w) for w in omega]
+
+
+@pytest.mark.parametrize(
+    ("scene", "names", "options", "message"),
+    [
+        (BRICK, ["mass"], {}, "sensitivities: unknown parameter 'mass'; allowed: omega0, moments"),
+        (BRICK, "omega0", {}, "sensitivities: text; allowed: names, as in"),
+        (BRICK, [1], {}, "sensitivities: a whole number; allowed: names"),
+        (BRICK, 3, {}, "sensitivities: a whole number; allowed: names"),
+        (BRICK, ["attitude"], {}, "the attitude is not computed; give attitude=True"),
+        (BRICK, ["omega0"], {"method": "rk45"}, "the method is rk45; allowed: auto, taylor"),
+        (
+            replace(BRICK, torque=opaque(_absolute)), ["omega0"], {"method": "dop853"},
+            "the method is dop853",
+        ),
+        (
+            replace(BRICK, torque=damping(-0.5)), ["omega0"], {"effort": 1e-4, "times": 50.0},
+            "work limit",
+        ),
+    ],
+)  # fmt: skip
+def test_mistakes_are_one_line(
+    scene: Scene, names: Any, options: dict[str, Any], message: str
+) -> None:
+    times = options.pop("times", 1.0)
+    with pytest.raises(InputError, match=message.replace("(", r"\(")):
+        solve(scene, times, **options, sensitivities=names)
+
+
+def test_the_truth_of_this_file_is_known_for_a_sphere() -> None:
+    # omega is (omega0 + N t/I), so that the derivatives are 1, -N t/I^2 and t/I.
+    sphere = Scene(
+        "sphere", (1.0, 0.0, 0.5), moments=(2.0, 2.0, 2.0), torque=TorqueLaw((0.4, 0, 0))
+    )
+    with decimal.localcontext() as context:
+        context.prec = 40
+        truth = parameter_campaign.differences(
+            replace(sphere, torque=TorqueLaw((0.4, 0, 0), (0, 0.5, 0))), ["torque.constant"], [3.0]
+        )
+    assert truth is not None
+    assert truth["torque.constant"][0, 0, 0] == pytest.approx(1.5, rel=1e-9)
+    found = slopes(sphere, [3.0], "omega0", "moments", "torque.constant")
+    assert found["torque.constant"][0, 0, 0] == pytest.approx(1.5, rel=1e-14)
+    assert found["moments"][0, 0, 0] == pytest.approx(-0.4 * 3.0 / 4.0, rel=1e-13)

@@ -15,7 +15,7 @@ from pyharness.ensembles.reductions import empty
 from pyharness.ensembles.store import Store, check_store, opened
 from pyharness.ensembles.sweep import Sweep
 from pyharness.model.errors import InputError
-from pyharness.model.progress import Progress, no_progress
+from pyharness.model.progress import Progress, progress_of
 
 # Ratio of the memory that a process needs to the size of a chunk. The process holds several chunks
 # at once, and needs additional memory to compute them.
@@ -91,7 +91,7 @@ def swept(
     workers: int | None = None,
     address: str | None = None,
     before: Callable[[Estimate], None] = lambda estimate: None,
-    progress: Progress = no_progress,
+    progress: bool | Progress = False,
     repair: bool = False,
 ) -> Iterator[tuple[Store, Outcome]]:
     """Compute the missing chunks of a sweep, and yield the open store and the outcome of the run.
@@ -108,7 +108,8 @@ def swept(
             # before any file is written.
             with engine(executor, workers, address) as own:
                 store = stack.enter_context(opened(sweep, path, repair))
-                outcome = _completed(store, own, before, progress)
+                with progress_of(progress, "chunks") as report:
+                    outcome = _completed(store, own, before, report)
         except OSError as error:
             raise InputError(
                 f"--out '{path}': {error.strerror or error}; finished chunks are kept, and "
@@ -124,7 +125,7 @@ def run_sweep(
     workers: int | None = None,
     address: str | None = None,
     before: Callable[[Estimate], None] = lambda estimate: None,
-    progress: Progress = no_progress,
+    progress: bool | Progress = False,
     repair: bool = False,
 ) -> Outcome:
     """Compute the chunks of a sweep that its store does not have yet, and return the outcome.
@@ -146,9 +147,10 @@ def run_sweep(
         default this executor starts a cluster on this machine.
     before : callable
         A function that is called with the forecast before anything is computed.
-    progress : callable
-        A function that is called after each chunk with the number of computed chunks, the number of
-        chunks to compute, and the text "chunks".
+    progress : bool or callable
+        True for a progress bar, in a terminal or in a notebook; or a function that is called after
+        each chunk with the number of computed chunks, the number of chunks to compute, and the text
+        "chunks".
     repair : bool
         Whether to compute damaged chunks again, and to write damaged metadata again, instead of
         raising an error.

@@ -45,10 +45,15 @@ from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.extension import extension
 from pyharness.model.pieces import for_each_piece
+from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import Array
-from pyharness.model.values import Number, finite
+from pyharness.model.values import Number, boolean, finite
 from pyharness.model.waves import with_merged_rows
+
+_BODY = ("moments", "coefficients", "inertia")
+_TORQUE = ("torque_constant", "torque_rate", "sines", "cosines")
+_STARTS = ("omega0", "attitude0")
 
 
 def solve_many(
@@ -70,6 +75,7 @@ def solve_many(
     effort: float = 1.0,
     threads: int = 1,
     out: "Ensemble | Array | None" = None,
+    progress: bool = False,
 ) -> Ensemble:
     """Solve many scenes in one call, each to its own final time.
 
@@ -113,6 +119,8 @@ def solve_many(
     out : Ensemble, or array of shape (n, 3), optional
         The object into which the results are written: either the Ensemble of an earlier call with
         as many bodies, or an array for omega.
+    progress : bool
+        Whether to show a progress bar, in a terminal or in a notebook.
 
     Returns
     -------
@@ -138,12 +146,27 @@ def solve_many(
     array([[-0.958924,  0.283662, 10.      ],
            [ 1.196944, -1.602287,  5.      ]])
     """
-    kinds = {"moments": moments, "coefficients": coefficients, "inertia": inertia}
-    torques = {
-        "torque_constant": torque_constant, "torque_rate": torque_rate, "sines": sines,
-        "cosines": cosines,
+    arrays = {
+        "omega0": omega0, "attitude0": attitude0, "moments": moments, "coefficients": coefficients,
+        "inertia": inertia, "torque_constant": torque_constant, "torque_rate": torque_rate,
+        "sines": sines, "cosines": cosines,
     }  # fmt: skip
-    starts = {"omega0": omega0, "attitude0": attitude0}
+    with bar_of_bodies(boolean("progress", progress)):
+        return _solved(
+            scene, t_end, arrays, out, step, method=method, tolerance=tolerance, effort=effort,
+            threads=threads,
+        )  # fmt: skip
+
+
+def _solved(
+    scene: Scene | Sequence[Scene], t_end: Any, arrays: dict[str, Any],
+    out: "Ensemble | Array | None", step: Number | None, *, method: str, tolerance: Number | None,
+    effort: float, threads: int,
+) -> Ensemble:  # fmt: skip
+    """Return the final states of many scenes; `arrays` has the arrays of `solve_many` by name."""
+    kinds, torques, starts = (
+        {name: arrays[name] for name in names} for names in (_BODY, _TORQUE, _STARTS)
+    )
     own = {name: value for name, value in {**starts, **torques}.items() if value is not None}
     kind = only_one(kinds)
     settings: dict[str, Any] = {
@@ -224,6 +247,7 @@ def _solve_groups(
     check_rows("t_end", times, n)
     times = spread(times, n)
     found = place_for(out, n, scenes[0].attitude is not None)
+    expect_bodies(n)
     groups: dict[int, list[int]] = {}
     for row, each in enumerate(scenes):
         kind = row if is_solved_alone(each, {}) else -1 if each.inertia is not None else -2

@@ -7,10 +7,14 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.model.progress import count_done, expect_bodies, has_bar
+
 # The most bodies in a piece. They take some milliseconds, after which Python checks for a signal.
 _PIECE = 1 << 18
 # The fewest bodies per thread. With fewer, a further thread costs more time than it saves.
 _SMALL = 256
+# The fewest pieces of many bodies if a bar shows the progress.
+_REPORTS = 100
 
 
 def share(
@@ -29,12 +33,14 @@ def share(
         # The work is done in the calling thread, because only the main thread receives signals.
         for piece in pieces:
             work(piece)
+            count_done(piece.stop - piece.start)
         return
     with ThreadPoolExecutor(min(threads, len(pieces))) as pool:
         jobs = [pool.submit(work, piece) for piece in pieces]
         try:
-            for job in jobs:
+            for job, piece in zip(jobs, pieces, strict=True):
                 job.result()
+                count_done(piece.stop - piece.start)
         except BaseException:
             # Only the main thread receives signals; the others poll this number.
             given_up[0] = 1
@@ -53,6 +59,9 @@ def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, thr
         return
     given_up = np.zeros(1, dtype=np.int32)
     count = max(1, -(-n // _PIECE), min(threads, n // _SMALL))
+    if has_bar():
+        expect_bodies(n)
+        count = max(count, min(_REPORTS, n))
     ends = [n * piece // count for piece in range(count + 1)]
     pieces = [slice(*each) for each in itertools.pairwise(ends)]
     share(lambda piece: work(piece, given_up), pieces, threads, given_up)

@@ -1,6 +1,9 @@
-"""The type of the functions to which a long computation reports its progress."""
+"""Reports of the progress of a long computation, and a bar that shows it to users of Python."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
 
 Progress = Callable[[int, int, str], None]
 """The type of a function that is called as a computation completes its parts.
@@ -9,6 +12,9 @@ Its arguments are the number of completed parts, the number of all parts, and th
 that is computed next.
 """
 
+# The bar of the bodies that are being computed; None if no bar was requested.
+_bar: ContextVar[Any] = ContextVar("bar", default=None)
+
 
 def no_progress(done: int, total: int, what: str) -> None:
     """Ignore a report of progress; this is the default function of computations that report it.
@@ -16,3 +22,60 @@ def no_progress(done: int, total: int, what: str) -> None:
     `done` is the number of completed parts, `total` the number of all parts, and `what` the name of
     the current part.
     """
+
+
+@contextmanager
+def bar_of_bodies(is_shown: bool) -> Iterator[None]:
+    """Show a progress bar of the bodies that are computed in this context, if `is_shown`.
+
+    The bar is that of tqdm, in a terminal or in a notebook.
+    """
+    if not is_shown:
+        yield
+        return
+    from tqdm.auto import tqdm
+
+    with tqdm(unit=" bodies", unit_scale=True) as bar:
+        token = _bar.set(bar)
+        try:
+            yield
+        finally:
+            _bar.reset(token)
+
+
+def has_bar() -> bool:
+    """Return whether a progress bar of bodies is shown."""
+    return _bar.get() is not None
+
+
+def expect_bodies(n: int) -> None:
+    """Tell the bar, if there is one, that n bodies are computed; only the first call counts."""
+    bar = _bar.get()
+    if bar is not None and bar.total is None:
+        bar.reset(total=n)
+
+
+def count_done(n: int) -> None:
+    """Tell the bar, if there is one, that n more bodies have been computed."""
+    bar = _bar.get()
+    if bar is not None:
+        bar.update(n)
+
+
+@contextmanager
+def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
+    """Provide the function that a user chose to report progress; True stands for a bar of parts."""
+    if not isinstance(choice, bool):
+        yield choice
+    elif not choice:
+        yield no_progress
+    else:
+        from tqdm.auto import tqdm
+
+        with tqdm(unit=f" {what}") as bar:
+
+            def show(done: int, total: int, what: str) -> None:
+                bar.total = total
+                bar.update(done - bar.n)
+
+            yield show

@@ -24,6 +24,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.extension import columns, extension
 from pyharness.model.listing import PROGRAMS, Listing, checked_listing
 from pyharness.model.pieces import share
+from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene, most_steps
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Number, boolean, integer, number_list
@@ -97,6 +98,7 @@ def run_many(
     at: Sequence[SupportsIndex] | None = None,
     threads: SupportsIndex = 1,
     effort: Number = 1.0,
+    progress: bool = False,
 ) -> ProgramEnsemble:
     """Run a compiled program of the thesis for n bodies in one call.
 
@@ -129,6 +131,8 @@ def run_many(
     effort : float
         Factor on the work limit. The work is the product of the number of bodies, the number of
         steps, and one plus the number of sines and cosines in the torque.
+    progress : bool
+        Whether to show a progress bar, in a terminal or in a notebook.
 
     Returns
     -------
@@ -197,7 +201,9 @@ def run_many(
             with np.errstate(over="ignore"):
                 first = np.array(cards) / inputs["body"]
     inputs["first"] = first
-    return _run(scene, listing, by_moments, inputs, n, wanted, may_stop, velocity, threads)
+    with bar_of_bodies(boolean("progress", progress)):
+        expect_bodies(n)
+        return _run(scene, listing, by_moments, inputs, n, wanted, may_stop, velocity, threads)
 
 
 def _run(

@@ -1,0 +1,71 @@
+"""The progress bar of calls for many bodies: it counts bodies, and changes no bit."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import InputError, Scene, TorqueLaw, run_many, solve_many, subset
+from pyharness.ensembles.run import run_sweep
+from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.torques import damping
+from tests.ensembles.sweeps import SQUARE, text, written
+
+BRICK = Scene("brick", (0.3, 1.1, -0.7), moments=(3.0, 2.0, 1.2))
+STARTS = np.random.default_rng(5).uniform(-1.0, 1.0, (700, 3))
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("torque", [TorqueLaw(), TorqueLaw((0.1, 0.0, 0.2)), damping(0.1)])
+def test_bar_counts_bodies_and_changes_no_bit(
+    torque: Any, threads: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = replace(BRICK, torque=torque)
+    given: dict[str, Any] = {"omega0": STARTS, "threads": threads}
+    plain = solve_many(scene, 2.0, **given)
+    assert capsys.readouterr().err == ""
+    found = solve_many(scene, 2.0, **given, progress=True)
+    assert found.omega.tobytes() == plain.omega.tobytes()
+    assert found.status.tobytes() == plain.status.tobytes()
+    shown = capsys.readouterr().err
+    assert "100%" in shown
+    assert "700/700" in shown
+    # Later calls show nothing.
+    solve_many(scene, 2.0, **given)
+    assert capsys.readouterr().err == ""
+
+
+def test_scenes_of_different_kinds_have_one_bar(capsys: pytest.CaptureFixture[str]) -> None:
+    full = Scene("full", (1.0, 0.0, 0.5), inertia=((3.0, 0.1, 0.0), (0.1, 2.0, 0.0), (0, 0, 1.5)))
+    scenes = [BRICK, full, replace(BRICK, torque=damping(0.1)), BRICK]
+    plain = solve_many(scenes, 1.0)
+    found = solve_many(scenes, 1.0, progress=True)
+    assert found.omega.tobytes() == plain.omega.tobytes()
+    assert "4.00/4.00" in capsys.readouterr().err
+
+
+def test_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    listing = subset("two-term")
+    scene = replace(BRICK, steps=20)
+    plain = run_many(scene, listing, omega0=STARTS)
+    found = run_many(scene, listing, omega0=STARTS, progress=True)
+    assert found.omega.tobytes() == plain.omega.tobytes()
+    assert "700/700" in capsys.readouterr().err
+    with pytest.raises(InputError, match="progress"):
+        run_many(scene, listing, omega0=STARTS, progress="yes")  # type: ignore[arg-type]
+
+
+def test_a_call_that_fails_leaves_no_bar(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(InputError, match="threads"):
+        solve_many(BRICK, 1.0, omega0=STARTS, threads=0, progress=True)
+    capsys.readouterr()
+    solve_many(BRICK, 1.0, omega0=STARTS)
+    assert capsys.readouterr().err == ""
+
+
+def test_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = written(tmp_path, text(SQUARE, top='chunk = 2\nreductions = ["end"]'))
+    run_sweep(read_sweep(file), str(tmp_path / "store"), progress=True)
+    assert "3/3" in capsys.readouterr().err

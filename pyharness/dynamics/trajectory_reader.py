@@ -173,7 +173,7 @@ def _sensitivities(
     arrays: dict[str, Any], names: Any, rows: dict[str, Any]
 ) -> dict[str, Array] | None:
     """Return the sensitivities by the name of the parameter, or None if there are none."""
-    if names is None:
+    if names is None and SENSITIVITIES not in arrays:
         return None
     array, counts = arrays[SENSITIVITIES], [_count(count) for _, count in names]
     shape = (len(rows["time"]), 3 if rows["attitude"] is None else 7, sum(counts))

@@ -374,6 +374,7 @@ FOREIGN: dict[str, Callable[[], bytes]] = {
         event_counts=np.zeros(20_000, "i8"), event_times=np.zeros(0), event_states=np.zeros((0, 7))
     ),
     "an infinity of events": _changed(**EVENT | {"event_counts": np.array([1e300])}),
+    "sensitivities without names": _changed(sensitivities=np.zeros((5, 7, 3))),
     "scene of numbers": _changed(scene=np.zeros(3)),
     "scene that is no TOML": _changed(scene="omega ="),
     "scene without a body": _changed(scene='[initial]\nomega = [1.0, 2.0, 3.0]'),
@@ -489,6 +490,8 @@ def _places(record: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
         ("stop", {"step": 1, "variable": "W", "quotient": 1.0}),
         ("stop", {"step": 1, "variable": "U", "quotient": None}),
         ("stop", {"step": -1, "variable": "U", "quotient": 1.0}),
+        ("sensitivities", [["omega0", 3]]), ("sensitivities", [["omega0", -1]]),
+        ("sensitivities", 1),
     ],
 )  # fmt: skip
 def test_wrong_value_of_the_header_is_refused(name: str, value: Any, tmp_path: Path) -> None:

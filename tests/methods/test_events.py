@@ -316,6 +316,16 @@ def test_function_of_one_number_alone() -> None:
     assert len(calls) > 30
 
 
+def test_a_function_that_mixes_the_times_of_an_array_is_called_for_each() -> None:
+    def largest_so_far(t: Any, omega: Any) -> Any:
+        # A number for one time, and for an array of times the largest of all.
+        return np.max(omega[1]) - 0.5
+
+    assert times_of(BODY, 9.0, largest_so_far) == pytest.approx(
+        times_of(BODY, 9.0, crosses(2, 0.5))
+    )
+
+
 def test_few_calls_with_arrays() -> None:
     calls: list[int] = []
 

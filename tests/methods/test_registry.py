@@ -135,6 +135,10 @@ def test_every_call_of_the_right_hand_side_is_counted(
     assert solve(scene, [0.5, 1.0], method, 1e-6).evaluations == slope.call_count
 
 
+def test_orders_of_gauss_collocation_are_twice_its_stages() -> None:
+    assert [METHODS[f"gauss-{stages}"].order for stages in range(1, 9)] == list(range(2, 17, 2))
+
+
 def test_orders_of_the_programs_are_those_of_their_schemes() -> None:
     """Two or four points with one correction have order 2; eq. 31 has order 4."""
     orders = {name: program.order for name, program in PROGRAM_REGISTRY.items()}

@@ -170,6 +170,22 @@ static inline lanes convolved(const double (*v)[SIDE_BY_SIDE], const double *a,
   return first + second;
 }
 
+/* Return the same sum of many terms, in four parts that need not wait for each other. */
+static inline lanes convolved_many(const double (*v)[SIDE_BY_SIDE], const double *a,
+                                   const double (*w)[SIDE_BY_SIDE], const double *b, int k)
+{
+  lanes first = {0.0}, second = {0.0}, third = {0.0}, fourth = {0.0};
+  int j = 0;
+  for (; j + 1 < k; j += 2) {
+    first += loaded(v[j]) * a[k - j];
+    second += loaded(w[j]) * b[k - j];
+    third += loaded(v[j + 1]) * a[k - j - 1];
+    fourth += loaded(w[j + 1]) * b[k - j - 1];
+  }
+  if (j < k) first += loaded(v[j]) * a[k - j], second += loaded(w[j]) * b[k - j];
+  return (first + second) + (third + fourth);
+}
+
 /* Return the same sum for one of each. */
 static inline lanes convolved_one(const double (*v)[SIDE_BY_SIDE], const double *a, int k)
 {
@@ -203,11 +219,13 @@ static inline void perturb(const struct tape *tape, double h, int k, int is_forc
       x = perturbed(tape, first, k, (const perturbations *)v);
       break;
     case PRODUCT:
-      x = convolved(v[first], a[second], v[second], a[first], k);
+      x = is_forced ? convolved_many(v[first], a[second], v[second], a[first], k)
+                    : convolved(v[first], a[second], v[second], a[first], k);
       x += loaded(v[first][k]) * a[second][0] + loaded(v[second][k]) * a[first][0];
       break;
     case QUOTIENT:
-      x = convolved(v[second], a[out], v[out], a[second], k);
+      x = is_forced ? convolved_many(v[second], a[out], v[out], a[second], k)
+                    : convolved(v[second], a[out], v[out], a[second], k);
       x = (loaded(v[first][k]) - loaded(v[second][k]) * a[out][0] - x) / a[second][0];
       break;
     case SQRT:
@@ -237,18 +255,29 @@ static inline void perturb(const struct tape *tape, double h, int k, int is_forc
   }
 }
 
+/* Return the larger of two numbers in each lane; NaN in the second is not lost. */
+static inline lanes larger(lanes first, lanes second)
+{
+  const bits is_smaller = second <= first;
+  return (lanes)(((bits)first & is_smaller) | ((bits)second & ~is_smaller));
+}
+
+static inline int all_below(lanes x, lanes limit)
+{
+  const bits is_below = x <= limit;
+  long long all = -1;
+  for (int lane = 0; lane < SIDE_BY_SIDE; lane++) all &= is_below[lane];
+  return all != 0;
+}
+
 /* Return the largest term k of each perturbation of the unknowns, with weights that make the unknowns
    comparable. */
 static inline lanes largest_terms(const struct tape *tape, int k, const double *weights)
 {
   const bits magnitude = ~(bits)(-(lanes){0.0});
   lanes most = {0.0};
-  for (int i = 0; i < tape->n_unknowns; i++) {
-    lanes x = weights[i] * (lanes)((bits)loaded(tape->v[FIRST_UNKNOWN + i][k]) & magnitude);
-    /* NaN is not lost. */
-    bits is_smaller = x <= most;
-    most = (lanes)(((bits)most & is_smaller) | ((bits)x & ~is_smaller));
-  }
+  for (int i = 0; i < tape->n_unknowns; i++)
+    most = larger(most, weights[i] * (lanes)((bits)loaded(tape->v[FIRST_UNKNOWN + i][k]) & magnitude));
   return most;
 }
 
@@ -322,20 +351,21 @@ int OF_LEVEL(vary_tape, LEVEL)(const struct tape *tape, double h, int order, dou
       if (forcings[i][lane])
         force(tape, forcings[i][lane] - 1, h, order, (double(*)[SIDE_BY_SIDE])(terms[0] + lane));
   }
-  do {
+  for (;; k++) {
     if (k > 0) perturb(tape, h, k - 1, 1);
-    const lanes most = largest_terms(tape, k, weights);
-    *excess = 0.0;
-    for (int lane = 0; lane < SIDE_BY_SIDE; lane++) {
-      const double size = power * most[lane];
-      if (k <= FIRST_TERMS && !(size <= sizes[lane])) sizes[lane] = size;
-      if (!(size <= *excess * tolerance * sizes[lane])) *excess = size / (tolerance * sizes[lane]);
+    const lanes most = power * largest_terms(tape, k, weights);
+    if (k <= FIRST_TERMS) store(sizes, larger(loaded(sizes), most));
+    /* One or two terms may be zero between others. */
+    small = all_below(most, tolerance * loaded(sizes)) ? small + 1 : 0;
+    if (small == SMALL_TERMS || k == order) {
+      *excess = 0.0;
+      for (int lane = 0; lane < SIDE_BY_SIDE; lane++)
+        if (!(most[lane] <= *excess * tolerance * sizes[lane]))
+          *excess = most[lane] / (tolerance * sizes[lane]);
+      return k;
     }
     power *= factor;
-    /* One or two terms may be zero between others. */
-    small = *excess <= 1.0 ? small + 1 : 0;
-  } while (small < SMALL_TERMS && k++ < order);
-  return k < order ? k : order;
+  }
 }
 
 /* Sum the terms of the perturbations of each unknown up to `last` for the part `factor` of the

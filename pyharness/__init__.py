@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pyharness.compare.method_comparison import compare_methods
     from pyharness.dynamics.scene_reader import read_scene
     from pyharness.dynamics.trajectory_reader import load
+    from pyharness.methods.compiled_call import get_include
     from pyharness.methods.many import Ensemble, solve_many
     from pyharness.methods.prepared import prepare
     from pyharness.methods.prepared_attitude import AttitudeSolver
@@ -63,6 +64,7 @@ __all__ = [
     "case_scene",
     "compare_methods",
     "compare_programs",
+    "get_include",
     "load",
     "opaque",
     "prepare",
@@ -98,6 +100,7 @@ _SUBMODULES = {
     "methods.many": ("Ensemble", "solve_many"),
     "methods.prepared": ("prepare",),
     "methods.prepared_attitude": ("AttitudeSolver",),
+    "methods.compiled_call": ("get_include",),
     "methods.solver": ("Solver",),
     "methods.stepper": ("Stepper",),
     "methods.taylor_ivp": ("Taylor",),

@@ -1,9 +1,11 @@
 from collections.abc import Callable
-from typing import Self
+from typing import Any, Self
 
 from pyharness.model.attitude import Quaternion
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Number, Numbers, Triple
+
+SOLVE_AT: int
 
 class BoundKernel:
     def __new__(
@@ -14,6 +16,10 @@ class BoundKernel:
         packed_with_gil: Array | None = None,
     ) -> Self: ...
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array: ...
+    @property
+    def capsule(self) -> Any: ...
+    @property
+    def _address(self) -> int: ...
     @property
     def _ending(self) -> tuple[int, int, float, float, Triple, float] | None: ...
 
@@ -29,5 +35,9 @@ class BoundAttitudeKernel:
     def __call__(
         self, omega0: Numbers, t_end: Number, attitude0: Numbers | None = None
     ) -> tuple[Array, Array]: ...
+    @property
+    def capsule(self) -> Any: ...
+    @property
+    def _address(self) -> int: ...
     @property
     def _ending(self) -> tuple[int, int, float, float, Triple, float] | None: ...

@@ -12,6 +12,8 @@
 #define NPY_TARGET_VERSION NPY_2_0_API_VERSION
 #include <numpy/arrayobject.h>
 
+#include "pyharness.h"
+
 /* The type of solve_packed in api.f90, for three numbers; or of solve_packed_attitude, for
    seven. */
 typedef void kernel(const double *packed, const int *n_packed, const double *start,
@@ -41,6 +43,7 @@ typedef struct {
   /* The same scene for the closed form alone, or NULL. This call keeps the GIL, as it is shorter
      than releasing the GIL and waiting for it again. */
   PyArrayObject *packed_with_gil;
+  pyharness_solver exported; /* the same for compiled callers */
   PyObject *check;       /* (omega0, t_end, third) -> (floats of a start, float), or InputError */
   int width;             /* numbers in a start: OMEGA or MOST */
   double attitude[ATTITUDE]; /* at time 0, for a call that specifies none */
@@ -454,6 +457,16 @@ static PyObject *new_kernel(PyTypeObject *type, PyObject *args, PyObject *names)
     self->packed_with_gil = own_packed(packed_with_gil);
     if (self->packed_with_gil == NULL) goto failed;
   }
+  self->exported = (pyharness_solver){
+    .kernel = self->address,
+    .numbers = PyArray_DATA(self->packed),
+    .n_numbers = (int)PyArray_DIM(self->packed, 0),
+    .width = self->width,
+  };
+  if (self->packed_with_gil != NULL) {
+    self->exported.first = PyArray_DATA(self->packed_with_gil);
+    self->exported.n_first = (int)PyArray_DIM(self->packed_with_gil, 0);
+  }
   return (PyObject *)self;
 failed:
   Py_DECREF(self);
@@ -501,6 +514,37 @@ static PyObject *size_of(PyObject *object, PyObject *Py_UNUSED(unused))
   return PyLong_FromSize_t((size_t)Py_TYPE(object)->tp_basicsize + places);
 }
 
+/* ---- Compiled callers --------------------------------------------------------------------- */
+
+static void release(PyObject *capsule) { Py_XDECREF((PyObject *)PyCapsule_GetContext(capsule)); }
+
+/* Return a capsule with the address of `exported`, which keeps this solver. */
+static PyObject *get_capsule(PyObject *object, void *Py_UNUSED(closure))
+{
+  bound_kernel *self = (bound_kernel *)object;
+  if (self->address == NULL) {
+    PyErr_SetString(PyExc_AttributeError, "the kernel is a Python object");
+    return NULL;
+  }
+  PyObject *capsule = PyCapsule_New(&self->exported, PYHARNESS_SOLVER, release);
+  if (capsule != NULL && PyCapsule_SetContext(capsule, Py_NewRef(object)) < 0) {
+    Py_DECREF(object);
+    Py_CLEAR(capsule);
+  }
+  return capsule;
+}
+
+/* pyharness_solve without an estimate, for callers that have its address alone. */
+static int solve_at(const pyharness_solver *solver, const double *start, double t_end, double *state)
+{
+  return pyharness_solve(solver, start, t_end, state, NULL);
+}
+
+static PyObject *get_address(PyObject *object, void *Py_UNUSED(closure))
+{
+  return PyLong_FromVoidPtr(&((bound_kernel *)object)->exported);
+}
+
 static PyMethodDef methods[] = {
   {"__sizeof__", size_of, METH_NOARGS, NULL},
   {"__init_subclass__", init_subclass, METH_CLASS | METH_NOARGS, NULL},
@@ -511,6 +555,9 @@ static PyGetSetDef attributes[] = {
   {"_ending", get_ending, NULL,
    "Status, steps, error, growth, omega0 and t_end of this thread's last call; None before one.",
    NULL},
+  {"capsule", get_capsule, NULL,
+   "A capsule with the address of a pyharness_solver, for compiled code; see pyharness.h.", NULL},
+  {"_address", get_address, NULL, "The address of the pyharness_solver.", NULL},
   {NULL, NULL, NULL, NULL, NULL},
 };
 
@@ -547,6 +594,15 @@ PyMODINIT_FUNC PyInit__solver(void)
     return NULL;
   }
   PyObject *created = PyModule_Create(&module);
+  /* A union, because C converts no address of a function to one of data. */
+  const union {
+    int (*function)(const pyharness_solver *, const double *, double, double *);
+    void *address;
+  } entry = {solve_at};
+  PyObject *address = PyLong_FromVoidPtr(entry.address);
+  if (created != NULL && (address == NULL || PyModule_AddObjectRef(created, "SOLVE_AT", address) < 0))
+    Py_CLEAR(created);
+  Py_XDECREF(address);
   if (created != NULL &&
       (PyModule_AddObjectRef(created, "BoundKernel", (PyObject *)&bound_kernel_type) < 0 ||
        PyModule_AddObjectRef(created, "BoundAttitudeKernel",

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from pyharness.methods.compiled_call import CompiledCall, compiled_call
 from pyharness.methods.plan import Plan
 from pyharness.methods.problem import known
 from pyharness.methods.registry import GAUSS
@@ -47,6 +48,15 @@ class LastCall:
     def _scene_of_calls(self) -> Scene:
         """The scene about the axes to which the arguments and results of calls refer."""
         return self.plan.scene
+
+    @property
+    def ctypes(self) -> CompiledCall:
+        """Return the solver as a function for compiled code, such as that of numba.
+
+        The attribute `capsule` is the solver for code in C, with the header in the folder
+        `pyharness.get_include()`.
+        """
+        return compiled_call(self)
 
     def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
         """Return the trajectory from `omega0` (rad/s) at `times` (s), as `solve` computes it.

@@ -1,0 +1,41 @@
+"""Calls of prepared solvers from compiled code, without a call of Python."""
+
+from ctypes import CFUNCTYPE, c_double, c_int, c_void_p
+from pathlib import Path
+from typing import Any, NamedTuple
+
+
+class CompiledCall(NamedTuple):
+    """A prepared solver as a function for compiled code, as numba calls it.
+
+    ``function(data, start, t_end, state)`` reads the state at time 0 from the address `start`, and
+    writes that at `t_end` (s) to the address `state`: three floats, omega (rad/s), and for a solver
+    of the attitude four more, a unit quaternion. It returns an integer of `pyharness.h`, which is 0
+    if the solution is complete. `data` is the address of what the solver has prepared. It is valid
+    as long as `solver` exists.
+    """
+
+    function: Any
+    data: int
+    solver: object
+
+
+def compiled_call(solver: Any) -> CompiledCall:
+    """Return a prepared solver as a function for compiled code."""
+    from pyharness import _solver
+
+    prototype = CFUNCTYPE(c_int, c_void_p, c_void_p, c_double, c_void_p)
+    return CompiledCall(prototype(_solver.SOLVE_AT), solver._address, solver)
+
+
+def get_include() -> str:
+    """Return the folder of the header `pyharness.h`, with which C code calls prepared solvers.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from pyharness import get_include
+    >>> Path(get_include(), "pyharness.h").exists()
+    True
+    """
+    return str(Path(__file__).parent.parent / "include")

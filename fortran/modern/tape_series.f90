@@ -1,12 +1,13 @@
 module tape_series
   !! Taylor series of all slots of a tape (Jorba and Zou 2005, section 2), and of perturbations of
   !! the unknowns. A term includes its power of the step.
-  use, intrinsic :: iso_c_binding, only: c_int, c_intptr_t, c_loc, c_null_ptr, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_intptr_t, c_loc, c_null_ptr, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use operations, only: EXPONENTIAL => EXP, LINEAR, PRODUCT, QUOTIENT, SINE_COSINE, &
                         SQUARE_ROOT => SQRT, TABLE, TANGENT => TANH
   use tape, only: arrays_of, FIRST_UNKNOWN, piece_at, tape_arrays_t, tape_t, TIME_SLOT
+  use tape_growth, only: MOST_UNKNOWNS
   use tape_powers, only: find_powers, powers_t
   use two_words, only: sine_cosine_of
   implicit none(type, external)
@@ -33,6 +34,15 @@ module tape_series
     type(tape_arrays_t) :: arrays           !! what tape_terms.c reads of the tape
   end type series_t
 
+  ! Derivatives of the unknowns with respect to eight parameters, side by side.
+  type, bind(c), public :: block_t
+    type(tape_arrays_t) :: arrays  !! what tape_terms.c reads of the tape
+    !! The combination that is the partial derivative of a rate; 0 for none.
+    integer(c_int) :: forcings(SIDE_BY_SIDE, MOST_UNKNOWNS)
+    integer(c_int) :: last_term    !! of the series in this step
+    real(c_double) :: sizes(SIDE_BY_SIDE) !! largest derivatives so far, relative
+  end type block_t
+
   interface
     subroutine expand_tape(tape, h, order) bind(c, name="expand_tape_level")
       !! Compute all terms of all slots from their terms 0, and from the time and the tables.
@@ -57,22 +67,18 @@ module tape_series
       integer(c_int), intent(out) :: is_short  !! not 0: all terms do not suffice
     end function perturb_tape
 
-    integer(c_int) function vary_tape(tape, h, order, factor, weights, tolerance, forcings, &
-                                      sizes, excess) bind(c, name="vary_tape_level")
+    real(dp) function vary_tape(block, h, order, factor, weights, tolerance) &
+      bind(c, name="vary_tape_level")
       !! Compute the terms of derivatives with respect to parameters, as many as they need, and
-      !! return the last one's number.
-      import :: c_int, dp, SIDE_BY_SIDE, tape_arrays_t
+      !! return the size of the last ones in tolerances. All terms do not suffice if it is above 1.
+      import :: block_t, c_int, dp, MOST_UNKNOWNS
       implicit none(type, external)
-      type(tape_arrays_t), intent(in) :: tape
+      type(block_t), intent(inout) :: block
       real(dp), intent(in), value :: h
       integer(c_int), intent(in), value :: order
       real(dp), intent(in), value :: factor    !! the step over h
-      real(dp), intent(in) :: weights(tape%n_unknowns) !! make the unknowns comparable
+      real(dp), intent(in) :: weights(MOST_UNKNOWNS) !! make the unknowns comparable
       real(dp), intent(in), value :: tolerance !! of the terms that are left out, relative
-      !! Combinations that are partial derivatives of the rates; 0 for none.
-      integer(c_int), intent(in) :: forcings(SIDE_BY_SIDE, tape%n_unknowns)
-      real(dp), intent(inout) :: sizes(SIDE_BY_SIDE) !! largest values so far
-      real(dp), intent(out) :: excess          !! above 1: all terms do not suffice
     end function vary_tape
 
     subroutine sum_perturbations(tape, last, factor, sums) bind(c, name="sum_perturbations_level")

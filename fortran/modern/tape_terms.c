@@ -24,6 +24,17 @@ struct tape {
   series *a;        /* terms of each slot */
   perturbations *v; /* terms of the perturbations of each slot */
 };
+
+/* block_t of tape_series.f90. Where the derivative of unknown i depends on a parameter itself,
+   combination forcings[i][lane] of the series is the partial derivative; 0 stands for none. */
+enum { MOST_UNKNOWNS = 7 };
+struct block {
+  struct tape tape;
+  int forcings[MOST_UNKNOWNS][SIDE_BY_SIDE];
+  int last_term;
+  double sizes[SIDE_BY_SIDE];
+};
+
 enum { FIRST_TERMS = 3, SMALL_TERMS = 3 }; /* that decide the size, and the end, of derivatives */
 enum { FIRST_UNKNOWN = 1 }; /* the slot of omega's first component, from 0 */
 
@@ -333,23 +344,21 @@ static void force(const struct tape *tape, int n, double h, int order, double (*
 }
 
 /* Compute the terms of eight derivatives of the unknowns with respect to parameters, whose terms 0 are
-   inputs, to as many as they need for the part `factor` of the step. Return the number of the last
-   one. Where the derivative of unknown i depends on the parameter itself, combination
-   forcings[i][lane] of the series is the partial derivative; 0 stands for none. `sizes` are the
-   largest values so far, and `excess` is the largest of the last terms relative to them, in
-   tolerances. */
-int OF_LEVEL(vary_tape, LEVEL)(const struct tape *tape, double h, int order, double factor,
-                               const double *weights, double tolerance,
-                               const int (*forcings)[SIDE_BY_SIDE], double *sizes, double *excess)
+   inputs, to as many as they need for the part `factor` of the step. Return the largest of the last
+   terms, relative to the largest values so far, in tolerances. */
+double OF_LEVEL(vary_tape, LEVEL)(struct block *block, double h, int order, double factor,
+                                  const double *weights, double tolerance)
 {
+  const struct tape *tape = &block->tape;
+  double *sizes = block->sizes;
   double power = 1.0;
   int k = 0, small = 0;
   for (int i = 0; i < tape->n_unknowns; i++) {
     double(*terms)[SIDE_BY_SIDE] = tape->v[FIRST_UNKNOWN + i];
     memset(terms[1], 0, order * sizeof terms[1]);
     for (int lane = 0; lane < SIDE_BY_SIDE; lane++)
-      if (forcings[i][lane])
-        force(tape, forcings[i][lane] - 1, h, order, (double(*)[SIDE_BY_SIDE])(terms[0] + lane));
+      if (block->forcings[i][lane])
+        force(tape, block->forcings[i][lane] - 1, h, order, (double(*)[SIDE_BY_SIDE])(terms[0] + lane));
   }
   for (;; k++) {
     if (k > 0) perturb(tape, h, k - 1, 1);
@@ -358,11 +367,12 @@ int OF_LEVEL(vary_tape, LEVEL)(const struct tape *tape, double h, int order, dou
     /* One or two terms may be zero between others. */
     small = all_below(most, tolerance * loaded(sizes)) ? small + 1 : 0;
     if (small == SMALL_TERMS || k == order) {
-      *excess = 0.0;
+      double excess = 0.0;
       for (int lane = 0; lane < SIDE_BY_SIDE; lane++)
-        if (!(most[lane] <= *excess * tolerance * sizes[lane]))
-          *excess = most[lane] / (tolerance * sizes[lane]);
-      return k;
+        if (!(most[lane] <= excess * tolerance * sizes[lane]))
+          excess = most[lane] / (tolerance * sizes[lane]);
+      block->last_term = k;
+      return excess;
     }
     power *= factor;
   }

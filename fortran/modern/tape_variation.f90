@@ -7,10 +7,10 @@ module tape_variation
   use problem, only: step_request_t, step_t, variation_request_t, variation_t
   use statuses, only: COMPLETE, GAVE_UP, OVERFLOW
   use step_limit, only: check_steps, limit_of, step_limit_t
-  use tape, only: arrays_of, FIRST_UNKNOWN, next_break, tape_arrays_t, tape_t, TIME_SLOT
+  use tape, only: arrays_of, FIRST_UNKNOWN, next_break, tape_t
   use tape_growth, only: MOST_UNKNOWNS
-  use tape_series, only: allocate_series, derivatives_at, MOST_ORDER, series_t, SIDE_BY_SIDE, &
-                         sum_perturbations, vary_tape
+  use tape_series, only: allocate_series, block_t, derivatives_at, MOST_ORDER, series_t, &
+                         SIDE_BY_SIDE, sum_perturbations, vary_tape
   use tape_step, only: take_step
   implicit none(type, external)
   private
@@ -25,15 +25,6 @@ module tape_variation
   integer, parameter :: BYTES = 8                 ! of a number
   ! Step that is tried first, s. The series tells how much shorter or longer it will be.
   real(dp), parameter :: LONGEST_TRIAL = 1e3_dp
-
-  ! Derivatives with respect to eight parameters.
-  type :: block_t
-    real(dp) :: derivatives(SIDE_BY_SIDE, MOST_UNKNOWNS) !! of the unknowns
-    integer :: forcings(SIDE_BY_SIDE, MOST_UNKNOWNS)     !! as in variation_request_t
-    real(dp) :: sizes(SIDE_BY_SIDE)                      !! largest derivatives so far, relative
-    integer :: last_term                                 !! of the series in this step
-    type(tape_arrays_t) :: arrays                        !! what tape_terms.c reads
-  end type block_t
 
   public :: vary_solution
 
@@ -55,6 +46,7 @@ contains
     real(dp) :: weights(MOST_UNKNOWNS)        ! which make the unknowns comparable
     real(dp) :: sums(SIDE_BY_SIDE, MOST_UNKNOWNS)
     type(block_t), allocatable :: blocks(:)
+    real(dp), allocatable :: lanes(:, :, :)   ! (SIDE_BY_SIDE, MOST_UNKNOWNS, blocks): derivatives
     type(series_t) :: s
     type(step_request_t) :: step_request
     type(step_t) :: step
@@ -77,6 +69,8 @@ contains
     call allocate_series(tape, .false., memory, s, fits)
     if (.not. fits) return
     allocate (blocks(n_blocks), stat=failed)
+    if (failed /= 0) return
+    allocate (lanes(SIDE_BY_SIDE, MOST_UNKNOWNS, n_blocks), stat=failed)
     if (failed /= 0) return
     allocate (numbers(SIDE_BY_SIDE*(1 + (MOST_ORDER + 1)*int(tape%n_slots, int64)*n_blocks)), &
               stat=failed)
@@ -117,13 +111,13 @@ contains
       v = 0.0_dp
       do block = 1, n_blocks
         associate (b => blocks(block))
-          b%derivatives = 0.0_dp
+          lanes(:, :, block) = 0.0_dp
           b%forcings = 0
           b%sizes = 0.0_dp
           b%arrays = arrays_of(tape, c_loc(s%a), c_loc(v(1, 0, 1, block)))
           do column = SIDE_BY_SIDE*(block - 1) + 1, min(n_columns, SIDE_BY_SIDE*block)
             lane = column - SIDE_BY_SIDE*(block - 1)
-            b%derivatives(lane, :n) = request%starts(:, column)
+            lanes(lane, :n, block) = request%starts(:, column)
             b%forcings(lane, :n) = request%forcings(:, column)
           end do
         end associate
@@ -188,13 +182,11 @@ contains
       call derivatives_at(tape, [t, 0.0_dp], state(:n), s%h, s, ends(:n))
       ratio = 1.0_dp
       do block = 1, n_blocks
-        associate (b => blocks(block))
-          do i = 1, n
-            v(:, 0, FIRST_UNKNOWN - 1 + i, block) = b%derivatives(:, i)
-          end do
-          b%last_term = vary_tape(b%arrays, s%h, s%order, factor, weights, &
-                                  OF_DERIVATIVES*request%tolerance, b%forcings, b%sizes, excess)
-        end associate
+        do i = 1, n
+          v(:, 0, FIRST_UNKNOWN - 1 + i, block) = lanes(:, i, block)
+        end do
+        excess = vary_tape(blocks(block), s%h, s%order, factor, weights, &
+                           OF_DERIVATIVES*request%tolerance)
         if (.not. excess <= huge(excess)) then
           factor = 0.0_dp
           return
@@ -240,9 +232,8 @@ contains
       integer :: block, i, k
 
       do block = 1, n_blocks
-        associate (b => blocks(block))
-          call sum_perturbations(b%arrays, b%last_term, factor, b%derivatives)
-        end associate
+        call sum_perturbations(blocks(block)%arrays, blocks(block)%last_term, factor, &
+                               lanes(:, :, block))
       end do
       ends(:n) = 0.0_dp
       do k = s%order, 1, -1

@@ -31,6 +31,11 @@ def compiled_call(solver: Any) -> CompiledCall:
 def get_include() -> str:
     """Return the folder of the header `pyharness.h`, with which C code calls prepared solvers.
 
+    Returns
+    -------
+    str
+        The path of the folder, for an option such as ``-I`` of a compiler.
+
     Examples
     --------
     >>> from pathlib import Path

@@ -122,6 +122,18 @@ subroutine torque_free_solution(coefficients, coefficients_low, omega0, n_times,
                         status)
 end subroutine torque_free_solution
 
+subroutine torque_free_period(coefficients, coefficients_low, omega0, period)
+  ! Compute the period of the angular velocity of a torque-free body, s; 0 if it has none.
+  use torque_free, only: torque_free_period_of
+  implicit none
+  real(8), intent(in) :: coefficients(3)  ! A, B, C
+  real(8), intent(in) :: coefficients_low(3) ! low-order parts of A, B, C (double-double)
+  real(8), intent(in) :: omega0(3)        ! rad/s at time 0
+  real(8), intent(out) :: period
+
+  period = torque_free_period_of(coefficients, coefficients_low, omega0)
+end subroutine torque_free_period
+
 subroutine torque_free_attitude_solution(moments, moments_low, omega0, attitude0, n_times, times, &
                                          rows, attitudes, n_rows, status)
   ! Evaluate the closed form of a torque-free body and its attitude, a quaternion from body to

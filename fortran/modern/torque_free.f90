@@ -20,6 +20,7 @@ module torque_free
   real(dp), parameter :: FLAT = 4e-9_dp       ! difference whose square is negligible
   real(dp), parameter :: FAINT = 1e-240_dp    ! squares of smaller perturbations would underflow
   real(dp), parameter :: LARGE_PHASE = 1e15_dp
+  real(dp), parameter :: TWO_PI = 6.28318530717958648_dp
 
   type :: orbit_t
     !! One torque-free motion. Axis 2 of the orbit has the coefficient with the odd sign (the middle
@@ -39,9 +40,25 @@ module torque_free
     real(dp) :: lower(MOST_LEVELS)   !! a(n) b(n-1)
   end type orbit_t
 
-  public :: torque_free_rows
+  public :: torque_free_period_of, torque_free_rows
 
 contains
+
+  pure real(dp) function torque_free_period_of(coefficients, coefficients_low, omega0)
+    !! Return the period of the angular velocity of a torque-free body, s; 0 if it is constant, has
+    !! no period, or is not bounded.
+    real(dp), intent(in) :: coefficients(3), coefficients_low(3) !! as in torque_free_rows
+    real(dp), intent(in) :: omega0(3)        !! at time 0, rad/s, finite
+    type(orbit_t) :: orbit
+    integer :: status
+
+    call prepare(coefficients, coefficients_low, omega0, orbit, status)
+    torque_free_period_of = 0.0_dp
+    if (status == COMPLETE .and. orbit%kind == ELLIPTIC) then
+      torque_free_period_of = scale(TWO_PI/(orbit%frequency + orbit%frequency_low), &
+                                    -orbit%time_exponent)
+    end if
+  end function torque_free_period_of
 
   subroutine torque_free_rows(coefficients, coefficients_low, omega0, n_times, times, rows, &
                               n_rows, status)

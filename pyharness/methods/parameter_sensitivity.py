@@ -14,14 +14,18 @@ from pyharness.dynamics.parameters import (
     parameters_of,
     varied_equations,
 )
+from pyharness.methods.problem import remainders
 from pyharness.methods.recorded import kernel_tape
 from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, TimedError, kind_of, unknown
 from pyharness.model.extension import COMPLETE, GAVE_UP, extension
+from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Trajectory
 
+# Change of omega in a period, relative, from which on the derivatives of the period are used.
+_VARIES = 1e-2
 _METHODS = ("auto", "taylor", "closed-form")
 _MOST_NAMES = 1000
 
@@ -66,23 +70,90 @@ def sensitivities_at(
     """
     if not names:
         return {}
-    equations = varied_equations(scene, names, found.attitude is not None)
+    times, attitude = found.time, found.attitude is not None
+    period = 0.0 if attitude or not found.time.size else _period(scene)
+    # Two periods take as long as the calculation from one period.
+    if 0.0 < 2.0 * period < np.abs(times).max() and found.evaluations == 0:
+        columns, rows = _by_periods(scene, names, times, period, tolerance, effort)
+    else:
+        columns, rows, _ = _by_series(scene, names, attitude, times, tolerance, effort)
+    return {name: rows[:, :, each] for name, each in columns.items()}
+
+
+def _by_series(
+    scene: Scene, names: Sequence[str], attitude: bool, times: Array, tolerance: float,
+    effort: float,
+) -> tuple[dict[str, slice], Array, Array]:  # fmt: skip
+    """Return the columns of each name, all derivatives, shape (n, 3 or 7, m), and those at 0."""
+    equations = varied_equations(scene, names, attitude)
     state, starts = initial_state(scene, equations)
     packed, forcings = _packed(equations.tape, len(state), equations.forcings)
-    rows = np.empty((len(found.time), *starts.shape))
-    is_before = found.time < 0.0
+    rows = np.empty((len(times), *starts.shape))
+    is_before = times < 0.0
     for side in (is_before, ~is_before):
         places = np.flatnonzero(side)
         # Each side is computed from 0 outward.
-        places = places[np.argsort(np.abs(found.time[places]))]
+        places = places[np.argsort(np.abs(times[places]))]
         if places.size:
-            times = found.time[places]
+            own = times[places]
             derivatives, n_rows, status, _ = extension().tape_derivatives(
-                packed, state, starts, forcings, times, tolerance, effort
+                packed, state, starts, forcings, own, tolerance, effort
             )
-            _check(status, n_rows, times, derivatives)
+            _check(status, n_rows, own, derivatives)
             rows[places] = derivatives.transpose(2, 0, 1)
-    return {name: rows[:, :, columns] for name, columns in equations.columns.items()}
+    return equations.columns, rows, starts
+
+
+def _period(scene: Scene) -> float:
+    """Return the period of omega (s) of a scene without torque; 0 if it has none, or a torque.
+
+    It is 0 too if omega is so nearly constant that the period's derivatives would have few digits.
+    """
+    if scene.changing is not None or not scene.torque.is_zero:
+        return 0.0
+    bare = principal(scene)[0] if scene.inertia is not None else scene
+    period = extension().torque_free_period(bare.euler_coefficients, remainders(bare), bare.omega)
+    varies = period * np.abs(_slope(scene)).max() > _VARIES * max(map(abs, bare.omega))
+    return float(period) if varies else 0.0
+
+
+def _slope(scene: Scene) -> Array:
+    """Return the derivative of omega at time 0 of a scene without torque, shape (3,)."""
+    x, y, z = scene.omega
+    if scene.inertia is None:
+        return np.array(scene.euler_coefficients) * (y * z, z * x, x * y)
+    inertia, omega = np.array(scene.inertia), np.array(scene.omega)
+    slope: Array = -np.linalg.solve(inertia, np.cross(omega, inertia @ omega))
+    return slope
+
+
+def _by_periods(
+    scene: Scene, names: Sequence[str], times: Array, period: float, tolerance: float, effort: float
+) -> tuple[dict[str, slice], Array]:
+    """Return the columns of each name, and all derivatives of a periodic omega, shape (n, 3, m).
+
+    The equations of the derivatives have periodic coefficients (Floquet's theorem). A perturbation
+    of the initial omega changes the period, and therefore grows by the same multiple of the slope
+    of omega in every period: M = I + N is the matrix of one period, where N has rank 1, and N N =
+    0. Therefore k periods add up to M^k = I + k N, and the part that the parameters cause, F in the
+    first period, to k F + k (k - 1)/2 N F.
+    """
+    whole = np.floor(times / period)
+    rest = times - whole * period
+    inner, place = np.unique(np.append(np.clip(rest, 0.0, period), period), return_inverse=True)
+    columns, rows, starts = _by_series(
+        scene, (OMEGA0, *(x for x in names if x != OMEGA0)), False, inner, tolerance, effort
+    )
+    transition, last = rows[:, :, columns[OMEGA0]], rows[place[-1]]
+    slope = _slope(scene)
+    growth = slope @ (last[:, columns[OMEGA0]] - np.eye(3)) / (slope @ slope)
+    growth -= slope * (growth @ slope) / (slope @ slope)
+    shear = np.outer(slope, growth)
+    forced = last - last[:, columns[OMEGA0]] @ starts
+    k = whole[:, None, None]
+    change = k * (shear @ starts + forced) + 0.5 * k * (k - 1.0) * (shear @ forced)
+    found = transition[place[:-1]] @ change + rows[place[:-1]]
+    return {name: columns[name] for name in names}, found
 
 
 def _packed(

@@ -13,6 +13,7 @@ import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, load, solve
 from pyharness.dynamics.parameters import parameters_of
+from pyharness.dynamics.rates import rates
 from pyharness.dynamics.scene_reader import scene_of_file
 from pyharness.events import crosses
 from pyharness.model.attitude import product
@@ -283,6 +284,45 @@ def test_mistakes_are_one_line(
     times = options.pop("times", 1.0)
     with pytest.raises(InputError, match=message.replace("(", r"\(")):
         solve(scene, times, **options, sensitivities=names)
+
+
+PERIODIC = {
+    "brick": BRICK,
+    "symmetric": Scene("top", (0.3, 0.4, 1.0), moments=(2.0, 2.0, 1.2)),
+    "nearly symmetric": Scene("top", (0.3, 0.4, 1.0), moments=(2.0, 2.000001, 1.2)),
+    "nearly flipping": Scene("flip", (1e-5, 1.0, 2e-5), moments=(1.0, 2.0, 3.0)),
+    "small nutation": Scene("spin", (1.0, 0.05, 0.05), moments=(1.0, 2.0, 3.0)),
+    "steady": Scene("spin", (1.0, 0.0, 0.0), moments=(1.0, 2.0, 3.0)),
+    "nearly steady": Scene("spin", (1.0, 1e-6, 0.0), moments=(1.0, 2.0, 3.0)),
+    "coefficients": Scene("abc", (0.3, 1.1, -0.7), coefficients=(0.4, -0.7, 0.3)),
+    "full": Scene("full", (0.3, 1.1, -0.7), inertia=MATRIX),
+    "slow": Scene("slow", (3e-5, 1.1e-4, -7e-5), moments=(3.0, 2.0, 1.2)),
+}
+
+
+@pytest.mark.parametrize("kind", PERIODIC)
+def test_many_periods_are_those_of_the_series(kind: str) -> None:
+    scene = PERIODIC[kind]
+    times = np.array([-400.0, -33.3, 0.0, 1.0, 77.0, 500.0]) * (1e4 if kind == "slow" else 1.0)
+    names = [name for name in parameters_of(scene) if name != "torque.rate"]
+    found = slopes(scene, times, "omega0", *names)
+    series = slopes(scene, times, "omega0", *names, method="taylor")
+    for name, array in series.items():
+        limit = 1e-9 * np.abs(array).max()
+        assert np.abs(found[name] - array).max() <= limit
+
+
+def test_a_million_periods_take_as_long_as_one() -> None:
+    # The series would need ten million steps.
+    found = slopes(BRICK, [1e7, -1e7], "moments", "omega0", effort=1e-3)
+    assert np.isfinite(found["moments"]).all()
+    # A change of all moments by the same factor changes nothing.
+    assert np.abs(found["moments"] @ [3.0, 2.0, 1.2]).max() <= 1e-9 * np.abs(found["moments"]).max()
+    # omega0 multiplied by c is the motion in the time t/c: w + t w' in omega and its derivative.
+    scaled = found["omega0"] @ np.array(BRICK.omega)
+    state = solve(BRICK, [1e7, -1e7]).omega
+    expected = state + np.array([[1e7], [-1e7]]) * rates(BRICK, np.zeros(2), state)
+    assert np.abs(scaled - expected).max() <= 1e-8 * np.abs(expected).max()
 
 
 def test_the_truth_of_this_file_is_known_for_a_sphere() -> None:

@@ -9,8 +9,9 @@ import numpy as np
 from pyharness.model.symbols import MOST_OPERATIONS, Recorder
 from pyharness.model.tape import Functions, Table, Tape, evaluate
 
-# A derivative may have more operations than a recorded torque, because no kernel reads it.
-_MORE = 100
+# A derivative may have more operations than a recorded torque if no kernel reads it, and fewer if
+# one does, whose memory is proportional to their number.
+_MORE, _FEWER = 100, 10
 
 
 def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
@@ -40,7 +41,7 @@ def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
     """
     count = len(values)
     instead = "fewer parameters"
-    recorder = Recorder(_MORE * MOST_OPERATIONS, tape.n_inputs - count, "sensitivities", instead)
+    recorder = Recorder(_FEWER * MOST_OPERATIONS, tape.n_inputs - count, "sensitivities", instead)
     inputs = [_Dual(symbol, [0.0] * count) for symbol in recorder.inputs()]
     inputs += [
         _Dual(value, [float(k == each) for k in range(count)]) for each, value in enumerate(values)

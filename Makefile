@@ -8,6 +8,8 @@ FC := gfortran
 endif
 INSTALL ?= yes
 export INSTALL
+# Otherwise every process compiles all sources again, tests with their assertions above all.
+export PYTHONDONTWRITEBYTECODE :=
 CASE ?= 3
 ARGS ?=
 OUT ?= build/edition

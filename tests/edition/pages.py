@@ -2,6 +2,7 @@
 
 import posixpath
 from collections.abc import Iterator
+from functools import cache
 from html.parser import HTMLParser
 from typing import NamedTuple
 from urllib.parse import unquote
@@ -47,12 +48,19 @@ class Read(HTMLParser):
 
 def pages(site: dict[str, bytes]) -> dict[str, Read]:
     """Parse every page of a site."""
-    return {name: Read(each.decode()) for name, each in site.items() if name.endswith(".html")}
+    return {name: _parsed(each) for name, each in site.items() if name.endswith(".html")}
+
+
+@cache
+def _parsed(page: bytes) -> Read:
+    """Parse a page once, because many tests read the same large pages."""
+    return Read(page.decode())
 
 
 def dead(site: dict[str, bytes]) -> Iterator[str]:
     """Yield every link and every source that leads nowhere."""
     read = pages(site)
+    anchors = {name: set(page.anchors) for name, page in read.items()}
     for name, page in read.items():
         for element, path, anchor in page.targets:
             if "://" in path:
@@ -64,8 +72,8 @@ def dead(site: dict[str, bytes]) -> Iterator[str]:
             # The anchor of these pages is a state, not an element.
             elif (
                 anchor
-                and target in read
+                and target in anchors
                 and target not in ("laboratory.html", "body.html")
-                and anchor not in read[target].anchors
+                and anchor not in anchors[target]
             ):
                 yield f"{name}: {element} {path}#{anchor}"

@@ -171,10 +171,10 @@ def test_the_search_knows_cards_entries_claims_documents_and_names(
 ) -> None:
     data = built_site["assets/search-data.js"].decode()
     places = json.loads(data.removeprefix("window.searchData=").removesuffix(";\n"))
-    read = pages(built_site)
+    anchors = {name: set(page.anchors) for name, page in pages(built_site).items()}
     for each in places:
         page, _, anchor = each["href"].partition("#")
-        assert anchor in read[page].anchors, each["href"]
+        assert anchor in anchors[page], each["href"]
     kinds = {each["kind"] for each in places}
     assert {"card", "claim", "defect", "misreading", "document", "API"} <= kinds
     assert sum(each["kind"] == "card" for each in places) == 528

@@ -4,6 +4,7 @@ import math
 import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from random import Random
 from typing import Any
 
@@ -28,7 +29,7 @@ from pyharness import (
 )
 from pyharness.methods.registry import METHODS, REGISTRY
 from pyharness.model.attitude import IDENTITY
-from pyharness.truth.reference import reference
+from pyharness.truth.reference import Reference, reference
 
 BOOMS = ChangingMoments([[40.0, 0.5, -0.01], [30.0, -0.3, 0.0, 0.001], [20.0, 0.4]])
 SCENE = Scene("booms", (0.3, 1.0, -0.6), moments=BOOMS)
@@ -335,14 +336,20 @@ def test_reversed_time_reverses_the_motion(seed: int) -> None:
     assert difference(-backward.omega, forward.omega) < 3e-12
 
 
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("method", ["dop853", "radau", "lsoda", "rk45"])
-def test_scipy_methods_meet_their_tolerance(seed: int, method: str) -> None:
+@cache
+def solved(seed: int) -> tuple[Scene, float, Reference]:
+    """Return a random scene, a time (s) within its span, and the reference at this time."""
     source = Random(f"scipy {seed}")
     scene, time = draw(source, full=seed % 2 == 1)
     scene = replace(scene, torque=torque_of(source, scene, time))
+    return scene, time, reference(scene, [time])
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("method", ["dop853", "radau", "lsoda", "rk45"])
+def test_scipy_methods_meet_their_tolerance(seed: int, method: str) -> None:
+    scene, time, truth = solved(seed)
     found = solve(scene, time, method, 1e-6, attitude=True)
-    truth = reference(scene, [time])
     largest = max(np.abs(scene.omega).max(), np.abs(truth.omega).max())
     assert np.abs(found.omega - truth.omega).max() <= 1e-6 * largest
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from random import Random
 from typing import Any
 
@@ -14,7 +15,7 @@ from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS
 from pyharness.model.law_symbols import law_value
 from pyharness.model.state_torque import opaque, replayed
 from pyharness.scenes.state_scenes import draw, draw_ready
-from pyharness.truth.reference import reference
+from pyharness.truth.reference import Reference, reference
 
 MOMENTS = (4.0, 3.0, 2.0)
 
@@ -36,18 +37,24 @@ def test_steps_are_those_of_the_compiled_method(method: str, case: int) -> None:
     assert found.tolerance is None
 
 
-@pytest.mark.parametrize("method", FIXED_STEP)
-@pytest.mark.parametrize("number", range(6))
-def test_error_falls_with_the_order_of_the_step(method: str, number: int) -> None:
-    """The errors of omega and attitude against the reference in decimal arithmetic."""
+@cache
+def solved(number: int) -> tuple[Scene, float, Reference]:
+    """Return a random scene, a time (s), and the reference at this time."""
     source = Random(f"fixed {number}")
     names = {0: ("damping", "wave"), 1: ("gradient", "drag"), 2: ("quotient", "swing", "field")}
     drawn = draw(source, names[number]) if number in names else draw_ready(source)
     scene, time = drawn[0], math.copysign(2.0 / np.abs(drawn[0].omega).max(), drawn[1])
     if "table" in scene.name or "pulses" in scene.name:
         scene = replace(scene, torque=torques.gravity_gradient(scene.moments or MOMENTS, 0.5))
+    return scene, time, reference(scene, [time])
+
+
+@pytest.mark.parametrize("method", FIXED_STEP)
+@pytest.mark.parametrize("number", range(6))
+def test_error_falls_with_the_order_of_the_step(method: str, number: int) -> None:
+    """The errors of omega and attitude against the reference in decimal arithmetic."""
+    scene, time, truth = solved(number)
     with_attitude = scene.attitude is not None
-    truth = reference(scene, [time])
     errors = []
     for steps in (64, 128, 256):
         fine = replace(scene, step_size=abs(time) / steps)

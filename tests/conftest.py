@@ -16,6 +16,21 @@ if os.environ.get("PYHARNESS_TRAPS"):
     assert guard(extension()) > 0
 
 Printed = Callable[[str], str]
+# Tests that share the built site and the judgements of all claims, half a minute of work; and
+# tests that take long, at the end of which no process should wait for another.
+_FIRST = (
+    "tests/browser/", "tests/edition/", "tests/cli/test_edition.py", "tests/history/",
+    "tests/test_",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the tests that share most.
+
+    With `--dist worksteal` each process begins with a part of the list, and the first process has
+    all of them.
+    """
+    items.sort(key=lambda item: not item.nodeid.startswith(_FIRST))
 
 
 @pytest.fixture

@@ -64,4 +64,10 @@ def product(x: Row, reversed_y: Row) -> Decimal:
 
     It is a Taylor coefficient of the product of two series if the second list is in reversed order.
     """
+    if x and not x[-1]:
+        # Polynomials, such as those of time, end in many zeros, which change no digit of the sum.
+        n = len(x) - 1
+        while n and not x[n - 1]:
+            n -= 1
+        x = x[:n]
     return sum(map(mul, x, reversed_y), Decimal(0))

@@ -85,11 +85,13 @@ def taylor_series(
         # The Taylor series of a table is valid until the table changes.
         if stop is not None and abs(stop) <= abs(end):
             end, length = stop, stop - begin
-        while is_recorded and not _is_continued(at_end, series, end, length, tolerance):
+        state = _evaluate(series, length)
+        while is_recorded and not _is_continued(at_end, series, state, end, length, tolerance):
             length /= 2
             end = begin + length
             if end == begin:
                 return rows
+            state = _evaluate(series, length)
         if end == stop:
             stops += 1
         else:
@@ -100,7 +102,6 @@ def taylor_series(
             rows.append(_evaluate(series, times[len(rows)] - begin))
         if len(rows) == len(times) or equations.is_singular_before(length):
             return rows
-        state = _evaluate(series, length)
         begin = end
 
 
@@ -216,9 +217,12 @@ def _size(coefficients: list[Row], k: int, unknowns: int | None = None) -> Decim
 
 
 def _evaluate(coefficients: list[Row], t: Decimal) -> Row:
-    totals = [Decimal(0)] * len(coefficients)
-    for terms in reversed(list(zip(*coefficients, strict=True))):
-        totals = [total * t + term for total, term in zip(totals, terms, strict=True)]
+    totals = []
+    for row in coefficients:
+        total = Decimal(0)
+        for term in reversed(row):
+            total = total * t + term
+        totals.append(total)
     return totals
 
 
@@ -228,15 +232,21 @@ def _derivatives(coefficients: list[Row], t: Decimal) -> Row:
 
 
 def _is_continued(
-    equations: "_Equations", series: list[Row], end: Decimal, length: Decimal, tolerance: Decimal
+    equations: "_Equations",
+    series: list[Row],
+    state: Row,
+    end: Decimal,
+    length: Decimal,
+    tolerance: Decimal,
 ) -> bool:
     """Return whether the derivatives at the end of a step are those of the Taylor series.
 
     A pulse of the torque within the step may be too small to be seen at its beginning. `series`
-    contains the Taylor coefficients of the unknowns around the beginning. The step has the length
-    `length` and ends at the time `end` (s). `tolerance` is the local tolerance, relative to omega.
+    contains the Taylor coefficients of the unknowns around the beginning, and `state` their values
+    at the end. The step has the length `length` and ends at the time `end` (s). `tolerance` is the
+    local tolerance, relative to omega.
     """
-    state, slopes = _evaluate(series, length), _derivatives(series, length)
+    slopes = _derivatives(series, length)
 
     def rates(factor: Decimal) -> Row:
         # Where a table changes at the end of the step, its earlier piece is meant.

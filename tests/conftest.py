@@ -25,12 +25,13 @@ _FIRST = (
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the tests that share most.
+    """Begin with the tests that share most, if several processes run tests.
 
     With `--dist worksteal` each process begins with a part of the list, and the first process has
-    all of them.
+    all of them. A single process runs the tests in the order of its command line.
     """
-    items.sort(key=lambda item: not item.nodeid.startswith(_FIRST))
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        items.sort(key=lambda item: not item.nodeid.startswith(_FIRST))
 
 
 @pytest.fixture

@@ -518,14 +518,17 @@ static PyObject *size_of(PyObject *object, PyObject *Py_UNUSED(unused))
 
 static void release(PyObject *capsule) { Py_XDECREF((PyObject *)PyCapsule_GetContext(capsule)); }
 
+static PyObject *no_address(void)
+{
+  PyErr_SetString(PyExc_AttributeError, "the kernel is a Python object");
+  return NULL;
+}
+
 /* Return a capsule with the address of `exported`, which keeps this solver. */
 static PyObject *get_capsule(PyObject *object, void *Py_UNUSED(closure))
 {
   bound_kernel *self = (bound_kernel *)object;
-  if (self->address == NULL) {
-    PyErr_SetString(PyExc_AttributeError, "the kernel is a Python object");
-    return NULL;
-  }
+  if (self->address == NULL) return no_address();
   PyObject *capsule = PyCapsule_New(&self->exported, PYHARNESS_SOLVER, release);
   if (capsule != NULL && PyCapsule_SetContext(capsule, Py_NewRef(object)) < 0) {
     Py_DECREF(object);
@@ -542,6 +545,7 @@ static int solve_at(const pyharness_solver *solver, const double *start, double 
 
 static PyObject *get_address(PyObject *object, void *Py_UNUSED(closure))
 {
+  if (((bound_kernel *)object)->address == NULL) return no_address();
   return PyLong_FromVoidPtr(&((bound_kernel *)object)->exported);
 }
 

@@ -70,7 +70,7 @@ module tape_series
     real(dp) function vary_tape(block, h, order, factor, weights, tolerance) &
       bind(c, name="vary_tape_level")
       !! Compute the terms of derivatives with respect to parameters, as many as they need, and
-      !! return the size of the last ones in tolerances. All terms do not suffice if it is above 1.
+      !! return the factor, reduced until all terms suffice; 0 if they are not finite.
       import :: block_t, c_int, dp, MOST_UNKNOWNS
       implicit none(type, external)
       type(block_t), intent(inout) :: block

@@ -35,7 +35,9 @@ struct block {
   double sizes[SIDE_BY_SIDE];
 };
 
-enum { FIRST_TERMS = 3, SMALL_TERMS = 3 }; /* that decide the size, and the end, of derivatives */
+enum { SMALL_TERMS = 3, MOST_TRIES = 60 }; /* last terms of derivatives that are small; cuts of a step */
+#define SHORTER 0.7        /* factor of a cut */
+#define MOST_CANCELLED 1e3 /* largest term over the size of a derivative */
 enum { FIRST_UNKNOWN = 1 }; /* the slot of omega's first component, from 0 */
 
 /* The same at any address. */
@@ -343,39 +345,65 @@ static void force(const struct tape *tape, int n, double h, int order, double (*
   for (int k = 0; k < order; k++) to[k + 1][0] = h / (k + 1) * sum[k];
 }
 
+/* Return whether the terms up to `last` suffice for the part `factor` of the step: whether the last
+   ones are small, and none is much larger than the derivative itself. Its size is the largest so far,
+   or its first term that is not 0. */
+static int suffice(const struct block *block, int last, double factor, const double *weights,
+                   double tolerance)
+{
+  const lanes zero = {0.0};
+  lanes size = loaded(block->sizes), largest = zero, tail = zero;
+  double power = 1.0;
+  for (int k = 0; k <= last; k++, power *= factor) {
+    const lanes term = power * largest_terms(&block->tape, k, weights);
+    const bits begins = size == zero;
+    size = (lanes)(((bits)term & begins) | ((bits)size & ~begins));
+    largest = larger(largest, term);
+    if (k > last - SMALL_TERMS) tail = larger(tail, term);
+  }
+  return all_below(tail, tolerance * size) && all_below(largest, MOST_CANCELLED * size);
+}
+
 /* Compute the terms of eight derivatives of the unknowns with respect to parameters, whose terms 0 are
-   inputs, to as many as they need for the part `factor` of the step. Return the largest of the last
-   terms, relative to the largest values so far, in tolerances. */
+   inputs, to as many as they need for the part `factor` of the step. Return the factor, reduced until
+   the terms suffice; 0 if they are not finite. */
 double OF_LEVEL(vary_tape, LEVEL)(struct block *block, double h, int order, double factor,
                                   const double *weights, double tolerance)
 {
   const struct tape *tape = &block->tape;
-  double *sizes = block->sizes;
-  double power = 1.0;
-  int k = 0, small = 0;
+  const lanes zero = {0.0};
+  lanes size = loaded(block->sizes), beyond[TERMS_OF_PERTURBATION + 1];
+  double powers[TERMS_OF_PERTURBATION];
+  int k = 0, small = 0, tries = 0;
+  powers[0] = 1.0;
+  for (int j = 1; j <= order; j++) powers[j] = factor * powers[j - 1];
   for (int i = 0; i < tape->n_unknowns; i++) {
     double(*terms)[SIDE_BY_SIDE] = tape->v[FIRST_UNKNOWN + i];
     memset(terms[1], 0, order * sizeof terms[1]);
     for (int lane = 0; lane < SIDE_BY_SIDE; lane++)
       if (block->forcings[i][lane])
-        force(tape, block->forcings[i][lane] - 1, h, order, (double(*)[SIDE_BY_SIDE])(terms[0] + lane));
+        force(tape, block->forcings[i][lane] - 1, h, order,
+              (double(*)[SIDE_BY_SIDE])(terms[0] + lane));
   }
+  /* The largest part of any later term that does not depend on the derivatives. */
+  beyond[order + 1] = zero;
+  for (int j = order; j > 0; j--)
+    beyond[j] = larger(beyond[j + 1], powers[j] * largest_terms(tape, j, weights));
   for (;; k++) {
     if (k > 0) perturb(tape, h, k - 1, 1);
-    const lanes most = power * largest_terms(tape, k, weights);
-    if (k <= FIRST_TERMS) store(sizes, larger(loaded(sizes), most));
+    const lanes term = powers[k] * largest_terms(tape, k, weights);
+    const bits begins = size == zero;
+    size = (lanes)(((bits)term & begins) | ((bits)size & ~begins));
     /* One or two terms may be zero between others. */
-    small = all_below(most, tolerance * loaded(sizes)) ? small + 1 : 0;
-    if (small == SMALL_TERMS || k == order) {
-      double excess = 0.0;
-      for (int lane = 0; lane < SIDE_BY_SIDE; lane++)
-        if (!(most[lane] <= excess * tolerance * sizes[lane]))
-          excess = most[lane] / (tolerance * sizes[lane]);
-      block->last_term = k;
-      return excess;
-    }
-    power *= factor;
+    small = all_below(larger(term, beyond[k + 1]), tolerance * size) ? small + 1 : 0;
+    if (small == SMALL_TERMS || k == order) break;
   }
+  block->last_term = k;
+  while (!suffice(block, k, factor, weights, tolerance)) {
+    if (++tries > MOST_TRIES) return 0.0;
+    factor *= SHORTER;
+  }
+  return factor;
 }
 
 /* Sum the terms of the perturbations of each unknown up to `last` for the part `factor` of the

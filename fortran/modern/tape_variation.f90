@@ -23,8 +23,9 @@ module tape_variation
   real(dp), parameter :: CHEAP_SLOTS = 10.0_dp
   real(dp), parameter :: STEPS_BETWEEN_LOOKS = 1e4_dp
   integer, parameter :: BYTES = 8                 ! of a number
-  ! Step that is tried first, s. The series tells how much shorter or longer it will be.
-  real(dp), parameter :: LONGEST_TRIAL = 1e3_dp
+  ! Turn in the step that is tried first, rad. The series tells how much shorter or longer the step
+  ! will be.
+  real(dp), parameter :: TURN = 1.0_dp
 
   public :: vary_solution
 
@@ -123,7 +124,6 @@ contains
         end associate
       end do
       state(:n) = request%state
-      weights(4:) = 2.0_dp
       t = 0.0_dp
       t_end = request%times(size(request%times))
       do while (found%n_rows < size(request%times))
@@ -140,7 +140,8 @@ contains
         scale = sqrt(maxval(abs(ends(:3))))
         if (.not. (scale > 0.0_dp .and. scale <= huge(scale))) scale = 1.0_dp
       end if
-      trial = LONGEST_TRIAL
+      call weigh()
+      trial = TURN/scale
       cost = max(1.0_dp, tape%n_slots*n_blocks/CHEAP_SLOTS)
       limit = limit_of(request%effort*(MOST_STEPS/cost), 1 + int(STEPS_BETWEEN_LOOKS/cost, int64))
       ahead = 0.0_dp
@@ -165,36 +166,44 @@ contains
         call take_step(tape, step_request, s, step)
         if (step%status /= COMPLETE) return
         reached = maxval(abs(ends(:3)))
-        weights(:3) = 1.0_dp/scale
         if (largest > 0.0_dp .or. .not. (reached > 0.0_dp .and. reached < 0.5_dp*scale)) exit
         scale = reached
         trial = abs(step%h)
+        call weigh()
       end do
     end subroutine take
+
+    subroutine weigh()
+      !! Make the derivatives of omega and of the attitude comparable, and update their sizes.
+      integer :: block, i
+
+      weights(:3) = 1.0_dp
+      weights(4:) = 2.0_dp*scale
+      do block = 1, n_blocks
+        do i = 1, n
+          blocks(block)%sizes = max(blocks(block)%sizes, weights(i)*abs(lanes(:, i, block)))
+        end do
+      end do
+    end subroutine weigh
 
     subroutine expand_derivatives()
       !! Compute the terms of all derivatives, and reduce the factor on the step until they suffice.
       !! The factor becomes 0 if they are not finite.
-      real(dp) :: excess, ratio
+      real(dp) :: shortened
       integer :: block, i
 
       ! The check of the step has overwritten the values at its beginning.
       call derivatives_at(tape, [t, 0.0_dp], state(:n), s%h, s, ends(:n))
-      ratio = 1.0_dp
+      shortened = factor
       do block = 1, n_blocks
         do i = 1, n
           v(:, 0, FIRST_UNKNOWN - 1 + i, block) = lanes(:, i, block)
         end do
-        excess = vary_tape(blocks(block), s%h, s%order, factor, weights, &
-                           OF_DERIVATIVES*request%tolerance)
-        if (.not. excess <= huge(excess)) then
-          factor = 0.0_dp
-          return
-        end if
-        if (excess > 1.0_dp) ratio = min(ratio, excess**(-1.0_dp/s%order))
+        shortened = min(shortened, vary_tape(blocks(block), s%h, s%order, factor, weights, &
+                                             OF_DERIVATIVES*request%tolerance))
       end do
-      if (ratio < 1.0_dp) then
-        step%h = (t + ratio*step%h) - t
+      if (shortened < factor) then
+        step%h = (t + shortened*s%h) - t
         factor = step%h/s%h
       end if
     end subroutine expand_derivatives
@@ -247,6 +256,7 @@ contains
       t = merge(break_time, t + step%h, arrives())
       largest = max(largest, maxval(abs(state(:3))))
       if (largest > 0.0_dp) scale = largest
+      call weigh()
     end subroutine advance
 
   end subroutine vary_solution

@@ -1,5 +1,6 @@
 """Parameters of a scene, and its equations of motion with their partial derivatives."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -61,6 +62,11 @@ class VariedEquations:
     forcings: NDArray[np.int32]
     columns: dict[str, slice]
 
+    @property
+    def needs_attitude(self) -> bool:
+        """Whether the derivatives depend on the attitude."""
+        return self.tape.needs_attitude
+
 
 def is_opaque(scene: Scene) -> bool:
     """Return whether the derivatives of the torque are unknown, because it can't be recorded."""
@@ -79,9 +85,16 @@ def parameters_of(scene: Scene) -> dict[str, list[float]]:
         found["coefficients"] = list(scene.coefficients)
     if scene.inertia is not None:
         found["inertia"] = [scene.inertia[i][j] for i, j in _ELEMENTS]
-    given = [each for part in _parts(scene.torque) for each in _parameters_of(part).items()]
-    names = [name for name, _ in given]
-    return found | {name: values for name, values in given if names.count(name) == 1}
+    ambiguous = ambiguous_names(scene)
+    for part in _parts(scene.torque):
+        found |= {k: each for k, each in _parameters_of(part).items() if k not in ambiguous}
+    return found
+
+
+def ambiguous_names(scene: Scene) -> set[str]:
+    """Return the names that stand for parameters of two summands of the torque."""
+    counts = Counter(name for part in _parts(scene.torque) for name in _parameters_of(part))
+    return {name for name, count in counts.items() if count > 1}
 
 
 def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> VariedEquations:
@@ -130,11 +143,13 @@ def _equations(
     state, rest = inputs[: N_INPUTS - 1], iter(inputs[N_INPUTS - 1 :])
     omega, q = np.array(state[:3], dtype=object), state[3:]
     given = {name: [next(rest) for _ in listed] for name, listed in values if listed}
-    total = sum(_torque(part, time, omega, q, given) for part in torque)
-    rates = list(_rates(body, time, omega, total, given))
-    if attitude:
-        rates += quaternion_rates((omega[0], omega[1], omega[2]), q)
-    tape = with_parameters(recorder.tape(rates), flat)
+    # A constant that is not finite is refused.
+    with np.errstate(all="ignore"):
+        total = sum(_torque(part, time, omega, q, given) for part in torque)
+        rates = list(_rates(body, time, omega, total, given))
+        if attitude:
+            rates += quaternion_rates((omega[0], omega[1], omega[2]), q)
+        tape = with_parameters(recorder.tape(rates), flat)
     # The derivatives of a rate with respect to all parameters are outputs in a row.
     forcings, columns = [], {}
     parameter = first = 0
@@ -154,9 +169,8 @@ def _equations(
 
 def _parts(torque: StateTorque | TorqueLaw) -> Sequence[StateTorque | TorqueLaw]:
     """Return the summands of a torque; one that has names for its numbers is preferred to a law."""
-    if isinstance(torque, TorqueLaw):
-        return [torque if torque.named is None else torque.named]
-    return torque.parts or [torque]
+    parts = (torque,) if isinstance(torque, TorqueLaw) else torque.parts or (torque,)
+    return [getattr(part, "named", None) or part for part in parts]
 
 
 def _parameters_of(part: StateTorque | TorqueLaw) -> dict[str, list[float]]:

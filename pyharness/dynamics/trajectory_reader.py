@@ -165,7 +165,7 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
         tolerance=_estimate(header["tolerance"]),
         t_events=t_events,
         y_events=y_events,
-        sensitivities=_sensitivities(arrays, header[SENSITIVITIES], rows),
+        sensitivities=_sensitivities(arrays, header.get(SENSITIVITIES), rows),
     )
 
 

@@ -1,6 +1,6 @@
 """Calls of prepared solvers from compiled code, without a call of Python."""
 
-from ctypes import CFUNCTYPE, c_double, c_int, c_void_p
+from ctypes import PYFUNCTYPE, c_double, c_int, c_void_p
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,7 +24,8 @@ def compiled_call(solver: Any) -> CompiledCall:
     """Return a prepared solver as a function for compiled code."""
     from pyharness import _solver
 
-    prototype = CFUNCTYPE(c_int, c_void_p, c_void_p, c_double, c_void_p)
+    # This kind of function raises KeyboardInterrupt after Ctrl-C, if Python code calls it.
+    prototype = PYFUNCTYPE(c_int, c_void_p, c_void_p, c_double, c_void_p)
     return CompiledCall(prototype(_solver.SOLVE_AT), solver._address, solver)
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pyharness.dynamics.parameters import (
     ATTITUDE,
     OMEGA0,
+    ambiguous_names,
     initial_state,
     is_opaque,
     parameters_of,
@@ -27,7 +28,10 @@ from pyharness.model.trajectory import Trajectory
 # Change of omega in a period, relative, from which on the derivatives of the period are used.
 _VARIES = 1e-2
 _METHODS = ("auto", "taylor", "closed-form")
-_MOST_NAMES = 1000
+_MOST_COLUMNS = 200
+_THREE = (0.0, 0.0, 0.0)  # as many values as omega0 and the attitude have
+# The parameters whose equations are periodic for a body without torque.
+_PERIODIC = {OMEGA0, "moments", "coefficients", "inertia"}
 
 
 def checked_names(
@@ -45,16 +49,24 @@ def checked_names(
         raise InputError(f"{place}: {kind_of(names)}; {allowed}")
     if is_opaque(scene):
         raise InputError(f"{place}: the torque is opaque; allowed: a torque that can be recorded")
-    known = [OMEGA0, *([ATTITUDE] if attitude else []), *parameters_of(scene)]
+    values, ambiguous = parameters_of(scene), ambiguous_names(scene)
+    known = [OMEGA0, *([ATTITUDE] if attitude else []), *values]
     found: dict[str, None] = {}
-    for name in itertools.islice(names, _MOST_NAMES):
+    for name in itertools.islice(names, _MOST_COLUMNS + 1):
         if not isinstance(name, str):
             raise InputError(f"{place}: {kind_of(name)}; {allowed}")
         if name == ATTITUDE and not attitude:
             raise InputError(f"{place}: the attitude is not computed; give attitude=True")
+        if name in ambiguous:
+            raise InputError(f"{place}: {name} is the name of two parameters; allowed: other names")
         if name not in known:
             raise unknown("parameter", name, known, place)
         found[name] = None
+    if sum(len(values.get(name, _THREE)) for name in found) > _MOST_COLUMNS:
+        raise InputError(f"{place}: more than {_MOST_COLUMNS} values; give fewer names")
+    needs_attitude = found and varied_equations(scene, tuple(found), attitude).needs_attitude
+    if needs_attitude and not attitude:
+        raise InputError(f"{place}: the torque depends on the attitude; give attitude=True")
     return tuple(found)
 
 
@@ -71,9 +83,9 @@ def sensitivities_at(
     if not names:
         return {}
     times, attitude = found.time, found.attitude is not None
-    period = 0.0 if attitude or not found.time.size else _period(scene)
+    period = _period(scene) if found.time.size and set(names) <= _PERIODIC else 0.0
     # Two periods take as long as the calculation from one period.
-    if 0.0 < 2.0 * period < np.abs(times).max() and found.evaluations == 0:
+    if not attitude and 0.0 < 2.0 * period < np.abs(times).max() and found.evaluations == 0:
         columns, rows = _by_periods(scene, names, times, period, tolerance, effort)
     else:
         columns, rows, _ = _by_series(scene, names, attitude, times, tolerance, effort)

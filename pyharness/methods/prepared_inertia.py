@@ -25,6 +25,14 @@ from pyharness.model.values import Number, Numbers, three_floats
 from pyharness.model.waves import with_merged_waves
 
 
+def _no_compiled_call(solver: object) -> Any:
+    # Compiled code would take and return omega about the principal axes.
+    raise AttributeError(
+        "a solver for a full inertia matrix has no compiled call; allowed: a solver for the scene "
+        "that `principal` returns"
+    )
+
+
 class InertiaSolver(Solver):
     """A solver, made by `prepare`, of one scene with a full inertia matrix.
 
@@ -33,6 +41,8 @@ class InertiaSolver(Solver):
     principal axes. The attribute `growth` is the error amplification: the largest norm of the
     state-transition matrices of omega about principal axes.
     """
+
+    ctypes = capsule = property(_no_compiled_call)
 
     def __new__(
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
@@ -105,6 +115,8 @@ class InertiaAttitudeSolver(AttitudeSolver):
     returns are about the axes of the inertia matrix. The quaternions rotate from these axes to
     space.
     """
+
+    ctypes = capsule = property(_no_compiled_call)
 
     def __new__(
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,

@@ -5,6 +5,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
+from pyharness.model.values import boolean
+
 Progress = Callable[[int, int, str], None]
 """The type of a function that is called as a computation completes its parts.
 
@@ -65,9 +67,9 @@ def count_done(n: int) -> None:
 @contextmanager
 def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
     """Provide the function that a user chose to report progress; True stands for a bar of parts."""
-    if not isinstance(choice, bool):
+    if callable(choice):
         yield choice
-    elif not choice:
+    elif not boolean("progress", choice):
         yield no_progress
     else:
         from tqdm.auto import tqdm

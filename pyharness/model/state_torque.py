@@ -162,9 +162,9 @@ def recorded(function: Function) -> StateTorque:
     ----------
     function : callable
         A function of (t, omega) or of (t, omega, attitude) that returns the three components of the
-        torque about the body axes (N m). It is called once, and once more if it has keyword
-        arguments whose defaults are numbers: these are parameters, and `solve` computes
-        sensitivities to them.
+        torque about the body axes (N m). It is called once, and again if it has keyword arguments
+        whose defaults are numbers: these are parameters, and `solve` computes sensitivities to
+        them.
 
     Returns
     -------
@@ -284,25 +284,38 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
 def _with_parameters(torque: StateTorque, function: Function, called: Function) -> StateTorque:
     """Return a torque with its parameters, the numbers among its function's keyword arguments.
 
-    They are no parameters if the function does anything with them that can't be recorded.
+    An argument is no parameter if the function does anything with it that can't be recorded.
     """
     pairs = {
         each.name: converted(each.default)
         for each in signature(function).parameters.values()
         if each.kind is Parameter.KEYWORD_ONLY and type(each.default) is not bool
     }
-    values = {name: value for name, value in pairs.items() if isinstance(value, float)}
-    if not values or not all(map(math.isfinite, values.values())):
+    values = {
+        name: value
+        for name, value in pairs.items()
+        if isinstance(value, float) and math.isfinite(value)
+    }
+
+    def with_symbols(names: Sequence[str]) -> Tape | None:
+        recorder = Recorder(MOST_OPERATIONS, N_INPUTS + len(names))
+        time, *state = recorder.inputs()
+        omega, attitude = (np.array(x, dtype=object) for x in (state[:3], state[3:7]))
+        try:
+            return recorder.tape(
+                list(called(time, omega, attitude, **dict(zip(names, state[7:], strict=True))))
+            )
+        except InputError:
+            return None
+
+    names = list(values)
+    tape = with_symbols(names) if names else None
+    if tape is None:
+        names = [name for name in names if with_symbols([name]) is not None]
+        tape = with_symbols(names) if names else None
+    if tape is None:
         return torque
-    recorder = Recorder(MOST_OPERATIONS, N_INPUTS + len(values))
-    time, *state = recorder.inputs()
-    omega, attitude = (np.array(x, dtype=object) for x in (state[:3], state[3:7]))
-    try:
-        outputs = called(time, omega, attitude, **dict(zip(values, state[7:], strict=True)))
-        tape = recorder.tape(list(outputs))
-    except InputError:
-        return torque
-    return replace(torque, parameters=tuple(values.items()), varied=tape)
+    return replace(torque, parameters=tuple((name, values[name]) for name in names), varied=tape)
 
 
 def _parts(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, ...]":

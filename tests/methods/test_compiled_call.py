@@ -161,6 +161,14 @@ def test_a_copy_has_an_address_of_its_own() -> None:
     assert again.ctypes.data != solver.ctypes.data
 
 
+def test_a_solver_for_a_full_inertia_has_no_compiled_call() -> None:
+    matrix = ((3.0, 0.2, -0.1), (0.2, 2.0, 0.3), (-0.1, 0.3, 1.2))
+    full = Scene("full", BRICK.omega, inertia=matrix)
+    for solver in (prepare(full), prepare(full, attitude=True)):
+        assert not hasattr(solver, "ctypes")
+        assert not hasattr(solver, "capsule")
+
+
 def test_numba_calls_a_solver_from_a_loop() -> None:
     numba = pytest.importorskip("numba")
     solver = prepare(BRICK)

@@ -69,3 +69,5 @@ def test_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = written(tmp_path, text(SQUARE, top='chunk = 2\nreductions = ["end"]'))
     run_sweep(read_sweep(file), str(tmp_path / "store"), progress=True)
     assert "3/3" in capsys.readouterr().err
+    with pytest.raises(InputError, match="progress"):
+        run_sweep(read_sweep(file), str(tmp_path / "other"), progress=1)  # type: ignore[arg-type]

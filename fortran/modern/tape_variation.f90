@@ -175,13 +175,17 @@ contains
 
     subroutine weigh()
       !! Make the derivatives of omega and of the attitude comparable, and update their sizes.
-      integer :: block, i
+      integer :: block, i, lane
 
       weights(:3) = 1.0_dp
       weights(4:) = 2.0_dp*scale
       do block = 1, n_blocks
         do i = 1, n
-          blocks(block)%sizes = max(blocks(block)%sizes, weights(i)*abs(lanes(:, i, block)))
+          do lane = 1, SIDE_BY_SIDE
+            associate (largest_so_far => blocks(block)%sizes(lane))
+              largest_so_far = max(largest_so_far, weights(i)*abs(lanes(lane, i, block)))
+            end associate
+          end do
         end do
       end do
     end subroutine weigh

@@ -425,7 +425,7 @@ def test_a_million_periods_take_as_long_as_one() -> None:
     found = slopes(BRICK, [1e7, -1e7], "moments", "omega0", effort=1e-3)
     assert np.isfinite(found["moments"]).all()
     # A change of all moments by the same factor changes nothing.
-    assert np.abs(found["moments"] @ [3.0, 2.0, 1.2]).max() <= 1e-9 * np.abs(found["moments"]).max()
+    assert np.abs(found["moments"] @ [3.0, 2.0, 1.2]).max() <= 1e-8 * np.abs(found["moments"]).max()
     # omega0 multiplied by c is the motion in the time t/c: w + t w' in omega and its derivative.
     scaled = found["omega0"] @ np.array(BRICK.omega)
     state = solve(BRICK, [1e7, -1e7]).omega

@@ -72,7 +72,7 @@ subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, tria
 end subroutine tape_step
 
 subroutine tape_derivatives(n_numbers, numbers, n, state, n_columns, starts, forcings, n_times, &
-                            times, tolerance, effort, rows, n_rows, status, steps)
+                            times, tolerance, effort, rows, n_rows, status)
   ! Compute the derivatives of the solution of a tape with respect to parameters, the columns, at
   ! `times`, which have one sign and are ordered away from 0.
   !f2py threadsafe
@@ -95,7 +95,6 @@ subroutine tape_derivatives(n_numbers, numbers, n, state, n_columns, starts, for
   real(8), intent(out), target :: rows(n, n_columns, n_times) ! n_rows times are set
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 work limit
-  integer(8), intent(out) :: steps
   type(variation_t) :: variation
 
   variation%rows => rows
@@ -104,5 +103,4 @@ subroutine tape_derivatives(n_numbers, numbers, n, state, n_columns, starts, for
                       variation)
   n_rows = variation%n_rows
   status = variation%status
-  steps = variation%steps
 end subroutine tape_derivatives

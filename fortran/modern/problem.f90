@@ -57,7 +57,6 @@ module problem
     !! The derivatives at the first n_rows times.
     real(dp), pointer, contiguous :: rows(:, :, :) !! (unknowns, columns, times)
     integer :: n_rows, status                   !! status of the module statuses
-    integer(int64) :: steps
   end type variation_t
 
   type, public :: solution_t

@@ -27,8 +27,9 @@ module tape_series
     integer :: order
     ! (0:LAST_TERM, slots): terms in ascending order
     real(dp), pointer, contiguous :: a(:, :) => null()
-    ! (SIDE_BY_SIDE, 0:MOST_ORDER, slots): perturbations
+    ! (SIDE_BY_SIDE, 0:MOST_ORDER, slots): perturbations; the first block of them
     real(dp), pointer, contiguous :: v(:, :, :) => null()
+    real(dp), pointer, contiguous :: blocks(:, :, :, :) => null() !! all of them, as v
     real(dp), allocatable :: noise(:)       !! (slots): rounding errors of terms 0, in units
     type(powers_t) :: powers
     type(tape_arrays_t) :: arrays           !! what tape_terms.c reads of the tape
@@ -97,10 +98,10 @@ module tape_series
 
 contains
 
-  subroutine allocate_series(tape, with_perturbations, memory, s, fits)
-    !! Allocate the terms of all slots.
+  subroutine allocate_series(tape, n_blocks, memory, s, fits)
+    !! Allocate the terms of all slots, and of blocks of perturbations.
     type(tape_t), intent(in) :: tape
-    logical, intent(in) :: with_perturbations
+    integer, intent(in) :: n_blocks !! 0 for no perturbations
     real(dp), allocatable, intent(inout), target :: memory(:) !! of the terms
     type(series_t), intent(inout) :: s
     logical, intent(out) :: fits !! whether there is enough memory
@@ -110,10 +111,7 @@ contains
     integer :: failed
 
     n_terms = (LAST_TERM + 1)*int(tape%n_slots, int64)
-    n_perturbations = 0
-    if (with_perturbations) then
-      n_perturbations = SIDE_BY_SIDE*(MOST_ORDER + 1)*int(tape%n_slots, int64)
-    end if
+    n_perturbations = SIDE_BY_SIDE*(MOST_ORDER + 1)*int(tape%n_slots, int64)*n_blocks
     fits = .false.
     allocate (memory(n_perturbations + n_terms + 2*SIDE_BY_SIDE), stat=failed)
     if (failed /= 0) return
@@ -125,8 +123,10 @@ contains
     address = transfer(c_loc(memory), address)/BYTES
     at = 1 + modulo(-address, int(SIDE_BY_SIDE, c_intptr_t))
     perturbations = c_null_ptr
-    if (with_perturbations) then
-      s%v(1:SIDE_BY_SIDE, 0:MOST_ORDER, 1:tape%n_slots) => memory(at:at + n_perturbations - 1)
+    if (n_blocks > 0) then
+      s%blocks(1:SIDE_BY_SIDE, 0:MOST_ORDER, 1:tape%n_slots, 1:n_blocks) => &
+        memory(at:at + n_perturbations - 1)
+      s%v(1:SIDE_BY_SIDE, 0:MOST_ORDER, 1:tape%n_slots) => s%blocks(:, :, :, 1)
       perturbations = c_loc(s%v)
     end if
     at = at + n_perturbations + SIDE_BY_SIDE - 1

@@ -66,7 +66,7 @@ contains
       solution%growth = 1.0_dp
       return
     end if
-    call allocate_series(tape, .true., memory, s, fits)
+    call allocate_series(tape, 1, memory, s, fits)
     if (.not. fits) return
     cost = max(1.0_dp, tape%n_slots/CHEAP_SLOTS)
     most = min(4e18_dp, request%effort*(MOST_STEPS/cost))

@@ -40,7 +40,7 @@ contains
     call c_f_pointer(step_at, step)
     step%status = OVERFLOW
     step%expansions = 0
-    call allocate_series(tape, .false., memory, s, fits)
+    call allocate_series(tape, 0, memory, s, fits)
     if (fits) call take_step(tape, request, s, step)
   end subroutine step_tape
 

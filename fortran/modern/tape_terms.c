@@ -284,27 +284,23 @@ static inline int all_below(lanes x, lanes limit)
 }
 
 /* Return the largest term k of each perturbation of the unknowns, with weights that make the unknowns
-   comparable. */
-static inline lanes largest_terms(const struct tape *tape, int k, const double *weights)
+   comparable. `units` makes the perturbations comparable. */
+static inline lanes largest_terms(const struct tape *tape, int k, const double *weights, lanes units)
 {
   const bits magnitude = ~(bits)(-(lanes){0.0});
   lanes most = {0.0};
-  for (int i = 0; i < tape->n_unknowns; i++)
-    most = larger(most, weights[i] * (lanes)((bits)loaded(tape->v[FIRST_UNKNOWN + i][k]) & magnitude));
+  for (int i = 0; i < tape->n_unknowns; i++) {
+    const lanes x = (lanes)((bits)loaded(tape->v[FIRST_UNKNOWN + i][k]) & magnitude);
+    most = larger(most, weights[i] * units * x);
+  }
   return most;
 }
 
-/* Return the largest term k of all perturbations of the unknowns. `units` makes them comparable. */
+/* Return the largest term k of all perturbations but the error. */
 static inline double largest(const struct tape *tape, int k, const double *weights, lanes units)
 {
-  const bits magnitude = ~(bits)(-(lanes){0.0});
-  lanes most = {0.0};
+  const lanes most = largest_terms(tape, k, weights, units);
   double found = 0.0;
-  for (int i = 0; i < tape->n_unknowns; i++) {
-    lanes x = weights[i] * units * (lanes)((bits)loaded(tape->v[FIRST_UNKNOWN + i][k]) & magnitude);
-    bits is_larger = x > most;
-    most = (lanes)(((bits)x & is_larger) | ((bits)most & ~is_larger));
-  }
   for (int lane = 1; lane < SIDE_BY_SIDE; lane++)
     if (most[lane] > found) found = most[lane];
   return found;
@@ -345,19 +341,22 @@ static void force(const struct tape *tape, int n, double h, int order, double (*
   for (int k = 0; k < order; k++) to[k + 1][0] = h / (k + 1) * sum[k];
 }
 
-/* Return whether the terms up to `last` suffice for the part `factor` of the step: whether the last
-   ones are small, and none is much larger than the derivative itself. Its size is the largest so far,
-   or its first term that is not 0. */
-static int suffice(const struct block *block, int last, double factor, const double *weights,
-                   double tolerance)
+/* Return the size of derivatives, the largest so far, or where they were 0 their first other term. */
+static inline lanes begun(lanes size, lanes term)
 {
-  const lanes zero = {0.0};
-  lanes size = loaded(block->sizes), largest = zero, tail = zero;
+  const bits begins = size == (lanes){0.0};
+  return (lanes)(((bits)term & begins) | ((bits)size & ~begins));
+}
+
+/* Return whether the terms up to `last` suffice for the part `factor` of the step: whether the last
+   ones are small, and none is much larger than the derivative itself. */
+static int suffice(const lanes *terms, int last, double factor, lanes size, double tolerance)
+{
+  lanes largest = {0.0}, tail = {0.0};
   double power = 1.0;
   for (int k = 0; k <= last; k++, power *= factor) {
-    const lanes term = power * largest_terms(&block->tape, k, weights);
-    const bits begins = size == zero;
-    size = (lanes)(((bits)term & begins) | ((bits)size & ~begins));
+    const lanes term = power * terms[k];
+    size = begun(size, term);
     largest = larger(largest, term);
     if (k > last - SMALL_TERMS) tail = larger(tail, term);
   }
@@ -371,8 +370,9 @@ double OF_LEVEL(vary_tape, LEVEL)(struct block *block, double h, int order, doub
                                   const double *weights, double tolerance)
 {
   const struct tape *tape = &block->tape;
-  const lanes zero = {0.0};
-  lanes size = loaded(block->sizes), beyond[TERMS_OF_PERTURBATION + 1];
+  const lanes zero = {0.0}, one = zero + 1.0;
+  lanes size = loaded(block->sizes), sizes[TERMS_OF_PERTURBATION];
+  lanes beyond[TERMS_OF_PERTURBATION + 1];
   double powers[TERMS_OF_PERTURBATION];
   int k = 0, small = 0, tries = 0;
   powers[0] = 1.0;
@@ -388,18 +388,18 @@ double OF_LEVEL(vary_tape, LEVEL)(struct block *block, double h, int order, doub
   /* The largest part of any later term that does not depend on the derivatives. */
   beyond[order + 1] = zero;
   for (int j = order; j > 0; j--)
-    beyond[j] = larger(beyond[j + 1], powers[j] * largest_terms(tape, j, weights));
+    beyond[j] = larger(beyond[j + 1], powers[j] * largest_terms(tape, j, weights, one));
   for (;; k++) {
     if (k > 0) perturb(tape, h, k - 1, 1);
-    const lanes term = powers[k] * largest_terms(tape, k, weights);
-    const bits begins = size == zero;
-    size = (lanes)(((bits)term & begins) | ((bits)size & ~begins));
+    sizes[k] = largest_terms(tape, k, weights, one);
+    const lanes term = powers[k] * sizes[k];
+    size = begun(size, term);
     /* One or two terms may be zero between others. */
     small = all_below(larger(term, beyond[k + 1]), tolerance * size) ? small + 1 : 0;
     if (small == SMALL_TERMS || k == order) break;
   }
   block->last_term = k;
-  while (!suffice(block, k, factor, weights, tolerance)) {
+  while (!suffice(sizes, k, factor, loaded(block->sizes), tolerance)) {
     if (++tries > MOST_TRIES) return 0.0;
     factor *= SHORTER;
   }

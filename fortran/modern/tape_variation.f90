@@ -1,7 +1,7 @@
 module tape_variation
   !! Derivatives of the solution of a tape with respect to parameters: the variational equations,
   !! integrated beside the solution by Taylor series (Biscani and Izzo 2021, section 2.4).
-  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use problem, only: step_request_t, step_t, variation_request_t, variation_t
@@ -22,7 +22,6 @@ module tape_variation
   real(dp), parameter :: MOST_STEPS = 1e6_dp      ! work limit with ten slots and eight columns
   real(dp), parameter :: CHEAP_SLOTS = 10.0_dp
   real(dp), parameter :: STEPS_BETWEEN_LOOKS = 1e4_dp
-  integer, parameter :: BYTES = 8                 ! of a number
   ! Turn in the step that is tried first, rad. The series tells how much shorter or longer the step
   ! will be.
   real(dp), parameter :: TURN = 1.0_dp
@@ -39,9 +38,7 @@ contains
     type(tape_t), pointer :: tape
     type(variation_request_t), pointer :: request
     type(variation_t), pointer :: found
-    real(dp), allocatable, target :: memory(:), numbers(:)
-    ! (SIDE_BY_SIDE, 0:MOST_ORDER, slots, blocks): terms of the derivatives
-    real(dp), pointer, contiguous :: v(:, :, :, :)
+    real(dp), allocatable, target :: memory(:)
     real(dp), target :: state(MOST_UNKNOWNS), tolerances(MOST_UNKNOWNS), ends(MOST_UNKNOWNS)
     real(dp), target :: terms(0:MOST_ORDER, MOST_UNKNOWNS)
     real(dp) :: weights(MOST_UNKNOWNS)        ! which make the unknowns comparable
@@ -54,7 +51,7 @@ contains
     type(step_limit_t) :: limit
     real(dp) :: t, t_end, break_time, longest, trial, local_tolerance, scale, largest, factor
     real(dp) :: cost, ahead
-    integer(c_intptr_t) :: address, at ! in numbers
+    integer(int64) :: steps
     integer :: failed, n, n_columns, n_blocks
     logical :: fits
 
@@ -66,20 +63,13 @@ contains
     n_blocks = (n_columns + SIDE_BY_SIDE - 1)/SIDE_BY_SIDE
     found%status = GAVE_UP
     found%n_rows = 0
-    found%steps = 0
-    call allocate_series(tape, .false., memory, s, fits)
+    steps = 0
+    call allocate_series(tape, n_blocks, memory, s, fits)
     if (.not. fits) return
     allocate (blocks(n_blocks), stat=failed)
     if (failed /= 0) return
     allocate (lanes(SIDE_BY_SIDE, MOST_UNKNOWNS, n_blocks), stat=failed)
     if (failed /= 0) return
-    allocate (numbers(SIDE_BY_SIDE*(1 + (MOST_ORDER + 1)*int(tape%n_slots, int64)*n_blocks)), &
-              stat=failed)
-    if (failed /= 0) return
-    ! Each term begins a line of the cache.
-    address = transfer(c_loc(numbers), address)/BYTES
-    at = modulo(-address, int(SIDE_BY_SIDE, c_intptr_t))
-    v(1:SIDE_BY_SIDE, 0:MOST_ORDER, 1:tape%n_slots, 1:n_blocks) => numbers(at + 1:)
     call begin()
     do
       if (.not. found%n_rows < size(request%times)) exit
@@ -98,8 +88,8 @@ contains
       end if
       call add_rows()
       call advance()
-      found%steps = found%steps + 1
-      call check_steps(found%steps, t, t_end - t, limit, ahead, found%status)
+      steps = steps + 1
+      call check_steps(steps, t, t_end - t, limit, ahead, found%status)
       if (found%status /= COMPLETE) return
     end do
 
@@ -109,13 +99,13 @@ contains
       !! Set the values at time 0.
       integer :: block, column, lane
 
-      v = 0.0_dp
+      s%blocks = 0.0_dp
       do block = 1, n_blocks
         associate (b => blocks(block))
           lanes(:, :, block) = 0.0_dp
           b%forcings = 0
           b%sizes = 0.0_dp
-          b%arrays = arrays_of(tape, c_loc(s%a), c_loc(v(1, 0, 1, block)))
+          b%arrays = arrays_of(tape, c_loc(s%a), c_loc(s%blocks(1, 0, 1, block)))
           do column = SIDE_BY_SIDE*(block - 1) + 1, min(n_columns, SIDE_BY_SIDE*block)
             lane = column - SIDE_BY_SIDE*(block - 1)
             lanes(lane, :n, block) = request%starts(:, column)
@@ -201,7 +191,7 @@ contains
       shortened = factor
       do block = 1, n_blocks
         do i = 1, n
-          v(:, 0, FIRST_UNKNOWN - 1 + i, block) = lanes(:, i, block)
+          s%blocks(:, 0, FIRST_UNKNOWN - 1 + i, block) = lanes(:, i, block)
         end do
         shortened = min(shortened, vary_tape(blocks(block), s%h, s%order, factor, weights, &
                                              OF_DERIVATIVES*request%tolerance))

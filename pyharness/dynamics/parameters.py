@@ -1,6 +1,5 @@
 """Parameters of a scene, and its equations of motion with their partial derivatives."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -38,16 +37,6 @@ class _Body(NamedTuple):
     changing: Changing | None
 
 
-class _Recorded(NamedTuple):
-    """A summand of the torque that is no law, with all that its derivatives depend on."""
-
-    tape: Tape
-    expression: tuple[str, ...]
-    constants: tuple[tuple[str, float], ...]
-    parameters: tuple[tuple[str, float], ...]
-    varied: Tape | None
-
-
 @dataclass(frozen=True)
 class VariedEquations:
     """The equations of motion of a scene, and how they depend on parameters.
@@ -62,39 +51,23 @@ class VariedEquations:
     forcings: NDArray[np.int32]
     columns: dict[str, slice]
 
-    @property
-    def needs_attitude(self) -> bool:
-        """Whether the derivatives depend on the attitude."""
-        return self.tape.needs_attitude
 
-
-def is_opaque(scene: Scene) -> bool:
-    """Return whether the derivatives of the torque are unknown, because it can't be recorded."""
-    return isinstance(scene.torque, StateTorque) and scene.torque.tape is None
-
-
-def parameters_of(scene: Scene) -> dict[str, list[float]]:
+def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
     """Return the values of the parameters of a scene by name, without those of its initial state.
 
-    A name that stands for two parameters of a torque is not among them.
+    A name that two summands of the torque have stands for no parameter; its value is None.
     """
-    found: dict[str, list[float]] = {}
+    found: dict[str, list[float] | None] = {}
     if scene.moments is not None:
         found["moments"] = list(scene.moments)
     if scene.coefficients is not None:
         found["coefficients"] = list(scene.coefficients)
     if scene.inertia is not None:
         found["inertia"] = [scene.inertia[i][j] for i, j in _ELEMENTS]
-    ambiguous = ambiguous_names(scene)
     for part in _parts(scene.torque):
-        found |= {k: each for k, each in _parameters_of(part).items() if k not in ambiguous}
+        own = _parameters_of(part)
+        found |= {name: None if name in found else values for name, values in own.items()}
     return found
-
-
-def ambiguous_names(scene: Scene) -> set[str]:
-    """Return the names that stand for parameters of two summands of the torque."""
-    counts = Counter(name for part in _parts(scene.torque) for name in _parameters_of(part))
-    return {name for name, count in counts.items() if count > 1}
 
 
 def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> VariedEquations:
@@ -104,8 +77,8 @@ def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> Vari
     """
     body = _Body(scene.moments, scene.coefficients, scene.inertia, scene.changing)
     known = parameters_of(scene)
-    values = tuple((name, tuple(known.get(name, ()))) for name in names)
-    return _equations(body, tuple(map(_summand, _parts(scene.torque))), values, attitude)
+    values = tuple((name, tuple(known.get(name) or ())) for name in names)
+    return _equations(body, tuple(_parts(scene.torque)), values, attitude)
 
 
 def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Array]:
@@ -126,7 +99,7 @@ def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Arra
 @lru_cache(maxsize=64)
 def _equations(
     body: _Body,
-    torque: tuple[TorqueLaw | _Recorded, ...],
+    torque: tuple[TorqueLaw | StateTorque, ...],
     values: tuple[tuple[str, tuple[float, ...]], ...],
     attitude: bool,
 ) -> VariedEquations:
@@ -184,15 +157,8 @@ def _parameters_of(part: StateTorque | TorqueLaw) -> dict[str, list[float]]:
     return found
 
 
-def _summand(part: StateTorque | TorqueLaw) -> TorqueLaw | _Recorded:
-    if isinstance(part, TorqueLaw):
-        return part
-    assert part.tape is not None
-    return _Recorded(part.tape, part.expression, part.constants, part.parameters, part.varied)
-
-
 def _torque(
-    part: TorqueLaw | _Recorded, time: Any, omega: Any, q: Any, given: Mapping[str, list[Any]]
+    part: TorqueLaw | StateTorque, time: Any, omega: Any, q: Any, given: Mapping[str, list[Any]]
 ) -> Any:
     """Return a summand of the torque in symbols, with symbols for the parameters in `given`."""
     if isinstance(part, TorqueLaw):
@@ -216,6 +182,7 @@ def _torque(
     if part.varied is not None and any(name in given for name, _ in others):
         numbers = [given.get(name, [value])[0] for name, value in others]
         return np.array(evaluate(part.varied, [time, *omega, *q, *numbers], SYMBOLS), dtype=object)
+    assert part.tape is not None
     return torque_of(part.tape, time, omega, q)
 
 

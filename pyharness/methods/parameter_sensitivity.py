@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 from pyharness.dynamics.parameters import (
     ATTITUDE,
     OMEGA0,
-    ambiguous_names,
     initial_state,
-    is_opaque,
     parameters_of,
     varied_equations,
 )
@@ -22,6 +20,7 @@ from pyharness.model.errors import InputError, TimedError, kind_of, unknown
 from pyharness.model.extension import COMPLETE, GAVE_UP, extension
 from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Trajectory
 
@@ -30,8 +29,10 @@ _VARIES = 1e-2
 _METHODS = ("auto", "taylor", "closed-form")
 _MOST_COLUMNS = 200
 _THREE = (0.0, 0.0, 0.0)  # as many values as omega0 and the attitude have
-# The parameters whose equations are periodic for a body without torque.
-_PERIODIC = {OMEGA0, "moments", "coefficients", "inertia"}
+# The parameters whose equations are periodic for a body without torque. The period depends on all
+# of them but the torque, under which it changes with time.
+_CONSTANT = "torque.constant"
+_PERIODIC = {OMEGA0, "moments", "coefficients", "inertia", _CONSTANT}
 
 
 def checked_names(
@@ -47,9 +48,9 @@ def checked_names(
     allowed = "allowed: names, as in ['omega0', 'moments']"
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise InputError(f"{place}: {kind_of(names)}; {allowed}")
-    if is_opaque(scene):
+    if isinstance(scene.torque, StateTorque) and scene.torque.tape is None:
         raise InputError(f"{place}: the torque is opaque; allowed: a torque that can be recorded")
-    values, ambiguous = parameters_of(scene), ambiguous_names(scene)
+    values = parameters_of(scene)
     known = [OMEGA0, *([ATTITUDE] if attitude else []), *values]
     found: dict[str, None] = {}
     for name in itertools.islice(names, _MOST_COLUMNS + 1):
@@ -57,15 +58,14 @@ def checked_names(
             raise InputError(f"{place}: {kind_of(name)}; {allowed}")
         if name == ATTITUDE and not attitude:
             raise InputError(f"{place}: the attitude is not computed; give attitude=True")
-        if name in ambiguous:
-            raise InputError(f"{place}: {name} is the name of two parameters; allowed: other names")
         if name not in known:
             raise unknown("parameter", name, known, place)
+        if values.get(name, _THREE) is None:
+            raise InputError(f"{place}: {name} is the name of two parameters; allowed: other names")
         found[name] = None
-    if sum(len(values.get(name, _THREE)) for name in found) > _MOST_COLUMNS:
+    if sum(len(values.get(name) or _THREE) for name in found) > _MOST_COLUMNS:
         raise InputError(f"{place}: more than {_MOST_COLUMNS} values; give fewer names")
-    needs_attitude = found and varied_equations(scene, tuple(found), attitude).needs_attitude
-    if needs_attitude and not attitude:
+    if found and not attitude and varied_equations(scene, tuple(found), False).tape.needs_attitude:
         raise InputError(f"{place}: the torque depends on the attitude; give attitude=True")
     return tuple(found)
 
@@ -83,9 +83,11 @@ def sensitivities_at(
     if not names:
         return {}
     times, attitude = found.time, found.attitude is not None
-    period = _period(scene) if found.time.size and set(names) <= _PERIODIC else 0.0
+    # Only a closed form takes no evaluations.
+    is_closed = not found.evaluations and not attitude and set(names) <= _PERIODIC
+    period = _period(scene) if is_closed else 0.0
     # Two periods take as long as the calculation from one period.
-    if not attitude and 0.0 < 2.0 * period < np.abs(times).max() and found.evaluations == 0:
+    if 0.0 < 2.0 * period < np.abs(times).max(initial=0.0):
         columns, rows = _by_periods(scene, names, times, period, tolerance, effort)
     else:
         columns, rows, _ = _by_series(scene, names, attitude, times, tolerance, effort)
@@ -108,7 +110,7 @@ def _by_series(
         places = places[np.argsort(np.abs(times[places]))]
         if places.size:
             own = times[places]
-            derivatives, n_rows, status, _ = extension().tape_derivatives(
+            derivatives, n_rows, status = extension().tape_derivatives(
                 packed, state, starts, forcings, own, tolerance, effort
             )
             _check(status, n_rows, own, derivatives)
@@ -121,7 +123,9 @@ def _period(scene: Scene) -> float:
 
     It is 0 too if omega is so nearly constant that the period's derivatives would have few digits.
     """
-    if scene.changing is not None or not scene.torque.is_zero:
+    torque = scene.torque
+    # A function that is 0 now, and has a parameter of this name, may depend on time.
+    if scene.changing is not None or not torque.is_zero or getattr(torque, "named", None):
         return 0.0
     bare = principal(scene)[0] if scene.inertia is not None else scene
     period = extension().torque_free_period(bare.euler_coefficients, remainders(bare), bare.omega)
@@ -148,7 +152,8 @@ def _by_periods(
     of the initial omega changes the period, and therefore grows by the same multiple of the slope
     of omega in every period: M = I + N is the matrix of one period, where N has rank 1, and N N =
     0. Therefore k periods add up to M^k = I + k N, and the part that the parameters cause, F in the
-    first period, to k F + k (k - 1)/2 N F.
+    first period, to k F + k (k - 1)/2 N F. The moments change the period once and for all, so that
+    their N F is 0.
     """
     whole = np.floor(times / period)
     rest = times - whole * period
@@ -162,8 +167,11 @@ def _by_periods(
     growth -= slope * (growth @ slope) / (slope @ slope)
     shear = np.outer(slope, growth)
     forced = last - last[:, columns[OMEGA0]] @ starts
+    drift = np.zeros_like(forced)
+    if _CONSTANT in columns:
+        drift[:, columns[_CONSTANT]] = shear @ forced[:, columns[_CONSTANT]]
     k = whole[:, None, None]
-    change = k * (shear @ starts + forced) + 0.5 * k * (k - 1.0) * (shear @ forced)
+    change = k * (shear @ starts + forced) + 0.5 * k * (k - 1.0) * drift
     found = transition[place[:-1]] @ change + rows[place[:-1]]
     return {name: columns[name] for name in names}, found
 

@@ -13,7 +13,7 @@ from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.law_symbols import body_torque
-from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder, Symbol, called_once
+from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, called_once
 from pyharness.model.tape import FLOATS, N_INPUTS, TIME, Tape, evaluate
 from pyharness.model.torque_law import FRAMES, TorqueLaw
 from pyharness.model.values import Triple, converted, three_floats
@@ -63,8 +63,8 @@ class StateTorque:
     expression: tuple[str, ...] = ()
     constants: tuple[tuple[str, float], ...] = ()
     terms: tuple[TorqueLaw | tuple[tuple[str, Any], ...], ...] = ()
-    parameters: tuple[tuple[str, float], ...] = field(default=(), compare=False, repr=False)
-    varied: Tape | None = field(default=None, compare=False, repr=False)
+    parameters: tuple[tuple[str, float], ...] = field(default=(), repr=False)
+    varied: Tape | None = field(default=None, repr=False)
     parts: "tuple[StateTorque | TorqueLaw, ...]" = field(default=(), compare=False, repr=False)
     # A torque law has these attributes too.
     is_zero: bool = field(default=False, init=False, repr=False)
@@ -141,11 +141,17 @@ def torque_of(tape: Tape, time: Any, omega: Any, attitude: Any) -> Array:
 
 def replayed(function: Function) -> StateTorque:
     """Return a torque recorded from a function of (t, omega, attitude) of this project."""
-    recorder = Recorder()
-    time, *state = recorder.inputs()
-    omega, attitude = np.array(state[:3], dtype=object), np.array(state[3:], dtype=object)
-    tape = recorder.tape(list(function(time, omega, attitude)))
+    tape = _tape_of(function)
     return StateTorque(tape, None, tape.needs_attitude)
+
+
+def _tape_of(function: Function, names: Sequence[str] = ()) -> Tape:
+    """Return a function of (t, omega, attitude) as a tape; keyword arguments are further inputs."""
+    recorder = Recorder(n_inputs=N_INPUTS + len(names))
+    time, *state = recorder.inputs()
+    omega, attitude = (np.array(each, dtype=object) for each in (state[:3], state[3:7]))
+    values = dict(zip(names, state[7:], strict=True))
+    return recorder.tape(list(function(time, omega, attitude, **values)))
 
 
 def of_law(law: TorqueLaw) -> StateTorque:
@@ -297,25 +303,20 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
         if isinstance(value, float) and math.isfinite(value)
     }
 
-    def with_symbols(names: Sequence[str]) -> Tape | None:
-        recorder = Recorder(MOST_OPERATIONS, N_INPUTS + len(names))
-        time, *state = recorder.inputs()
-        omega, attitude = (np.array(x, dtype=object) for x in (state[:3], state[3:7]))
+    def is_recordable(names: Sequence[str]) -> bool:
         try:
-            return recorder.tape(
-                list(called(time, omega, attitude, **dict(zip(names, state[7:], strict=True))))
-            )
+            _tape_of(called, names)
         except InputError:
-            return None
+            return False
+        return True
 
     names = list(values)
-    tape = with_symbols(names) if names else None
-    if tape is None:
-        names = [name for name in names if with_symbols([name]) is not None]
-        tape = with_symbols(names) if names else None
-    if tape is None:
+    if not is_recordable(names):
+        names = [name for name in names if is_recordable([name])]
+    if not (names and is_recordable(names)):
         return torque
-    return replace(torque, parameters=tuple((name, values[name]) for name in names), varied=tape)
+    parameters = tuple((name, values[name]) for name in names)
+    return replace(torque, parameters=parameters, varied=_tape_of(called, names))
 
 
 def _parts(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, ...]":

@@ -121,19 +121,23 @@ class Run:
             time * self.unit,
         )
 
+    def work_error(self, time: float) -> TimedError:
+        """Return the exception for an integration that exceeded the work limit at `time` (s)."""
+        return TimedError(
+            f"{self.label} exceeded its work limit at t = {{time}} s after {self.most} "
+            "right-hand sides; "
+            + advice(
+                "use a shorter time or a larger tolerance",
+                self.effort,
+                self.effort * self.end / time if time else None,
+            ),
+            time,
+        )
+
     def _counted(self, time: float, state: Sequence[float]) -> list[float]:
         self.evaluations += 1
         if self.evaluations > self.most:
-            raise TimedError(
-                f"{self.label} exceeded its work limit at t = {{time}} s after {self.most} "
-                "right-hand sides; "
-                + advice(
-                    "use a shorter time or a larger tolerance",
-                    self.effort,
-                    self.effort * self.end / (time * self.unit) if time else None,
-                ),
-                time * self.unit,
-            )
+            raise self.work_error(time * self.unit)
         if self.unit == 1.0:
             return self.slopes(time, state)
         return [self.unit * slope for slope in self.slopes(self.unit * time, state)]

@@ -1,5 +1,7 @@
 """SciPy's methods for torques that depend on the state, recorded or opaque.
 
+DOP853 is compiled if the torque is a compiled function.
+
 SciPy controls the local error of each step, whereas a tolerance of this project limits the error at
 the requested times. How a torque of the state adds up and amplifies local errors is unknown.
 Therefore the scene is integrated repeatedly with smaller and smaller local tolerances, until the
@@ -14,8 +16,19 @@ from typing import NamedTuple
 import numpy as np
 
 from pyharness.dynamics.system import slopes_of
-from pyharness.methods.scipy_run import FINEST_STEP, NoNumberError, RightHandSide, Run, rows_of
+from pyharness.methods.compiled_run import integrated
+from pyharness.methods.scipy_run import (
+    FINEST_STEP,
+    LARGEST_PHASE,
+    NoNumberError,
+    RightHandSide,
+    Run,
+    rows_of,
+)
+from pyharness.model.attitude import IDENTITY
+from pyharness.model.compiled_torque import CompiledTorque
 from pyharness.model.errors import InputError, TimedError, printable
+from pyharness.model.extension import GAVE_UP, OVERFLOW
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array, Trajectory
@@ -48,6 +61,8 @@ _TRIAL = (1e-7, 1e-8)
 # Work of a right-hand side, in microseconds: without torque, with SciPy's own work; of an operation
 # of a tape; and of an opaque function.
 _WORK, _OPERATION_WORK, _OPAQUE_WORK = 16.0, 0.7, 16.0
+# The same of a compiled right-hand side with a compiled torque.
+_COMPILED_WORK = 0.05
 
 
 class _Rows(NamedTuple):
@@ -79,6 +94,7 @@ def solve_state(
     run = _StateRun(scene, times[-1], name, effort, most)
     nothing = np.empty((0, len(run.start)))
     if run.is_singular():
+        _check_attitude(scene)
         return rows_of([], nothing, 1, len(times), "overflow")
     if times[-1] == 0.0:
         return rows_of(times, np.array([run.start]), 1, 0, "complete")
@@ -91,6 +107,20 @@ def solve_state(
     count = len(found.state)
     ended = "complete" if found.is_complete else "overflow"
     return rows_of(times[:count], found.state, run.evaluations, len(times), ended)
+
+
+def _check_attitude(scene: Scene) -> None:
+    """Raise InputError if a compiled torque is NaN at time 0 for want of the attitude alone."""
+    torque = scene.torque
+    assert isinstance(torque, StateTorque)
+    function = torque.function
+    if torque.needs_attitude or not isinstance(function, CompiledTorque):
+        return
+    if all(map(math.isfinite, function(0.0, scene.omega, IDENTITY))):
+        raise InputError(
+            "[torque]: the compiled function depends on the attitude; allowed: "
+            "opaque(function, needs_attitude=True)"
+        )
 
 
 def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
@@ -199,7 +229,10 @@ class _StateRun(Run):
             )
         slopes = slopes_of(scene)
         rate = max(map(abs, scene.euler_coefficients))
-        limit = int(most * _WORK / (_WORK + work))
+        self._scene, self._compiled = scene, None
+        if name == "DOP853" and isinstance(torque.function, CompiledTorque):
+            self._compiled = torque.function
+        limit = int(most * _WORK / (_COMPILED_WORK if self._compiled else _WORK + work))
         start = (*scene.omega, *(scene.attitude or ()))
         super().__init__(
             start, slopes if torque.tape is not None else _guarded(slopes), rate, end, name, effort,
@@ -264,6 +297,8 @@ class _StateRun(Run):
         self._integrations += 1
         sizes = [local * scale] * 3 + [local] * (len(self.start) - 3)
         longest = abs(self.end) / (_FEWEST_STEPS + _MORE_STEPS * self._integrations)
+        if self._compiled:
+            return self._compiled_rows(self._compiled, times, local, sizes, longest, scale)
         wanted = list(times)
         while wanted:
             self._reached, self._largest, self._stuck = 0.0, 0.0, 0
@@ -278,6 +313,22 @@ class _StateRun(Run):
             # SciPy returns an empty list if it reached no time.
             return self._found(np.asarray(result.y).T, len(times))
         return _Rows(np.empty((0, len(self.start))), False, 0.0)
+
+    def _compiled_rows(
+        self, function: CompiledTorque, times: Sequence[float], local: float,
+        sizes: Sequence[float], longest: float, scale: float,
+    ) -> _Rows:  # fmt: skip
+        left = max(0, self.most - self.evaluations)
+        found = integrated(self._scene, function, times, local, sizes, longest, left)
+        self.evaluations += found.evaluations
+        self._reached, self._largest = found.reached, found.largest
+        if found.status == GAVE_UP:
+            raise self.work_error(found.reached)
+        if found.status == OVERFLOW and found.largest < _UNBOUNDED * scale:
+            phase = self.rate * abs(found.reached) * found.largest
+            if phase > LARGEST_PHASE:
+                raise self.phase_error(found.reached / self.unit)
+        return self._found(found.state, len(times))
 
     def _found(self, rows: Array, wanted: int) -> _Rows:
         rows = np.reshape(rows, (-1, len(self.start)))

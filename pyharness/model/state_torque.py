@@ -11,6 +11,7 @@ import numpy as np
 
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes
+from pyharness.model.compiled_torque import compiled_torque
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.law_symbols import body_torque
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, called_once
@@ -204,16 +205,24 @@ def recorded(function: Function) -> StateTorque:
     return _with_parameters(replayed(called), function, called)
 
 
-def opaque(function: Function) -> StateTorque:
-    """Return a torque that is evaluated by calling a Python function at each time step.
+def opaque(function: Any, *, needs_attitude: bool = False) -> StateTorque:
+    """Return a torque that is evaluated by calling a function at each time step.
 
-    Only SciPy's methods solve a scene with such a torque.
+    Only SciPy's methods solve a scene with such a torque. Under a compiled function, ``dop853``
+    does not call Python and is faster by two orders of magnitude.
 
     Parameters
     ----------
     function : callable
         A function of (t, omega) or of (t, omega, attitude), which are a float and NumPy arrays. It
-        returns the three components of the torque about the body axes (N m).
+        returns the three components of the torque about the body axes (N m). Or a compiled function
+        with the signature ``void (double, double *, double *, double *, void *)``: a
+        `scipy.LowLevelCallable`, a function of ctypes, or a cfunc of numba. Its arguments are the
+        time (s), the addresses of omega (rad/s) and of the attitude, the address to which it writes
+        the torque, and the user's data.
+    needs_attitude : bool
+        Whether a compiled function depends on the attitude. If it does not, the attitude that it is
+        given may be NaN. A Python function depends on the attitude if it has three arguments.
 
     Returns
     -------
@@ -223,7 +232,8 @@ def opaque(function: Function) -> StateTorque:
     Raises
     ------
     InputError
-        If `function` is not a function of two or three arguments.
+        If `function` is not a function of two or three arguments, or is a compiled function with
+        another signature.
 
     Examples
     --------
@@ -234,6 +244,9 @@ def opaque(function: Function) -> StateTorque:
     >>> solve(scene, 1.0, "dop853").omega.round(6)
     array([[0.9, 0. , 0. ]])
     """
+    compiled = compiled_torque(function)
+    if compiled:
+        return StateTorque(None, compiled, needs_attitude)
     return StateTorque(None, function, _takes_attitude(function))
 
 

@@ -92,9 +92,7 @@ def state_pieces(
 def _first_edges(scene: Scene, found: Trajectory, ends: list[float]) -> list[float]:
     """Return the ends of the first intervals (s), among which are all changes of tables."""
     tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
-    tables = [each.table for each in tape.operations if each.table] if tape else []
-    changes = {time for table in tables for time in table.breaks}
-    inner = {time for time in changes if ends[0] < time < ends[-1]}
+    inner = {time for time in (tape.breaks if tape else ()) if ends[0] < time < ends[-1]}
     bounds = sorted({*ends, *inner})
     fastest = float(np.abs(found.omega).max(initial=max(map(abs, scene.omega))))
     total = ends[-1] - ends[0]

@@ -107,8 +107,7 @@ class GaussState:
         self._tape = system(scene)
         self._times, end = times, times[-1]
         # The steps also end where a table of the torque changes, and the order is therefore kept.
-        breaks = {x for each in self._tape.operations if each.table for x in each.table.breaks}
-        inside = {x for x in breaks if 0.0 < x / (end or 1.0) < 1.0}
+        inside = {x for x in self._tape.breaks if 0.0 < x / (end or 1.0) < 1.0}
         self._stops = sorted({*times, *inside} - {0.0}, key=abs)
         self._first = 0.0
         self._tables, self._stages = tables(stages), stages

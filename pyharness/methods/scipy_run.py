@@ -69,13 +69,16 @@ class Run:
         absolute: float | Sequence[float],
         times: Sequence[float] | None = None,
         longest: float = math.inf,
+        begin: float = 0.0,
+        state: Sequence[float] | None = None,
     ) -> Any:
         """Integrate by SciPy's method `name` and return SciPy's result object.
 
         `relative` and `absolute` are the tolerances `rtol` and `atol` of `solve_ivp`, and `longest`
         is the longest allowed step (s). The result contains the solution at `times` (s), or dense
         output if `times` is None. Times in the result are in the unit of time `self.unit`, which is
-        a number of seconds. Raise NoNumberError if Radau's linear algebra refuses a number.
+        a number of seconds. The integration begins with `state`, if given, at the time `begin`
+        (s). Raise NoNumberError if Radau's linear algebra refuses a number.
         """
         from scipy.integrate import solve_ivp
 
@@ -89,8 +92,8 @@ class Run:
             try:
                 return solve_ivp(
                     self._counted,
-                    (0.0, (self.end if times is None else times[-1]) / self.unit),
-                    self.start,
+                    (begin / self.unit, (self.end if times is None else times[-1]) / self.unit),
+                    self.start if state is None else state,
                     method=name,
                     t_eval=None if times is None else [time / self.unit for time in times],
                     dense_output=times is None,

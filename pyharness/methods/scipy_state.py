@@ -41,7 +41,7 @@ _RATIO, _LARGEST_RATIO = 8.0, 1e3
 # Safety factor on the error of the second of two integrations. The error is estimated from their
 # difference, in proportion to the local tolerances, but by no less than a fraction of it. The
 # errors of LSODA, which also changes its order, are not in proportion to the local tolerances, and
-# neither are those under a torque that jumps, as a table or an opaque function may.
+# neither are those under a torque that jumps, as an opaque function may.
 _SAFETY = 4.0
 _LEAST_FRACTION = {"DOP853": 0.25, "RK45": 0.25, "Radau": 0.25, "LSODA": 1.0}
 # The longest step is the time span over this number, which grows with each integration, so that two
@@ -234,15 +234,24 @@ class _StateRun(Run):
             self._compiled = torque.function
         limit = int(most * _WORK / (_COMPILED_WORK if self._compiled else _WORK + work))
         start = (*scene.omega, *(scene.attitude or ()))
-        super().__init__(
-            start, slopes if torque.tape is not None else _guarded(slopes), rate, end, name, effort,
-            limit,
-        )  # fmt: skip
+        own = self._between_breaks(slopes) if torque.tape is not None else _guarded(slopes)
+        super().__init__(start, own, rate, end, name, effort, limit)
         self.name = name
-        tape = torque.tape
-        self.is_smooth = tape is not None and not any(each.table for each in tape.operations)
+        self.is_smooth = torque.tape is not None
+        breaks = torque.tape.breaks if torque.tape is not None else []
+        self._breaks = sorted((x for x in breaks if 0.0 < x / (end or 1.0) < 1.0), key=abs)
+        self._between = -math.inf, math.inf
         self._integrations = 0
         self._reached, self._largest, self._stuck = 0.0, 0.0, 0
+
+    def _between_breaks(self, slopes: RightHandSide) -> RightHandSide:
+        """Return a right-hand side in which a table changes after a breakpoint, not at it."""
+
+        def between(time: float, state: Sequence[float]) -> list[float]:
+            low, high = self._between
+            return slopes(min(max(time, low), high), state)
+
+        return between
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
         """Record the time (s) and |omega|; raise NoNumberError if the steps are too short."""
@@ -299,11 +308,29 @@ class _StateRun(Run):
         longest = abs(self.end) / (_FEWEST_STEPS + _MORE_STEPS * self._integrations)
         if self._compiled:
             return self._compiled_rows(self._compiled, times, local, sizes, longest, scale)
-        wanted = list(times)
+        rows = np.empty((0, len(self.start)))
+        state, begin, self._largest = self.start, 0.0, 0.0
+        # SciPy does not know where a table changes: each integration ends there.
+        for end in [*(x for x in self._breaks if abs(x) < abs(times[-1])), times[-1]]:
+            own = [time for time in times[len(rows) :] if abs(time) <= abs(end)]
+            wanted = own if own and own[-1] == end else [*own, end]
+            self._between = _interior(begin, end)
+            found = self._from(begin, state, wanted, local, sizes, longest, scale)
+            rows = np.concatenate([rows, found[: len(own)]])
+            if len(found) < len(wanted):
+                break
+            state, begin = found[-1].tolist(), end
+        return self._found(rows, len(times))
+
+    def _from(
+        self, begin: float, state: Sequence[float], wanted: list[float], local: float,
+        sizes: Sequence[float], longest: float, scale: float,
+    ) -> Array:  # fmt: skip
+        """Return the states at the first of the `wanted` times (s), as many as SciPy computes."""
         while wanted:
-            self._reached, self._largest, self._stuck = 0.0, 0.0, 0
+            self._reached, self._stuck = begin, 0
             try:
-                result = self.solved(self.name, local, sizes, wanted, longest)
+                result = self.solved(self.name, local, sizes, wanted, longest, begin, state)
             except NoNumberError:
                 # SciPy returned no rows. They exist at the times before that of the failure.
                 wanted = [time for time in wanted if abs(time) < abs(self._reached)]
@@ -311,8 +338,8 @@ class _StateRun(Run):
             if result.status == 1 and self._largest < _UNBOUNDED * scale:
                 raise self.phase_error(float(result.t_events[0][0]))
             # SciPy returns an empty list if it reached no time.
-            return self._found(np.asarray(result.y).T, len(times))
-        return _Rows(np.empty((0, len(self.start))), False, 0.0)
+            return np.reshape(np.asarray(result.y).T, (-1, len(self.start)))
+        return np.empty((0, len(self.start)))
 
     def _compiled_rows(
         self, function: CompiledTorque, times: Sequence[float], local: float,
@@ -338,6 +365,12 @@ class _StateRun(Run):
             unit = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
             rows = np.hstack([rows[:, :3], unit])
         return _Rows(rows, len(rows) == wanted, self._largest)
+
+
+def _interior(first: float, second: float) -> tuple[float, float]:
+    """Return the smallest and largest time between two times, without these."""
+    inner = math.nextafter(first, second), math.nextafter(second, first)
+    return min(inner), max(inner)
 
 
 def _guarded(slopes: RightHandSide) -> RightHandSide:

@@ -248,8 +248,7 @@ class Stepper:
             raise InputError("the torque depends on the attitude; give attitude=True")
         self._tape = _equations(scene, torque.tape, self._n == 7)
         self._packed = kernel_tape(self._tape)
-        tables = [each.table for each in self._tape.operations if each.table is not None]
-        self._breaks = sorted({time for table in tables for time in table.breaks[1:]})
+        self._breaks = self._tape.breaks
         self._scene = scene
 
     def _set(self, place: slice, values: Sequence[float]) -> None:

@@ -82,6 +82,13 @@ class Tape:
         """Whether the function depends on the attitude."""
         return not self.inputs.isdisjoint(ATTITUDE)
 
+    @property
+    def breaks(self) -> list[float]:
+        """The times (s) at which a table changes, in ascending order."""
+        tables = [each.table for each in self.operations if each.table is not None]
+        # The first piece holds before its breakpoint too.
+        return sorted({time for table in tables for time in table.breaks[1:]})
+
 
 def slots_of(operation: Operation) -> tuple[int, ...]:
     """Return the slots that an operation reads."""

@@ -14,6 +14,7 @@ from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, opaque, replayed
 from pyharness.model.trajectory import Trajectory
+from pyharness.torques import table
 from pyharness.truth.reference import Reference, reference
 
 METHODS = ("DOP853", "RK45", "Radau", "LSODA")
@@ -131,6 +132,29 @@ def test_a_short_pulse_is_not_missed(name: str) -> None:
     found = scipy_method(name)(scene, [10.0], 1e-6)
     wanted = math.sqrt(math.pi / 200.0) / _MOMENTS[0]
     assert found.omega[0, 0] == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_no_step_passes_a_change_of_a_table(name: str, sign: float) -> None:
+    """The pulses are far shorter than a step, and some rows are at their ends."""
+    changes = [sign * x for x in (0.3, 0.301, 1.0, 1.0 + 1e-6, 1.7)]
+    # From 0 on: no torque, a pulse, a constant, a shorter pulse, a constant, and again no torque.
+    values = [(0, 0, 0), (900, 0, 50), (0, -0.2, 0), (0, 3e5, 0), (0.1, 0.1, 0.1), (0, 0, 0)]
+    if sign < 0.0:
+        changes.reverse()
+        values.reverse()
+    torque = table([changes[0] - 1.0, *changes], values, "held")
+    scene = Scene("", _OMEGA, _MOMENTS, torque=torque + replayed(lambda t, w, q: -0.1 * w))
+    times = [sign * x for x in (0.0, 0.3, 0.3005, 0.301, 0.9, 1.0, 1.1, 1.7, 2.0)]
+    tolerance = 1e-6 if name == "Radau" else 1e-9
+    found = scipy_method(name)(scene, times, tolerance)
+    assert found.time.tolist() == times
+    assert _error(found, reference(scene, times)) <= tolerance
+    assert len(np.unique(found.omega, axis=0)) == len(times)
+    # The first piece holds before its breakpoint too.
+    assert torque.tape is not None
+    assert torque.tape.breaks == changes
 
 
 @pytest.mark.parametrize("name", ["Radau", "LSODA"])

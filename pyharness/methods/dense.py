@@ -28,12 +28,38 @@ _NODE_TOLERANCE = 0.25
 _LAST = 0.02
 _ROUNDING = 4e-16
 _TAIL = 3  # coefficients whose size is an estimate of those left out
-# A piece that is divided and whose tail does not become much smaller has errors of the method that
-# are not smooth.
+# A piece has errors of the method that are not smooth if its tail is not much smaller than that of
+# the piece of which it is a part, although the polynomial of the latter was accurate.
 _DIVIDED = 8.0
 _MOST_PARTS = 64  # into which an interval is divided at once
 _MOST_PIECES = 200_000
 _RADIANS = 2.0  # of rotation in an interval; first guess
+
+
+@dataclass(frozen=True, eq=False)
+class _Open:
+    """An interval (s) without a polynomial, and the longer one of which it is a part."""
+
+    low: float
+    high: float
+    tail: float = math.inf  # of the polynomial of the longer interval
+    whole: Pieces | None = None  # this polynomial
+
+    def is_rough(
+        self, tail: float, times: Array, values: Array, scale: float, tolerance: float
+    ) -> bool:
+        """Return whether a polynomial with this tail has errors of the method that are not smooth.
+
+        `values` at `times` (s) are the method's, `scale` is the largest |omega| (rad/s), and both
+        the errors and the tail must be below the tolerance.
+        """
+        if self.whole is None or not self.tail / _DIVIDED < tail <= tolerance:
+            return False
+        # A fast wave between few nodes has small tails too, but another polynomial.
+        apart = np.abs(self.whole(times) - values).max(axis=0)
+        apart[:3] /= scale or 1.0
+        return bool(apart.max() <= tolerance)
+
 
 # A function that returns the trajectory at given times to a given tolerance.
 Rows = Callable[[Array, float], Trajectory]
@@ -106,7 +132,7 @@ def _first_edges(scene: Scene, found: Trajectory, ends: list[float]) -> list[flo
 
 def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pieces:
     """Return polynomials through the rows of a method, for intervals that are divided as needed."""
-    open_pieces = [(low, high, math.inf) for low, high in itertools.pairwise(edges)]
+    open_pieces = [_Open(low, high) for low, high in itertools.pairwise(edges)]
     done: dict[float, tuple[float, Array]] = {}
     scale = 0.0
     aim = max(_LAST * tolerance, _ROUNDING)
@@ -116,7 +142,7 @@ def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pie
                 f"dense output and events need more than {_MOST_PIECES} polynomials; use a "
                 "shorter time or a larger tolerance, or give the times of the results"
             )
-        lows, highs = np.array([piece[:2] for piece in open_pieces]).T
+        lows, highs = np.array([(piece.low, piece.high) for piece in open_pieces]).T
         each = nodes(lows, highs, POINTS)
         times, place = np.unique(each, return_inverse=True)
         try:
@@ -134,16 +160,21 @@ def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pie
         tails = np.abs(coefficients[:, -_TAIL:]).max(axis=1)
         tails[:, :3] /= scale or 1.0
         following = []
-        for (low, high, before), own_values, tail in zip(
-            open_pieces, values, tails.max(axis=1).tolist(), strict=True
+        for piece, own_nodes, own_values, tail in zip(
+            open_pieces, each, values, tails.max(axis=1).tolist(), strict=True
         ):
-            is_rough = tail <= tolerance and tail > before / _DIVIDED
-            if tail <= aim or is_rough or high - low <= 64 * math.ulp(max(abs(low), abs(high))):
+            low, high = piece.low, piece.high
+            if (
+                tail <= aim
+                or high - low <= 64 * math.ulp(max(abs(low), abs(high)))
+                or piece.is_rough(tail, own_nodes, own_values, scale, tolerance)
+            ):
                 done[low] = high, own_values
                 continue
             parts = math.ceil(1.2 * (tail / aim) ** (1.0 / (NODES - _TAIL)))
             cuts = np.linspace(low, high, min(max(parts, 2), _MOST_PARTS) + 1).tolist()
-            following += [(a, b, tail) for a, b in itertools.pairwise(cuts)]
+            whole = Pieces(np.array([low, high]), own_values[None])
+            following += [_Open(a, b, tail, whole) for a, b in itertools.pairwise(cuts)]
         open_pieces = following
     starts = sorted(done)
     return Pieces(np.array([*starts, done[starts[-1]][0]]), np.array([done[t][1] for t in starts]))

@@ -242,3 +242,15 @@ def test_a_wrong_dense_output_is_reported(
     monkeypatch.setattr(Pieces, "__call__", lambda own, times: right(own, times) * (1.0 + 2e-3))
     assert dense_campaign.main(["4", "test"]) == 1
     assert " times the limit" in capsys.readouterr().out
+
+
+def test_a_fast_small_wave_is_no_roughness_of_the_method() -> None:
+    """The wave turns 56 radians between 17 nodes, and its amplitude is a few tolerances."""
+    law = TorqueLaw(sines=[((-5.95e-4, 4.26e-4, -6.21e-4), 12.2)])
+    scene = Scene("wave", (9e-5, -0.7, -1e-4), moments=(23.0, 37.0, 52.0), torque=law)
+    times = np.linspace(-18.45, 0.0, 400)
+    truth = solve(scene, times).omega
+    for method in ("rk45", "dop853", "auto"):
+        found = solve(scene, -18.45, method, 1e-6, dense_output=True)
+        assert found.sol is not None
+        assert np.abs(found.sol(times).T - truth).max() <= 0.7e-6, method

@@ -128,6 +128,18 @@ def test_the_steps_are_those_of_scipy(
     assert (found.status, found.reached) == (0, end)
 
 
+def test_rounding_errors_do_not_add_up_over_many_steps(library: Any) -> None:
+    """A sum of 100 000 steps without their remainders has an error of about 1e-12."""
+    rate = ctypes.c_double(0.0)
+    address = ctypes.cast(ctypes.pointer(rate), ctypes.c_void_p)
+    torque = opaque(LowLevelCallable(library.damped, address))  # a constant of 0.2 N m
+    scene = Scene("ball", (1.0, 0.0, 0.0), moments=(3.0, 3.0, 3.0), torque=torque)
+    assert isinstance(torque.function, CompiledTorque)
+    found = integrated(scene, torque.function, [1.0], 1e-9, [1e-9] * 3, 1e-5, 10**7)
+    assert found.evaluations > 10**6
+    assert abs(found.state[0, 0] - (1.0 + 0.2 / 3.0)) <= 2.3e-16
+
+
 @pytest.mark.parametrize("number", range(12))
 def test_random_torques_meet_the_tolerance(number: int) -> None:
     source = Random(f"compiled {number}")

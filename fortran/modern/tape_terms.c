@@ -217,7 +217,8 @@ static inline lanes perturbed(const struct tape *tape, int n, int k, const pertu
 
 /* Compute term k of eight perturbations of all slots, and term k + 1 of those of the unknowns. Where
    they are forced, the terms of the unknowns have a part of their own already. */
-static inline void perturb(const struct tape *tape, double h, int k, int is_forced)
+static inline __attribute__((always_inline)) void perturb(const struct tape *tape, double h, int k,
+                                                          int is_forced)
 {
   const series *const a = (const series *)tape->a;
   perturbations *const v = tape->v;

@@ -6,7 +6,7 @@ the programs of the thesis.
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -124,23 +124,25 @@ def trajectory_of(
     reach the last time.
     """
     ended = ENDS[status] if ENDS[status] in WITH_ALL_ROWS else "overflow"
-    found = rows_trajectory(times[:n_rows], rows.T[:n_rows], evaluations, steps, ended)
-    if attitudes is not None:
-        found = replace(found, attitude=attitudes.T[:n_rows])
-    return replace(found, error=error, growth=growth) if found.has_all_rows else found
+    more = {"error": error, "growth": growth} if ended in WITH_ALL_ROWS else {}
+    attitude = None if attitudes is None else attitudes.T[:n_rows]
+    return rows_trajectory(
+        times[:n_rows], rows.T[:n_rows], evaluations, steps, ended, attitude=attitude, **more
+    )
 
 
 def rows_trajectory(
-    times: Sequence[float], omega: Array, evaluations: int, steps: int, ended: str
+    times: Sequence[float], omega: Array, evaluations: int, steps: int, ended: str, **more: Any
 ) -> Trajectory:
     """Return a trajectory from omega (rad/s, shape (n, 3)) at `times` (s), without velocity.
 
     Its `recorded_time`, which differs from the true time only for programs of the thesis, is equal
     to its `time`. `evaluations` is the number of evaluations of the right-hand side, and `steps`
-    the number of steps. `ended` states how the integration ended, for example ``complete``.
+    the number of steps. `ended` states how the integration ended, for example ``complete``, and
+    `more` are other attributes of the trajectory.
     """
     time = np.array(times, dtype=float)
-    return Trajectory(time, time, omega, None, steps, evaluations, ended)
+    return Trajectory(time, time, omega, None, steps, evaluations, ended, **more)
 
 
 def closed_form(scene: Scene) -> str | None:

@@ -2,7 +2,7 @@
 
 import importlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from pyharness.dynamics.system import is_recorded
@@ -66,8 +66,9 @@ def _reference(
 
     result = reference(scene, times, effort=effort)
     ended = "complete" if len(result.time) == len(times) else "overflow"
-    found = rows_trajectory(result.time.tolist(), result.omega, 0, len(times), ended)
-    return replace(found, attitude=result.attitude)
+    return rows_trajectory(
+        result.time.tolist(), result.omega, 0, len(times), ended, attitude=result.attitude
+    )
 
 
 def _no_rows(*given: object) -> Trajectory:

@@ -3,7 +3,6 @@
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -155,8 +154,7 @@ def rows_of(
     right-hand side, and `steps` the number of steps. `ended` states how the integration ended, for
     example ``complete``. The attitudes are normalised to unit quaternions.
     """
-    found = rows_trajectory(times, rows[:, :3], evaluations, steps, ended)
-    if rows.shape[1] == 3:
-        return found
-    attitude = rows[:, 3:]
-    return replace(found, attitude=attitude / np.linalg.norm(attitude, axis=1, keepdims=True))
+    attitude = None
+    if rows.shape[1] > 3:
+        attitude = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
+    return rows_trajectory(times, rows[:, :3], evaluations, steps, ended, attitude=attitude)

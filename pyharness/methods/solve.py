@@ -155,8 +155,9 @@ def solve(
     start = (scene.attitude or IDENTITY) if attitude else None
     if start is not scene.attitude:
         scene = replace(scene, attitude=start)
-    is_full = scene.inertia is not None
-    scene, axes = principal(scene)
+    axes = None
+    if scene.inertia is not None:
+        scene, axes = principal(scene)
     moments = scene.changing or scene.moments
     values, turned = _ascending(times)
     if scene.changing is not None:
@@ -176,7 +177,7 @@ def solve(
     found = parts[0] if len(parts) == 1 else joined(*parts)
     reported = None if chosen.is_fixed_step else tolerance
     found = replace(found, moments=moments, tolerance=reported, scene=given)
-    if is_full:
+    if axes is not None:
         found = in_scene_axes(found, axes)
     rows = partial(_more_rows, given, method, effort, found.attitude is not None)
     if dense_output:

@@ -22,8 +22,9 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Trajectory
 
 # The results at the nodes are computed to this part of the tolerance, because a polynomial may
-# have larger errors than its nodes.
+# have larger errors than its nodes; and to the second part if the method can't meet the first.
 _NODE_TOLERANCE = 0.25
+_LARGEST_NODE_TOLERANCE = 0.75
 # Largest of the last coefficients of a polynomial, in tolerances, and relative to the state.
 _LAST = 0.02
 _ROUNDING = 4e-16
@@ -111,7 +112,7 @@ def state_pieces(
     ends = sorted({0.0, *found.time[[0, -1]].tolist()})
     if tolerance == 1.0:
         return _of_fixed_steps(scene, ends, rows, partial(rates, scene))
-    own = max(finest, _NODE_TOLERANCE * tolerance)
+    own = [max(finest, part * tolerance) for part in (_NODE_TOLERANCE, _LARGEST_NODE_TOLERANCE)]
     return _fitted(_first_edges(scene, found, ends), rows, tolerance, own)
 
 
@@ -130,8 +131,11 @@ def _first_edges(scene: Scene, found: Trajectory, ends: list[float]) -> list[flo
     return [*edges, bounds[-1]]
 
 
-def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pieces:
-    """Return polynomials through the rows of a method, for intervals that are divided as needed."""
+def _fitted(edges: list[float], rows: Rows, tolerance: float, own: list[float]) -> Pieces:
+    """Return polynomials through the rows of a method, for intervals that are divided as needed.
+
+    `own` are tolerances of the rows. The second is used if the method can't meet the first.
+    """
     open_pieces = [_Open(low, high) for low, high in itertools.pairwise(edges)]
     done: dict[float, tuple[float, Array]] = {}
     scale = 0.0
@@ -146,11 +150,11 @@ def _fitted(edges: list[float], rows: Rows, tolerance: float, own: float) -> Pie
         each = nodes(lows, highs, POINTS)
         times, place = np.unique(each, return_inverse=True)
         try:
-            states = rows(times, own).y.T
-        except InputError:
-            if own == tolerance:
-                raise
-            own = tolerance
+            states = rows(times, own[0]).y.T
+        except InputError as error:
+            if own[0] == own[-1]:
+                raise InputError(f"dense output and events: {error}") from error
+            own = own[1:]
             continue
         if len(states) < len(times):
             raise InputError("dense_output: the method reached fewer times than before")

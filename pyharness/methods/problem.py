@@ -52,17 +52,6 @@ def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
     return coefficients, ratios, *torque
 
 
-def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:
-    """Return the name of the kernel that solves a scene by Taylor series, and its first arguments.
-
-    The arguments are arrays of the body's coefficients and of the torque. The kernel depends on
-    whether the torque is about the axes of the body or of space.
-    """
-    if scene.torque.in_space:
-        return "space_torque_rows", normalized_in_space(scene)
-    return "taylor_rows", normalized(scene)
-
-
 def _over(scene: Scene, law: TorqueLaw, moments: Array) -> tuple[Array, Array, Array, Array, Array]:
     # A wave of amplitude 0 has no effect, but computing its sine or cosine would take time.
     sines, cosines = (

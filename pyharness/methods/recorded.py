@@ -1,4 +1,4 @@
-"""Integration of scenes with a recorded torque, by the Taylor series of a tape."""
+"""The equations of motion of a scene with a recorded torque, as the kernel reads them."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -7,16 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.dynamics.system import system_of
-from pyharness.methods.problem import known, trajectory_of
-from pyharness.model.attitude import IDENTITY
 from pyharness.model.codes import Operations
-from pyharness.model.effort import advice
-from pyharness.model.errors import InputError, TimedError
-from pyharness.model.extension import GAVE_UP, extension
+from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import TIME, Linear, Table, Tape
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import Array
 
 _KINDS = {
     "linear": (Operations.LINEAR, 1),
@@ -28,38 +24,6 @@ _KINDS = {
     "sine": (Operations.SINE_COSINE, 3),
     "table": (Operations.TABLE, 1),
 }
-
-
-def recorded_series(
-    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
-) -> Trajectory:
-    """Return the trajectory of a scene with a recorded torque at `times` (s) by Taylor series.
-
-    The attitude is computed too if the scene has one. `tolerance` is the largest allowed error,
-    relative to the largest |omega|, and of the attitude's angle (rad). `effort` multiplies the work
-    limit of some ten seconds. If the error of the first integration is too large, the scene is
-    integrated again. `steps` is the number of steps of the last integration, and `evaluations` that
-    of all. Raise InputError for an opaque torque, a torque that is not finite, and if the work
-    limit is exceeded.
-    """
-    tape = kernel_tape(system(scene))
-    work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
-    n_attitudes = 0 if scene.attitude is None else len(times)
-    joint = np.empty((4, n_attitudes + 1), order="F")
-    joint[:, 0] = scene.attitude or IDENTITY
-    rows, n_rows, status, steps = extension().tape_rows(
-        tape, scene.omega, times, tolerance, joint, work
-    )
-    if status == GAVE_UP:
-        count = "1 step" if steps == 1 else f"{steps} steps"
-        raise TimedError(
-            f"taylor exceeded its work limit before t = {{time}} s after {count}; "
-            + advice("use a shorter time or a larger tolerance", effort, work[1]),
-            times[n_rows],
-        )
-    error, growth = map(known, work[2:4])
-    attitudes = joint[:, 1:] if n_attitudes else None
-    return trajectory_of(times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes)
 
 
 def system(scene: Scene) -> Tape:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness.methods.problem import closed_form, known, normalized
-from pyharness.methods.recorded import recorded_series
+from pyharness.methods.taylor import taylor
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
 from pyharness.model.principal import PrincipalScene
@@ -118,6 +118,6 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
 
 def _recorded_growth(scene: Scene, t_end: float) -> float | None:
     try:
-        return recorded_series(scene, [t_end], _COARSE, _LITTLE_WORK).growth
+        return taylor(scene, [t_end], _COARSE, _LITTLE_WORK).growth
     except InputError:
         return None

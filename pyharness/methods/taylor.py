@@ -4,15 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pyharness.methods.problem import known, series_kernel, trajectory_of
-from pyharness.methods.recorded import recorded_series
+from pyharness.methods.problem import known, normalized, normalized_in_space, trajectory_of
+from pyharness.methods.recorded import kernel_tape, system
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import advice
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.trajectory import Trajectory
+from pyharness.model.trajectory import Array, Trajectory
 
 
 def taylor(
@@ -28,11 +28,10 @@ def taylor(
     number of steps of all integrations, because each step computes one Taylor series. Under a
     torque about the axes of space there are at least two integrations, the later ones with a
     smaller local tolerance. The difference of the integrations is the estimate of the error, and
-    the error amplification (`growth`) is unknown. A torque that depends on the state has a kernel
-    of its own, for which see `recorded_series`.
+    the error amplification (`growth`) is unknown.
+
+    Raise InputError for an opaque torque, and if the work limit is exceeded.
     """
-    if isinstance(scene.torque, StateTorque):
-        return recorded_series(scene, times, tolerance, effort)
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     # The first column is the attitude at time 0. A column for each time follows.
     n_attitudes = 0 if scene.attitude is None else len(times)
@@ -53,3 +52,17 @@ def taylor(
     error, growth = map(known, work[2:4])
     attitudes = joint[:, 1:] if n_attitudes else None
     return trajectory_of(times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes)
+
+
+def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:
+    """Return the name of the kernel that solves a scene by Taylor series, and its first arguments.
+
+    The arguments are arrays of the body's coefficients and of the torque. The kernel depends on
+    whether the torque depends on the state, or else on the axes that it is about. Raise InputError
+    for an opaque torque.
+    """
+    if isinstance(scene.torque, StateTorque):
+        return "tape_rows", (kernel_tape(system(scene)),)
+    if scene.torque.in_space:
+        return "space_torque_rows", normalized_in_space(scene)
+    return "taylor_rows", normalized(scene)

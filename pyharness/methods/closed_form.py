@@ -12,8 +12,18 @@ from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive, to
 from pyharness.model.effort import advice, waves
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.extension import COMPLETE, GAVE_UP, REFUSED, SENSITIVE, extension
+from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
+
+
+def period_of(scene: Scene) -> float:
+    """Return the period of omega (s) of a body without torque; 0 if there is none, or a torque."""
+    if scene.changing is not None or not scene.torque.is_zero:
+        return 0.0
+    bare = principal(scene)[0]
+    found = extension().torque_free_period(bare.euler_coefficients, remainders(bare), bare.omega)
+    return float(found)
 
 
 def known_solution(

@@ -4,9 +4,13 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from pyharness.methods import dense
+from pyharness.methods.closed_form import period_of
 from pyharness.methods.event_functions import EventFunction
 from pyharness.methods.events import Solution, found_events, no_events
+from pyharness.methods.periodic_events import PERIODS, are_of_omega
 from pyharness.methods.registry import METHODS
 from pyharness.methods.sides import row_names
 from pyharness.model.dense_output import DenseOutput, Pieces
@@ -42,12 +46,15 @@ def with_events(
     sol = found.sol or solution_of(scene, found, rows, method, tolerance)
     events = no_events(len(functions), 3 if found.attitude is None else 7)
     if sol.t_min < sol.t_max:
-        pieces = sol.states
+        pieces, period = sol.states, 0.0
         if not isinstance(pieces, Pieces):
-            pieces = dense.state_pieces(scene, found, rows, tolerance, METHODS[method].finest)
+            if are_of_omega(functions):
+                period = period_of(scene)
+            shown = _first_periods(found, rows, tolerance, period)
+            pieces = dense.state_pieces(scene, shown, rows, tolerance, METHODS[method].finest)
         # A fixed step of a method has a tolerance of 1.
         own = tolerance if tolerance < 1.0 else 0.0
-        events = found_events(functions, Solution(pieces, sol, own))
+        events = found_events(functions, Solution(pieces, sol, own), period)
     kept = (found.time >= events.first) & (found.time <= events.last)
     cut: dict[str, Any] = {name: getattr(found, name)[kept] for name in row_names(found)}
     # An overflow remains the ending if it is not beyond a terminal event.
@@ -61,6 +68,20 @@ def with_events(
         low, high = max(sol.t_min, events.first), min(sol.t_max, events.last)
         cut["sol"] = replace(sol, t_min=low, t_max=high)
     return replace(found, **cut, t_events=events.times, y_events=events.states)
+
+
+def _first_periods(
+    found: Trajectory, rows: dense.Rows, tolerance: float, period: float
+) -> Trajectory:
+    """Return a trajectory that ends after a few periods (s) on each side of 0, if it is longer."""
+    ends = found.time[[0, -1]]
+    last = PERIODS * period
+    # A little more than these periods is not worth another way to find events.
+    if last == 0.0 or np.abs(ends).max() <= 2.0 * last:
+        return found
+    return rows(
+        np.unique(np.where(np.abs(ends) > 2.0 * last, np.sign(ends) * last, ends)), tolerance
+    )
 
 
 def with_events_reversed(found: Trajectory) -> Trajectory:

@@ -26,6 +26,7 @@ from pyharness.methods.event_roots import (
     joined,
     may_vanish,
 )
+from pyharness.methods.periodic_events import improved, repeated
 from pyharness.model.array_type import Array
 from pyharness.model.chebyshev import nodes
 from pyharness.model.dense_output import DenseOutput, Pieces
@@ -71,6 +72,10 @@ class Solution:
         states = self.states(times) if states is None else states
         rates = self.sol.rates(times, states) if g.event.needs_rates else None
         return g(times, states, rates)
+
+    def exact_values(self, g: EventFunction, times: Array) -> Array:
+        """Return the values of an event's function at `times` (s), without the polynomials."""
+        return self.values(g, times, _normalised(self.sol.states(times)))
 
     def noise(self, g: EventFunction, times: Array) -> Array:
         """Return, for each time, the error of an event's function due to errors of its arguments.
@@ -342,6 +347,21 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
     return found
 
 
+def _repeated(
+    g: EventFunction, solution: Solution, times: Array, side: int, period: float
+) -> Array:
+    """Return the times of all events on one side of 0, from those where there are polynomials."""
+    last, end = solution.pieces.edges[-1], solution.sol.t_max
+    if side < 0:
+        last, end = solution.pieces.edges[0], solution.sol.t_min
+    if last == end:
+        return times
+    found, kept = repeated(side * times, period, abs(end), g.name)
+    found *= side
+    found[kept:] = improved(g, found[kept:], solution.exact_values, period)
+    return np.clip(found, solution.sol.t_min, solution.sol.t_max)
+
+
 @dataclass(frozen=True, eq=False)
 class FoundEvents:
     """The events of a scene, and the times at which they end the integration.
@@ -368,13 +388,24 @@ def no_events(count: int, columns: int) -> FoundEvents:
     return FoundEvents([np.zeros(0) for _ in range(count)], states, -math.inf, math.inf)
 
 
-def found_events(functions: list[EventFunction], solution: Solution) -> FoundEvents:
-    """Return the events of several functions, without those beyond a terminal event."""
+def found_events(
+    functions: list[EventFunction], solution: Solution, period: float = 0.0
+) -> FoundEvents:
+    """Return the events of several functions, without those beyond a terminal event.
+
+    With a period (s), the polynomials of the solution may end before the solution. Events beyond
+    them are repetitions.
+    """
     roots = [event_roots(g, solution) for g in functions]
     sides: dict[int, list[Array]] = {}
     limits: dict[int, float] = {}
     for side in (-1, 1):
         lists = [side_events(g, solution, x, side) for g, x in zip(functions, roots, strict=True)]
+        if period > 0.0:
+            lists = [
+                _repeated(g, solution, times, side, period)
+                for g, times in zip(functions, lists, strict=True)
+            ]
         ends = [
             abs(times[int(g.limit) - 1])
             for g, times in zip(functions, lists, strict=True)

@@ -1,6 +1,7 @@
 """Sensitivities: derivatives of a solution with respect to its parameters, by Taylor series."""
 
 import itertools
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -13,12 +14,11 @@ from pyharness.dynamics.parameters import (
     parameters_of,
     varied_equations,
 )
-from pyharness.methods.problem import remainders
+from pyharness.methods.closed_form import period_of
 from pyharness.methods.recorded import kernel_tape
 from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, TimedError, kind_of, unknown
 from pyharness.model.extension import COMPLETE, GAVE_UP, extension
-from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import Tape
@@ -123,14 +123,10 @@ def _period(scene: Scene) -> float:
 
     It is 0 too if omega is so nearly constant that the period's derivatives would have few digits.
     """
-    torque = scene.torque
     # A function that is 0 now, and has a parameter of this name, may depend on time.
-    if scene.changing is not None or not torque.is_zero or getattr(torque, "named", None):
-        return 0.0
-    bare = principal(scene)[0] if scene.inertia is not None else scene
-    period = extension().torque_free_period(bare.euler_coefficients, remainders(bare), bare.omega)
-    varies = period * np.abs(_slope(scene)).max() > _VARIES * max(map(abs, bare.omega))
-    return float(period) if varies else 0.0
+    period = 0.0 if getattr(scene.torque, "named", None) else period_of(scene)
+    largest = math.hypot(*scene.omega)
+    return period if period * np.abs(_slope(scene)).max() > _VARIES * largest else 0.0
 
 
 def _slope(scene: Scene) -> Array:

@@ -1,0 +1,83 @@
+"""Events of a body without torque, whose omega is periodic: those of one period, repeated."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from pyharness.methods.event_functions import EventFunction
+from pyharness.model.array_type import Array
+from pyharness.model.errors import InputError
+from pyharness.model.symbols import Recorder
+from pyharness.model.tape import ATTITUDE, N_INPUTS, TIME
+
+# The events are found in so many periods, where the second and third have no end of the solution.
+PERIODS = 3.0
+_MOST_EVENTS = 5_000_000
+_BLOCK = 100_000  # events that are improved together
+# Half the distance at which the slope of a function is measured, in periods. It is the largest
+# correction of a time too.
+_PROBE = 1e-5
+
+
+def are_of_omega(functions: Sequence[EventFunction]) -> bool:
+    """Return whether functions are known to depend on omega and its derivative alone.
+
+    A function is called once with symbols. What it does with them is unknown if it can't be
+    recorded.
+    """
+    return all(map(_is_of_omega, functions))
+
+
+def _is_of_omega(g: EventFunction) -> bool:
+    recorder = Recorder(n_inputs=N_INPUTS + 3)
+    time, *state = recorder.inputs()
+    omega, attitude, rates = np.split(np.array(state, dtype=object), [3, 7])
+    try:
+        tape = recorder.tape([g.event.function(time, omega, attitude, rates)])
+    except Exception:  # the function may raise anything where it expects a number
+        return False
+    return tape.inputs.isdisjoint({TIME, *ATTITUDE})
+
+
+def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
+    """Return the times of events until `end`, and how many of them are those of `times`.
+
+    The times (s) are those in the first PERIODS periods, in ascending order. Raise InputError, with
+    `where` in front of the message, if there are too many events.
+    """
+    inner = times[(times > period) & (times <= 2.0 * period)]
+    if not inner.size:
+        # There may be an event at time 0 alone.
+        return times[times < period], len(times[times < period])
+    # No event is near the beginning of the period that is repeated.
+    gaps = np.diff(inner, append=inner[0] + period)
+    begin = inner[gaps.argmax()] + 0.5 * gaps.max()
+    begin -= period if begin > 2.0 * period else 0.0
+    first = times[times <= begin]
+    one = times[(times > begin) & (times <= begin + period)]
+    count = np.floor((end - begin) / period) + 1.0
+    if count * len(one) > _MOST_EVENTS:
+        raise InputError(
+            f"{where}: more than {_MOST_EVENTS} events; use a shorter time, or the attribute "
+            "terminal"
+        )
+    later = (one + period * np.arange(count)[:, None]).ravel()
+    return np.concatenate([first, later[later <= end]]), len(first)
+
+
+def improved(
+    g: EventFunction, times: Array, values: Callable[[EventFunction, Array], Array], period: float
+) -> Array:
+    """Return the times (s) of events, corrected by one step of Newton's method.
+
+    `values` is a function of the times that returns those of an event's function.
+    """
+    found, probe = times.copy(), _PROBE * period
+    for begin in range(0, len(times), _BLOCK):
+        block = times[begin : begin + _BLOCK]
+        before, value, after = (values(g, block + shift) for shift in (-probe, 0.0, probe))
+        with np.errstate(all="ignore"):
+            step = -value * 2.0 * probe / (after - before)
+        # A root without a sign change has no slope.
+        found[begin : begin + _BLOCK] += np.where(np.abs(step) < probe, step, 0.0)
+    return found

@@ -27,6 +27,8 @@ _NODE_TOLERANCE = 0.25
 _LARGEST_NODE_TOLERANCE = 0.75
 # Largest of the last coefficients of a polynomial, in tolerances, and relative to the state.
 _LAST = 0.02
+# Rounding errors of a method, over the error amplification. They are not smooth.
+_OWN_ROUNDING = 4e-15
 _ROUNDING = 4e-16
 _TAIL = 3  # coefficients whose size is an estimate of those left out
 # A piece has errors of the method that are not smooth if its tail is not much smaller than that of
@@ -47,19 +49,19 @@ class _Open:
     whole: Pieces | None = None  # this polynomial
 
     def is_rough(
-        self, tail: float, times: Array, values: Array, scale: float, tolerance: float
+        self, tail: float, times: Array, values: Array, scale: float, rough: float
     ) -> bool:
         """Return whether a polynomial with this tail has errors of the method that are not smooth.
 
         `values` at `times` (s) are the method's, `scale` is the largest |omega| (rad/s), and both
-        the errors and the tail must be below the tolerance.
+        the errors and the tail must be below `rough`.
         """
-        if self.whole is None or not self.tail / _DIVIDED < tail <= tolerance:
+        if self.whole is None or not self.tail / _DIVIDED < tail <= rough:
             return False
         # A fast wave between few nodes has small tails too, but another polynomial.
         apart = np.abs(self.whole(times) - values).max(axis=0)
         apart[:3] /= scale or 1.0
-        return bool(apart.max() <= tolerance)
+        return bool(apart.max() <= rough)
 
 
 # A function that returns the trajectory at given times to a given tolerance.
@@ -113,7 +115,8 @@ def state_pieces(
     if tolerance == 1.0:
         return _of_fixed_steps(scene, ends, rows, partial(rates, scene))
     own = [max(finest, part * tolerance) for part in (_NODE_TOLERANCE, _LARGEST_NODE_TOLERANCE)]
-    return _fitted(_first_edges(scene, found, ends), rows, tolerance, own)
+    rough = tolerance + _OWN_ROUNDING * (found.growth or 0.0)
+    return _fitted(_first_edges(scene, found, ends), rows, tolerance, own, rough)
 
 
 def _first_edges(scene: Scene, found: Trajectory, ends: list[float]) -> list[float]:
@@ -131,10 +134,13 @@ def _first_edges(scene: Scene, found: Trajectory, ends: list[float]) -> list[flo
     return [*edges, bounds[-1]]
 
 
-def _fitted(edges: list[float], rows: Rows, tolerance: float, own: list[float]) -> Pieces:
+def _fitted(
+    edges: list[float], rows: Rows, tolerance: float, own: list[float], rough: float
+) -> Pieces:
     """Return polynomials through the rows of a method, for intervals that are divided as needed.
 
-    `own` are tolerances of the rows. The second is used if the method can't meet the first.
+    `own` are tolerances of the rows. The second is used if the method can't meet the first. `rough`
+    is the largest error of the rows that is not smooth, relative to the largest |omega|.
     """
     open_pieces = [_Open(low, high) for low, high in itertools.pairwise(edges)]
     done: dict[float, tuple[float, Array]] = {}
@@ -171,7 +177,7 @@ def _fitted(edges: list[float], rows: Rows, tolerance: float, own: list[float]) 
             if (
                 tail <= aim
                 or high - low <= 64 * math.ulp(max(abs(low), abs(high)))
-                or piece.is_rough(tail, own_nodes, own_values, scale, tolerance)
+                or piece.is_rough(tail, own_nodes, own_values, scale, rough)
             ):
                 done[low] = high, own_values
                 continue

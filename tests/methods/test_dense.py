@@ -254,3 +254,17 @@ def test_a_fast_small_wave_is_no_roughness_of_the_method() -> None:
         found = solve(scene, -18.45, method, 1e-6, dense_output=True)
         assert found.sol is not None
         assert np.abs(found.sol(times).T - truth).max() <= 0.7e-6, method
+
+
+def test_rounding_errors_above_the_tolerance_are_not_resolved() -> None:
+    """They grow with the error amplification, and no polynomial is as accurate as the tolerance."""
+    scene = Scene("wing nut", (0.01, 5.0, 0.0), moments=(1.0, 2.0, 3.0))
+    found = solve(scene, 2000.0, "taylor", 1e-14, dense_output=True)
+    assert found.ended == "sensitive"
+    assert found.sol is not None
+    assert found.growth is not None
+    assert isinstance(found.sol.states, Pieces)
+    assert len(found.sol.states.edges) < 20_000
+    times = np.linspace(0.0, 2000.0, 501)
+    apart = np.abs(found.sol(times).T - solve(scene, times, "closed-form").omega)
+    assert apart.max() <= 5.0 * (1e-14 + 4e-14 * found.growth)

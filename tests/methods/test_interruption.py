@@ -140,7 +140,6 @@ def test_kernel_ends_at_once(
     name: str, keyboard: _Keyboard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rooms = [f"methods.{each}" for each in ("taylor", "fixed_step", "closed_form", "gauss", "many")]
-    rooms += ["methods.recorded"]
     for each in (*rooms, "original.compiled", "original.many", "model.extension"):
         monkeypatch.setattr(f"pyharness.{each}.extension", keyboard.door)
     if name in DOORLESS:

@@ -232,8 +232,8 @@ def opaque(function: Any, *, needs_attitude: bool = False) -> StateTorque:
     Raises
     ------
     InputError
-        If `function` is not a function of two or three arguments, or is a compiled function with
-        another signature.
+        If `function` is not a function of two or three arguments, has no argument for an attitude
+        that it needs, or is a compiled function with another signature.
 
     Examples
     --------
@@ -247,7 +247,13 @@ def opaque(function: Any, *, needs_attitude: bool = False) -> StateTorque:
     compiled = compiled_torque(function)
     if compiled:
         return StateTorque(None, compiled, needs_attitude)
-    return StateTorque(None, function, _takes_attitude(function))
+    takes_attitude = _takes_attitude(function)
+    if needs_attitude and not takes_attitude:
+        raise InputError(
+            "[torque]: needs_attitude is given, but the function has no argument for the attitude; "
+            "allowed: a function of (t, omega, attitude)"
+        )
+    return StateTorque(None, function, takes_attitude)
 
 
 def checked_torque(value: object) -> TorqueLaw | StateTorque:

@@ -281,8 +281,11 @@ def test_other_compiled_functions_are_refused(library: Any) -> None:
     for given in (locked, LowLevelCallable(locked)):
         with pytest.raises(InputError, match="needs the lock of the interpreter"):
             opaque(given)
-    # A Python function is not affected.
+    # The arguments of a Python function say what it needs.
     assert not opaque(lambda t, w: -w).needs_attitude
+    assert opaque(lambda t, w, q: -w, needs_attitude=True).needs_attitude
+    with pytest.raises(InputError, match="has no argument for the attitude; allowed"):
+        opaque(lambda t, w: -w, needs_attitude=True)
 
 
 def test_a_cfunc_of_numba() -> None:

@@ -160,7 +160,6 @@ def _by_periods(
     transition, last = rows[:, :, columns[OMEGA0]], rows[place[-1]]
     slope = _slope(scene)
     growth = slope @ (last[:, columns[OMEGA0]] - np.eye(3)) / (slope @ slope)
-    growth -= slope * (growth @ slope) / (slope @ slope)
     shear = np.outer(slope, growth)
     forced = last - last[:, columns[OMEGA0]] @ starts
     drift = np.zeros_like(forced)

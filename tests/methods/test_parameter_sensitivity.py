@@ -280,6 +280,19 @@ def test_a_torque_that_is_0_need_not_have_periodic_derivatives(law: TorqueLaw) -
         assert np.abs(found[name] - series[name]).max() <= 1e-9 * np.abs(series[name]).max()
 
 
+def test_a_parameter_of_a_function_may_have_the_name_of_a_term() -> None:
+    def torque(t: Any, omega: Any, *, constant: float = 0.0) -> Any:
+        return [constant * np.sin(t), 0.0, constant]
+
+    given: Any = torque
+    scene = Scene("zero", (0.1, 0.5, 0.3), moments=(1.0, 2.0, 3.0), torque=given)
+    assert scene.torque.is_zero
+    found = slopes(scene, [10.0, 200.0], "torque.constant")
+    series = slopes(scene, [10.0, 200.0], "torque.constant", method="taylor")
+    assert found.shape == (2, 3, 1)
+    assert np.abs(found - series).max() <= 1e-9 * np.abs(series).max()
+
+
 @pytest.mark.parametrize("factor", [1e-12, 1e-16, 1e6])
 def test_slow_and_fast_motions(factor: float) -> None:
     slow = Scene("", tuple(factor * w for w in BRICK.omega), moments=BRICK.moments)

@@ -268,3 +268,24 @@ def test_rounding_errors_above_the_tolerance_are_not_resolved() -> None:
     times = np.linspace(0.0, 2000.0, 501)
     apart = np.abs(found.sol(times).T - solve(scene, times, "closed-form").omega)
     assert apart.max() <= 5.0 * (1e-14 + 4e-14 * found.growth)
+
+
+@pytest.mark.parametrize("possible", [0.0, 0.5, 0.9])
+def test_the_nodes_are_more_accurate_than_the_tolerance(possible: float) -> None:
+    """Polynomials through errors of the whole tolerance would have larger errors."""
+    scene = Scene("body", (1.0, 2.0, 3.0), moments=(1.0, 2.0, 2.5))
+    used = []
+
+    def rows(times: Any, tolerance: float) -> Trajectory:
+        used.append(tolerance)
+        if tolerance < possible * 1e-6:
+            raise InputError("too small")
+        return solve(scene, times, "taylor", tolerance)
+
+    found = solve(scene, 2.0, "taylor", 1e-6)
+    if possible == 0.9:
+        with pytest.raises(InputError, match=r"^dense output and events: too small$"):
+            dense.state_pieces(scene, found, rows, 1e-6, 1e-15)
+        return
+    dense.state_pieces(scene, found, rows, 1e-6, 1e-15)
+    assert used[-1] == pytest.approx(0.75e-6 if possible else 0.25e-6)

@@ -60,6 +60,12 @@ void chattering(double t, const double *w, const double *q, double *n, void *dat
   for (int i = 0; i < 3; i++) n[i] = w[i] > 0.0 ? -0.5 : 0.5;
 }
 
+void late(double t, const double *w, const double *q, double *n, void *data)
+{
+  (void)data;
+  n[0] = t > 0.5 ? q[0] : -w[0];
+}
+
 void turning(double t, const double *w, const double *q, double *n, void *data)
 {
   (void)t, (void)q, (void)data;
@@ -78,7 +84,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Any:
     compiler = shlex.split(os.environ.get("CC", "cc"))
     subprocess.run([*compiler, *flags, str(source), "-o", str(built), "-lm"], check=True)
     found = ctypes.CDLL(str(built))
-    for name in ("damped", "pulled", "growing", "chattering", "turning"):
+    for name in ("damped", "pulled", "growing", "chattering", "late", "turning"):
         function = getattr(found, name)
         function.restype, function.argtypes = None, ARGUMENTS
     return found
@@ -185,6 +191,21 @@ def test_the_attitude_of_a_torque(library: Any) -> None:
         undeclared = replace(BRICK, torque=opaque(library.pulled))
         with pytest.raises(InputError, match=r"allowed: opaque\(function, needs_attitude=True\)"):
             solve(undeclared, 1.0, "dop853", attitude=given)
+
+
+def test_an_attitude_that_is_used_late_is_nan(library: Any) -> None:
+    """What happens at time 0 does not show that the function uses the attitude."""
+    found = solve(replace(BRICK, torque=opaque(library.late)), [0.4, 1.0], "dop853", 1e-8)
+    assert (found.ended, len(found.time)) == ("overflow", 1)
+
+
+def test_components_that_a_function_does_not_set_are_zero(library: Any) -> None:
+    scene = replace(BRICK, torque=opaque(library.turning))
+    first, second = (solve(scene, 2.0, name, 1e-8).omega for name in ("dop853", "lsoda"))
+    recorded = replayed(lambda t, w, q: [w[1], -w[0], 0.0])
+    truth = solve(replace(BRICK, torque=recorded), 2.0).omega
+    assert np.abs(first - truth).max() <= 2e-8
+    assert np.abs(second - truth).max() <= 2e-8
 
 
 def test_python_is_not_called(library: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
+from docs.article import build as article
 from pyharness import read_scene
 from pyharness.cli import options
 from pyharness.cli.main import VERBS, main
@@ -181,13 +182,14 @@ def test_a_field_that_is_not_documented_is_found(printed: Printed) -> None:
 
 
 def write_anew() -> None:
-    """Replace the output of every block by what the command prints today."""
+    """Replace the output of every block by what the command prints today; build the article."""
     import contextlib
     import io
     import os
 
     os.environ["COLUMNS"] = "100"
     (ROOT / "docs/reference/json.md").write_text(render())
+    article.main()
     for path in DOCS:
 
         def anew(match: re.Match[str]) -> str:

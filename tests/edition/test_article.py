@@ -1,0 +1,223 @@
+"""The article: its text is built from computed values, and no number in it is written by hand."""
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from jinja2 import Environment, UndefinedError, nodes
+
+from docs.article.build import ARTICLE, HERE, METADATA, abstract_of, built, rendered, wrapped
+from docs.article.values import values
+from pyharness.cli.main import VERBS
+from pyharness.history.ablation import entries
+from pyharness.history.claims.ledger import judgement
+
+ROOT = Path(__file__).parents[2]
+TEMPLATE = (HERE / f"{ARTICLE}.in").read_text()
+TEXT = (HERE / ARTICLE).read_text()
+THESIS = ROOT.parent / "shared" / "thesis" / "thesis.txt"
+# Formulas with digits, each of which is derived or quoted.
+FORMULAS = (
+    r"$I_1, I_2, I_3$", r"$A = (I_2 - I_3)/I_1$", r"$B = (I_3 - I_1)/I_2$",
+    r"$C = (I_1 - I_2)/I_3$", r"$\frac{h}{2} F(p)$", r"$2\,y(t/2) - y(0)$", r"$2 \sin 2.5t$",
+    r"$\sin 5t$", r"$\dot\omega = F - \frac{2}{9} t^2 Q(F)$", r"$C = 0$", r"$F_3 = 0$",
+    r"$$\dot\omega_1 = A\,\omega_2\omega_3 + M_1, \quad \dot\omega_2 = B\,\omega_1\omega_3 + M_2, "
+    r"\quad \dot\omega_3 = C\,\omega_1\omega_2 + M_3,$$",
+)  # fmt: skip
+# Digits that are no results: years, places in the thesis and in books, cases, names and units.
+NAMES = (
+    r"\b(?:19|20)\d\d\b", r"\b[sS]ection [IV]+\.\d\b", r"\bequations? \d+(?: to \d+)?",
+    r"\bCases? \d(?:(?:,| and| to) \d)*", r"\b(?:Figure|Table) \d+ of the thesis", r"\bomega1\b",
+    r"\bLEQT1F\b", r"`C1`", r"\bkg m2\b", r" 1/s\b", r"\]\(\.\./figures/[\w.-]+\)",
+)  # fmt: skip
+# Words of number that are counts by definition, orders of methods, parts of a name, or pronouns.
+COUNTS = (
+    "three FORTRAN programs", "two by collocation and one by a Runge-Kutta method",
+    "the seven cases", "One moves", "two others together", "at half the speed", "half speed",
+    "two programs of collocation, with two and with four terms", "seven cases", "fourth order",
+    "second order", "three programs", "three questions", "once more", "thirds of the step",
+    "for two terms and at fifths for four", "one machine reading", "From the second step on",
+    "Four kinds of evidence", "only one reading", "on one digit", "two-term", "third, separate",
+    "three implementations", "five cases", "double precision", "One right-hand side", "One body",
+    "to one", "with three choices", "four points", "for two terms", "for four,", "two terms",
+    "as four", "about twice the time", "last fifth", "a known solution in two cases",
+    "its three products", "one of its two main faults", "one observation", "in place of four",
+    "two implementations", "one noisy scan", "second copy", "three or five terms", "the one that",
+    "four-term", "where one exists", "nearly zero", "tends to zero", "are zero", "therefore zero",
+    "was not one of the methods", "one extrapolates", "the two errors",
+)  # fmt: skip
+WORDS = (
+    r"\b(?:zero|one|two|three|four|five|six|seven|eight|nine|ten|eleven|twelve|twelfth|dozen|"
+    r"hundred|thousand|million|half|thirds?|fourth|fifths?|second|twice|double)\b"
+)
+
+
+@pytest.fixture(scope="module")
+def found() -> dict[str, Any]:
+    """Return the values of the article, computed once."""
+    return values()
+
+
+def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    for name, each in tree.items():
+        if isinstance(each, Mapping):
+            yield from _leaves(each, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", each
+
+
+def _explained(text: str) -> str:
+    """Return a template without fields, code, quotations, formulas and names with digits."""
+    text = re.sub(r"```.*?```|\{\{.*?\}\}|“[^”]*”", "", text, flags=re.DOTALL)
+    for known in (*FORMULAS, *(f"`{each['id']}`" for each in entries())):
+        text = text.replace(known, "")
+    return re.sub("|".join(NAMES), "", text)
+
+
+@pytest.mark.claims
+def test_the_article_is_that_of_today(found: dict[str, Any]) -> None:
+    """Compare the files; `python -m docs.article.build` writes them."""
+    for name, text in built(found).items():
+        assert text == (HERE / name).read_text(), name
+
+
+@pytest.mark.claims
+def test_every_value_is_a_text_that_the_template_uses(found: dict[str, Any]) -> None:
+    told = dict(_leaves(found))
+    assert all(isinstance(each, str) and each for each in told.values())
+    named = {field.strip() for field in re.findall(r"\{\{(.*?)\}\}", TEMPLATE)} - {"references"}
+    assert named <= set(told)
+    # Each fault has the same fields, and so has each limit.
+    unused = {name for name in set(told) - named if not name.startswith(("faults.", "limits."))}
+    assert unused == set()
+
+
+def test_fields_of_the_template_are_names_alone() -> None:
+    tree = Environment().parse(TEMPLATE)
+    fields = [
+        each for output in tree.find_all(nodes.Output) for each in output.nodes
+        if not isinstance(each, nodes.TemplateData)
+    ]  # fmt: skip
+    assert len(fields) > 80
+    for each in fields:
+        while isinstance(each, nodes.Getattr):
+            each = each.node
+        assert isinstance(each, nodes.Name)
+
+
+def test_no_number_of_the_template_is_written_by_hand() -> None:
+    left = _explained(TEMPLATE)
+    assert not re.findall(r".{30}\d.{30}|\d", left)
+    for known in COUNTS:
+        left = left.replace(known, "")
+    assert not re.findall(rf".{{0,30}}{WORDS}.{{0,30}}", left, re.IGNORECASE)
+
+
+def test_every_exception_is_needed() -> None:
+    text = re.sub(r"\{\{.*?\}\}", "", TEMPLATE)
+    assert [each for each in FORMULAS if each not in text] == []
+    assert [each for each in NAMES if not re.search(each, text)] == []
+    assert [each for each in COUNTS if each not in text] == []
+
+
+@pytest.mark.parametrize("line", ["It is 25.", "Of 58 statements", "twelve runs", "1.7e-7 rad/s"])
+def test_a_number_without_a_source_is_found(line: str) -> None:
+    left = _explained(line)
+    assert re.search(rf"\d|{WORDS}", left)
+
+
+def test_another_value_gives_another_text(found: dict[str, Any]) -> None:
+    stop = found["stop"] | {"step": "99"}
+    text = built(found | {"stop": stop})
+    assert "at step 99 of Case 2" in text[ARTICLE]
+    assert "at step 99 of Case 2" in text[METADATA]
+
+
+def test_a_missing_value_is_an_error() -> None:
+    with pytest.raises(UndefinedError, match="no attribute 'step'"):
+        rendered("{{ stop.step }}", {"stop": {}})
+
+
+def test_length_is_that_of_an_article() -> None:
+    """Count the words of the text and the captions, without tables, code and references."""
+    text = re.sub(r"```.*?```|\$\$.*?\$\$", "", TEXT.partition("## References")[0], flags=re.DOTALL)
+    text = re.sub(r"^(?:\||!\[).*$", "", text, flags=re.MULTILINE)
+    assert 2700 <= len(re.sub(r"\$[^$]*\$", "x", text).split()) <= 3300
+
+
+def test_lines_are_short_and_formulas_whole() -> None:
+    for line in TEXT.splitlines():
+        assert len(line) <= 120 or line.startswith(("|", "![", "$$")), line
+        assert line.replace("$$", "").count("$") % 2 == 0, line
+        assert line.startswith("```") or line.count("`") % 2 == 0, line
+    text = "- a `b  c` " + "word " * 40 + "\n- d\n\n| " + "x" * 200 + " |\n"
+    assert wrapped(text).startswith("- a `b c` word")
+    assert "\n  word" in wrapped(text)
+    assert "\n- d\n\n| xxx" in wrapped(text)
+
+
+def test_the_conclusion_is_false_of_the_methods_under_every_alternative() -> None:
+    judged = judgement("vi-superior")
+    assert {each.corrected for each in judged.survivals} == {"false"} == {judged.corrected.verdict}
+    assert [each.original for each in judged.survivals if not each.survives] == [
+        "reproduced in part"
+    ]
+
+
+def test_quotations_are_words_of_the_thesis() -> None:
+    quotes = re.findall(r"“([^”]*)”", TEMPLATE)
+    assert len(quotes) > 8
+    if not THESIS.exists():
+        pytest.skip("the thesis is not part of the project")
+    thesis = " ".join(re.sub(r"\$[^$]*\$|[*_]", "", THESIS.read_text()).split())
+    for each in quotes:
+        assert each in thesis, each
+
+
+def test_metadata_have_the_form_of_the_journal_and_the_facts_of_the_project() -> None:
+    record = yaml.safe_load((HERE / METADATA).read_text())
+    assert list(record) == [
+        "title", "authors", "affiliations", "keywords", "code", "data", "replication", "abstract",
+        "bibliography", "type", "domain", "language", "review", "contributors", "dates", "article",
+        "journal",
+    ]  # fmt: skip
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert [each["name"] for each in record["authors"]] == [
+        each["name"] for each in citation["authors"]
+    ]
+    assert citation["references"][0]["title"] in record["title"] == f"[Re] {_original(citation)}"
+    assert TEXT.startswith(f"# {record['title']}\n\n{record['authors'][0]['name']}\n")
+    assert record["abstract"] == abstract_of(TEXT)
+    assert record["keywords"].startswith(", ".join(citation["keywords"]))
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["keywords"] == citation["keywords"]
+    assert f"**Keywords:** {', '.join(project['keywords'])}" in " ".join(TEXT.split())
+    assert (HERE / record["bibliography"]).is_file()
+    marks = (HERE / METADATA).read_text().count("# TO DECIDE:")
+    assert marks == 5
+
+
+def _original(citation: Mapping[str, Any]) -> str:
+    title: str = citation["references"][0]["title"]
+    return title
+
+
+def test_every_reference_is_cited_and_no_identifier_is_invented() -> None:
+    text, _, listed = TEXT.partition("## References")
+    bibliography = (HERE / "bibliography.bib").read_text()
+    names = re.findall(r"author = \{+([^,}]*)", bibliography)
+    assert len(names) == listed.count("\n- ")
+    for name in names:
+        assert name in " ".join(text.split()), name
+    assert "doi" not in bibliography
+
+
+def test_its_commands_are_verbs() -> None:
+    (block,) = re.findall(r"```sh\n(.*?)```", TEXT, re.DOTALL)
+    verbs = re.findall(r"^pyharness (\w+)", block, re.MULTILINE)
+    assert len(verbs) == 9
+    assert set(verbs) <= set(VERBS)

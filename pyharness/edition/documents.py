@@ -12,7 +12,12 @@ from pyharness.model.facts import shipped
 # Suffixes of the pictures in the documents.
 _PICTURES = (".png", ".svg")
 # Documents to which an entry in the menu of the site links.
-_OF_THE_MENU = ("index.md", "explanation/findings.md", "explanation/methods.md")
+_OF_THE_MENU = (
+    "index.md",
+    "article/article.md",
+    "explanation/findings.md",
+    "explanation/methods.md",
+)
 
 
 def documents_folder(given: str | None = None) -> Path:

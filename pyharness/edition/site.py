@@ -66,6 +66,7 @@ MENU = {
     "About": (
         ("About", "about.html"),
         ("Documents", "docs/index.html"),
+        ("Article", "docs/article/article.html"),
         ("Findings", "docs/explanation/findings.html"),
         ("Methods", "docs/explanation/methods.html"),
         ("API", "api.html"),

@@ -82,6 +82,7 @@ def values() -> dict[str, Any]:
         "family": {"ratio": _number("vi-successful-technique", "corrected", "*")},
         "test": _stop_test(),
         "fast": {
+            "blow_up": prose(limit("two-term", case_scene(6), 1).blow_up or 0.0),
             "overflow": str(_one(6, "two-term original").trajectory.steps + 1),
             "least": _number("v2-case-6-too-fast", "corrected", "*", "min", 4),
             "most": _number("v2-case-6-too-fast", "corrected", "*", "max", 4),
@@ -139,9 +140,7 @@ def _switched() -> list[dict[str, Any]]:
 def _faults() -> dict[str, Any]:
     named = {
         each["id"].replace("-", "_"): {
-            "cards": "; ".join(
-                f"{TITLES[program]} {cards}" for program, cards in each["cards"].items()
-            ),
+            "cards": "; ".join(f"{program} {cards}" for program, cards in each["cards"].items()),
             "numbers": "; ".join(each["cards"].values()),
             "original": each["original"],
             "corrected": each["corrected"],
@@ -231,7 +230,7 @@ def _superior(told: Mapping[str, Any]) -> dict[str, str]:
         "most": prose(told["ratios"][1]),
         "two_term_7": prose(told["case_7"]["two-term"]),
         "four_term_7": prose(told["case_7"]["four-term"]),
-        "start": start[start.index("(0") : start.rindex(")") + 1],
+        "start": start.partition(" = ")[2].partition(" where")[0],
         "changed": changed[0].original,
         "verdict": judgement("vi-superior").corrected.verdict,
     }

@@ -271,6 +271,10 @@ def test_a_page_says_under_which_entry_of_the_menu_it_is(built_site: dict[str, b
             [("listing/index.html", "true"), ("listing/two-term.html", "page")],
         ),
         ("docs/explanation/words.html", [("about.html", "true"), ("docs/index.html", "true")]),
+        (
+            "docs/article/article.html",
+            [("about.html", "true"), ("docs/article/article.html", "page")],
+        ),
         ("claims.html", [("thesis.html", "true"), ("claims.html", "page")]),
     ):
         links = r'href="(?:\.\./)*([^"]*)" aria-current="(\w+)"'

@@ -26,6 +26,7 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Report, Table, words
 from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.model.scene_report import heading
 from pyharness.model.trajectory import Stop
 from pyharness.original.cells import all_cells
 from pyharness.original.word import WORDS
@@ -284,9 +285,13 @@ def _cases_table() -> str:
     rows = []
     for each in facts("cases")["case"]:
         start = _tuple(each["omega"])
-        given = "assumed" if each["number"] in assumed else "from the thesis"
-        rows.append([each["number"], each["title"], _tuple(each["moments"]), start, given])
-    heads = ("case", "body and torque", "moments of inertia", "initial omega (rad/s)", "source")
+        torque = heading(case_scene(each["number"]))[1].split("; ")[1].removeprefix("N = ")
+        given = "assumed" if each["number"] in assumed else "thesis"
+        rows.append([each["number"], each["title"], _tuple(each["moments"]), torque, start, given])
+    heads = (
+        "case", "body and torque", "moments of inertia (kg m2)", "torque", "initial omega (rad/s)",
+        "source",
+    )  # fmt: skip
     return _table(heads, rows)
 
 

@@ -33,7 +33,7 @@ FORMULAS = (
 NAMES = (
     r"\b(?:19|20)\d\d\b", r"\b[sS]ection [IV]+\.\d\b", r"\bequations? \d+(?: to \d+)?",
     r"\bCases? \d(?:(?:,| and| to) \d)*", r"\b(?:Figure|Table) \d+ of the thesis", r"\bomega1\b",
-    r"\bLEQT1F\b", r"`C1`", r"\bkg m2\b", r"\s1/s\b", r"\]\(\.\./figures/[\w.-]+\)",
+    r"\bLEQT1F\b", r"`C1`", r"\s1/s\b", r"\]\(\.\./figures/[\w.-]+\)",
 )  # fmt: skip
 # Words of number that are counts by definition, orders of methods, parts of a name, or pronouns.
 COUNTS = (

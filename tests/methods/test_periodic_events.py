@@ -140,5 +140,9 @@ def test_the_period_that_is_repeated_begins_between_events() -> None:
         found, kept = repeated(some[(some >= 0.0) & (some <= 3.0)], 1.0, 37.5, "")
         np.testing.assert_allclose(found, some[(some >= 0.0) & (some <= 37.5)], rtol=0, atol=1e-12)
         assert 0 < kept < len(found)
+    # An event at the end of the polynomials may be lost there.
+    some = np.sort(np.concatenate([np.arange(0.0, 37.5), np.arange(0.9, 37.5)]))
+    found, kept = repeated(some[some < 3.0], 1.0, 37.5, "")
+    np.testing.assert_allclose(found, some, rtol=0, atol=1e-12)
     found, kept = repeated(np.array([0.0]), 1.0, 37.5, "")
     assert (found.tolist(), kept) == ([0.0], 1)

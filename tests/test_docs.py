@@ -15,6 +15,7 @@ from pyharness import read_scene
 from pyharness.cli import options
 from pyharness.cli.main import VERBS, main
 from pyharness.history import figures
+from pyharness.history.timeline import timeline_page
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.report import Report
 from pyharness.views import render as views
@@ -190,6 +191,7 @@ def write_anew() -> None:
     os.environ["COLUMNS"] = "100"
     (ROOT / "docs/reference/json.md").write_text(render())
     article.main()
+    (ROOT / "docs/explanation/timeline.md").write_text(timeline_page())
     for path in DOCS:
 
         def anew(match: re.Match[str]) -> str:

@@ -31,6 +31,7 @@ from pyharness.history.claims.report import written
 from pyharness.history.claims.stories import prose
 from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import text_digest
+from pyharness.history.timeline import timeline
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.progress import Progress, no_progress
@@ -135,6 +136,7 @@ def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -
         "counts": ledger.counts(judged), "kinds": ledger.kinds(judged),
         "account": ledger.account(), "story": story.context(),
         "work": facts("account")["work"], "mechanism": facts("account")["mechanism"],
+        "timeline": timeline(),
     }  # fmt: skip
     yield Page("index.html", "Story", "index.html", context)
     yield Page("about.html", "About this edition", "about.html", context)

@@ -16,6 +16,7 @@ from pyharness.history.claims.ledger import claims
 from pyharness.history.claims.report import kinds_table
 from pyharness.history.claims.sentences import sentences
 from pyharness.history.text_digest import text_digest
+from pyharness.history.timeline import timeline
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Picture
@@ -279,6 +280,14 @@ def test_a_page_says_under_which_entry_of_the_menu_it_is(built_site: dict[str, b
     ):
         links = r'href="(?:\.\./)*([^"]*)" aria-current="(\w+)"'
         assert re.findall(links, built_site[name].decode()) == current
+
+
+def test_dates_that_the_report_names_are_on_the_page_about(built_site: dict[str, bytes]) -> None:
+    page = built_site["about.html"].decode()
+    shown = re.findall(r"<dt>([^<]*\d)</dt>", page)
+    assert shown == [each.date for each in timeline() if each.certainty == "certain"]
+    for each in timeline():
+        assert each.date in built_site["docs/explanation/timeline.html"].decode()
 
 
 def test_verdicts_are_counted_for_both() -> None:

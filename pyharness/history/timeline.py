@@ -1,0 +1,122 @@
+"""The dates of the thesis, each with its source, and the page of the documents that shows them.
+
+The data are in `data/timeline.toml`. No entry has a date that its source does not support.
+"""
+
+from typing import NamedTuple
+
+from pyharness.model.facts import facts
+
+CERTAINTIES = {
+    "certain": "the source names the date",
+    "probable": "the source reports the event, and its date follows from another entry",
+    "unknown": "no source dates the event",
+}
+"""The degrees of certainty of a date, each with its meaning."""
+_INTRODUCTION = """\
+This page lists the events in the history of the thesis with their dates and sources. A date is here
+only if the text of the thesis supports it. The last column says how certain the date of an event
+is; the event itself is reported by its source:"""
+_MONTHS = (
+    *("January", "February", "March", "April", "May", "June"),
+    *("July", "August", "September", "October", "November", "December"),
+)
+
+
+class Event(NamedTuple):
+    """An event in the history of the thesis, with its date and source.
+
+    Attributes
+    ----------
+    id : str
+        The identifier of the event.
+    what : str
+        The event, as a sentence in Markdown.
+    where : str
+        The place in the thesis that reports the event.
+    certainty : str
+        The certainty of the date, a key of `CERTAINTIES`.
+    first, last : str
+        The first and the last month in which the event may have happened, as in ``1979-01``. Both
+        are empty if no source dates the event.
+    quote : str
+        A few words of the place, or nothing.
+    why : str
+        For a date that is not certain, how it was found.
+    """
+
+    id: str
+    what: str
+    where: str
+    certainty: str
+    first: str = ""
+    last: str = ""
+    quote: str = ""
+    why: str = ""
+
+    @property
+    def date(self) -> str:
+        """Return the date in words, as in ``January 1979 to April 1981``."""
+        if not self.first:
+            return "not dated"
+        if self.first == self.last:
+            return _in_words(self.first)
+        between = "between " if self.certainty == "probable" else ""
+        joined = " and " if between else " to "
+        return f"{between}{_in_words(self.first)}{joined}{_in_words(self.last)}"
+
+
+class Gap(NamedTuple):
+    """A question about the history of the thesis that its text does not answer.
+
+    `answer` says what the text lacks.
+    """
+
+    question: str
+    answer: str
+
+
+def timeline() -> tuple[Event, ...]:
+    """Return the events in the history of the thesis, in the order of the data."""
+    return tuple(
+        Event(
+            first=row.get("from", ""),
+            last=row.get("to", row.get("from", "")),
+            **{name: text for name, text in row.items() if name not in ("from", "to")},
+        )
+        for row in facts("timeline")["entry"]
+    )
+
+
+def gaps() -> tuple[Gap, ...]:
+    """Return the questions that the text of the thesis does not answer."""
+    return tuple(Gap(**row) for row in facts("timeline")["gap"])
+
+
+def timeline_page() -> str:
+    """Return the text, in Markdown, of the document `docs/explanation/timeline.md`."""
+    lines = [
+        "# Timeline",
+        "",
+        _INTRODUCTION,
+        "",
+        *(f"- *{name}*: {meaning};" for name, meaning in CERTAINTIES.items()),
+    ]
+    lines[-1] = lines[-1].removesuffix(";") + "."
+    lines += [
+        "",
+        "| date | event | source in the thesis | certainty of the date |",
+        "|---|---|---|---|",
+    ]
+    for each in timeline():
+        sure = f"{each.certainty}: {each.why}" if each.why else each.certainty
+        lines.append(f"| {each.date} | {each.what} | {each.where} | {sure} |")
+    lines += ["", "## What the sources do not say", ""]
+    lines += ["| question | what we know |", "|---|---|"]
+    lines += [f"| {each.question} | {each.answer} |" for each in gaps()]
+    return "\n".join(lines) + "\n"
+
+
+def _in_words(month: str) -> str:
+    year, number = month.split("-")
+    return f"{_MONTHS[int(number) - 1]} {year}"

@@ -1,0 +1,85 @@
+"""The timeline: every date is in its source, and the page and the site show the same events."""
+
+import re
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+
+from pyharness.history.timeline import CERTAINTIES, Event, gaps, timeline, timeline_page
+from pyharness.model.facts import facts
+
+ROOT = Path(__file__).parents[2]
+THESIS = ROOT.parent / "shared" / "thesis" / "thesis.txt"
+EVENTS = {each.id: each for each in timeline()}
+
+
+def test_page_is_current() -> None:
+    """`python -m tests.test_docs` writes it anew."""
+    assert (ROOT / "docs/explanation/timeline.md").read_text() == timeline_page()
+
+
+@pytest.mark.parametrize("event", EVENTS.values(), ids=EVENTS)
+def test_every_event_has_a_source_and_a_date_that_agrees_with_its_certainty(event: Event) -> None:
+    assert event.what.endswith(".")
+    assert event.where
+    assert event.certainty in CERTAINTIES
+    assert bool(event.first) == (event.certainty != "unknown")
+    assert bool(event.why) == (event.certainty != "certain")
+    if event.first:
+        months = [datetime.strptime(each, "%Y-%m") for each in (event.first, event.last)]
+        assert months == sorted(months)
+
+
+@pytest.mark.parametrize("event", EVENTS.values(), ids=EVENTS)
+def test_a_certain_date_is_in_the_words_of_its_source(event: Event) -> None:
+    if event.certainty == "certain":
+        months = re.findall(r"[A-Z][a-z]+(?= 19)|March(?= -)", event.date)
+        assert months
+        for month in months:
+            assert month in event.quote
+        assert event.first[:4] in event.quote
+
+
+@pytest.mark.skipif(not THESIS.exists(), reason="the text of the thesis is not beside the project")
+def test_every_quotation_is_in_the_thesis() -> None:
+    text = " ".join(THESIS.read_text().split())
+    for event in EVENTS.values():
+        assert event.quote in text, event.id
+    assert [each.id for each in EVENTS.values() if not each.quote] == ["scan"]
+
+
+@pytest.mark.skipif(not THESIS.exists(), reason="the text of the thesis is not beside the project")
+def test_no_later_date_and_none_of_the_missing_parts_are_in_the_thesis() -> None:
+    """The Bibliography has no later date than the entry says, and the gaps are gaps."""
+    text = THESIS.read_text()
+    named = {int(year) for year in re.findall(r"\b(19[78]\d)\b(?!-)", text)}
+    assert max(named - {1981, 1982}) == 1980
+    assert re.findall(r"\b19(?:81|82)\b(?!-)", text) == ["1982", "1981", "1981", "1981"]
+    for missing in ("1473", "DTIC", "AFWAL-TR", "Vita", "VITA", "Approved by"):
+        assert missing not in text
+    assert len(gaps()) == 7
+
+
+def test_dates_are_those_of_the_account() -> None:
+    """Home page, README and documents take their dates from `account.toml`."""
+    work = facts("account")["work"]
+    found = {name: EVENTS[event].date for name, event in (
+        ("began", "work-begins"), ("ended", "work-ends"),
+        ("submitted", "submitted"), ("published", "published"),
+    )}  # fmt: skip
+    assert found == {name: work[name] for name in found}
+
+
+def test_dates_in_words() -> None:
+    assert Event("a", "", "", "certain", "1980-03", "1980-04").date == "March 1980 to April 1980"
+    assert EVENTS["rechecked"].date == "between January 1979 and April 1981"
+    assert EVENTS["scan"].date == "not dated"
+
+
+def test_undated_work_is_within_the_period_of_the_foreword() -> None:
+    first, last = EVENTS["work-begins"].first, EVENTS["work-ends"].last
+    for event in EVENTS.values():
+        if event.why.startswith("part of the work"):
+            assert (event.first, event.last) == (first, last)
+    assert EVENTS["manuscript"].last == EVENTS["submitted"].first

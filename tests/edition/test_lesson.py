@@ -1,0 +1,121 @@
+"""The lesson: its cards and commands are those of the project, and no fault is named too early."""
+
+import html
+import re
+from pathlib import Path
+
+import pytest
+
+from pyharness.edition.documents import page_of
+from pyharness.edition.laboratory import data
+from pyharness.history.ablation import entries
+from pyharness.model.listing import PROGRAMS, Listing
+from pyharness.original.decks import deck_text
+from tests.conftest import Printed
+from tests.ports import WEB, run_javascript
+
+DOCS = Path(__file__).parents[2] / "docs"
+LESSON = (DOCS / "tutorials/lesson.md").read_text()
+NOTES = (DOCS / "tutorials/lesson-notes.md").read_text()
+EXERCISES, HINTS, CHECKS = re.split(r"^## (?:Hints|Checks)$", LESSON, flags=re.MULTILINE)
+GLOSSARY = re.findall(r"^\| (.*?) \|", (DOCS / "glossary.md").read_text(), re.MULTILINE)[2:]
+TERMS = {term for row in GLOSSARY for term in row.split(", ")}
+
+
+def _titles(text: str) -> list[str]:
+    return re.findall(r"^## (Exercise \d: .*)$", text, re.MULTILINE)
+
+
+def _commands(text: str) -> list[str]:
+    blocks = "\n".join(re.findall(r"```sh\n(.*?)```", text, re.DOTALL))
+    prose = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    found = re.findall(r"^pyharness (.*)$", blocks, re.MULTILINE)
+    return found + [" ".join(each.split()) for each in re.findall(r"`pyharness ([^`]*)`", prose)]
+
+
+def test_notes_have_the_exercises_of_the_lesson() -> None:
+    assert len(_titles(LESSON)) == 6
+    assert _titles(NOTES) == _titles(LESSON)
+    for number in range(1, 7):
+        assert f"*Exercise {number}.*" in HINTS
+        assert f"\n| {number} | `pyharness" in CHECKS
+    parts = re.split(r"^## ", EXERCISES, flags=re.MULTILINE)[-6:]
+    for each in parts:
+        for head in ("**Cards**", "**Question.**", "**Run**", "**You have understood**"):
+            assert head in each
+    for each in re.split(r"^## ", NOTES, flags=re.MULTILINE)[1:7]:
+        for head in ("**Solution.**", "**Where students go wrong.**", "**Today.**"):
+            assert head in each
+
+
+def test_cards_are_those_of_the_decks() -> None:
+    quoted = 0
+    for part in re.split(r"(?=\*\*Cards\*\*)", EXERCISES)[1:]:
+        (program,) = re.findall(r"^\*\*Cards\*\* of the `(\S+)` deck", part)
+        assert program in PROGRAMS
+        lines = deck_text(Listing.original(program)).splitlines()
+        for block in re.findall(r"```fortran\n(.*?)```", part, re.DOTALL):
+            for line in block.splitlines():
+                assert line in lines, (program, line)
+                quoted += 1
+    assert quoted > 40
+
+
+def test_no_fault_is_named_before_the_hints() -> None:
+    """Neither are the commands of the exercises among those that name the faults."""
+    for each in entries():
+        assert each["id"] not in EXERCISES + HINTS, each["id"]
+    told = ("cards", "defects", "claims", "limits", "--ablate")
+    runs = _commands(EXERCISES)
+    assert len(runs) > 10
+    for command in runs:
+        if command not in ("cards", "defects", "run"):  # the introduction advises against these
+            assert not any(word in command.split() for word in told), command
+            if command.startswith("run"):
+                assert "--format" in command, command
+
+
+@pytest.mark.parametrize("command", [*_commands(LESSON), *_commands(NOTES)])
+def test_commands_run(
+    command: str, printed: Printed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if command in ("cards", "defects", "run"):  # a verb, without its options
+        return
+    monkeypatch.chdir(tmp_path)
+    words = command.replace("--case N", "--case 3")
+    if not words.startswith("edition"):
+        assert printed(words) or any(tmp_path.iterdir())
+
+
+def test_addresses_of_the_laboratory_are_understood() -> None:
+    words = re.findall(r"`laboratory\.html#([^`]*)`", CHECKS)
+    assert len(words) == 6
+    found = run_javascript(
+        {"S": WEB / "laboratory/state.js"},
+        "return given.map((each) => S.stateFrom(data, each));",
+        data=data(), given=words,
+    )  # fmt: skip
+    assert [each["problems"] for each in found] == [[]] * 6
+    kept = [each["state"]["active"] for each in found]
+    assert kept[3] == ["stage-base"]
+    assert kept[5] == ["lipschitz-per-component"]
+
+
+def test_terms_that_documents_link_are_in_the_glossary() -> None:
+    """A link to the glossary whose text is not the word "glossary" marks a term."""
+    linked = 0
+    for path in DOCS.rglob("*.md"):
+        for text in re.findall(r"\[([^]]*)\]\([^)]*glossary\.md\)", path.read_text()):
+            term = re.sub(r"(?<=[a-z])s$", "", " ".join(text.split()))
+            assert {term, " ".join(text.split())} & (TERMS | {"glossary"}), (path.name, text)
+            linked += term != "glossary"
+    assert linked > 10
+    assert [each.lower() for each in GLOSSARY] == sorted(each.lower() for each in GLOSSARY)
+
+
+def test_lesson_is_linked_from_the_site(built_site: dict[str, bytes]) -> None:
+    for name in ("tutorials/lesson.md", "tutorials/lesson-notes.md", "explanation/timeline.md"):
+        page = page_of(name)
+        assert page in built_site
+        assert f'href="{page}"' in html.unescape(built_site["about.html"].decode())
+        assert f'"{page.removeprefix("docs/")}"' in built_site["docs/index.html"].decode()

@@ -61,9 +61,10 @@ class Event(NamedTuple):
             return "not dated"
         if self.first == self.last:
             return _in_words(self.first)
-        between = "between " if self.certainty == "probable" else ""
-        joined = " and " if between else " to "
-        return f"{between}{_in_words(self.first)}{joined}{_in_words(self.last)}"
+        if self.certainty == "probable":
+            return f"between {_in_words(self.first)} and {_in_words(self.last)}"
+        first, year = _in_words(self.first).split()
+        return f"{first if year in self.last else _in_words(self.first)} to {_in_words(self.last)}"
 
 
 class Gap(NamedTuple):

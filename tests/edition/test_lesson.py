@@ -2,6 +2,7 @@
 
 import html
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,8 @@ from pyharness.edition.documents import page_of
 from pyharness.edition.laboratory import data
 from pyharness.history.ablation import entries
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.original.decks import deck_text
+from pyharness.model.scene_file import case_scene
+from pyharness.original.decks import compiler, deck_text, run_deck
 from tests.conftest import Printed
 from tests.ports import WEB, run_javascript
 
@@ -85,6 +87,59 @@ def test_commands_run(
     words = command.replace("--case N", "--case 3")
     if not words.startswith("edition"):
         assert printed(words) or any(tmp_path.iterdir())
+
+
+def _last_line(case: int, changes: Sequence[tuple[str, str, str]], end: str = "") -> list[str]:
+    """Change the cards of the Runge-Kutta deck as a student does, and return U1 and the step.
+
+    A change is a card, and an old and a new text. `end` is inserted after card 1530.
+    """
+    lines = deck_text(Listing.original("runge-kutta"), case_scene(case), "gfortran").splitlines()
+    for card, old, new in changes:
+        (index,) = [n for n, line in enumerate(lines) if line.split()[-1] == card]
+        assert old in lines[index]
+        text = lines[index][:72].replace(old, new).rstrip()
+        lines[index] = f"{text:72}{lines[index][72:]}"
+    (index,) = [n for n, line in enumerate(lines) if line.split()[-1] == "1530"]
+    lines[index + 1 : index + 1] = end.splitlines()
+    return run_deck("\n".join(lines) + "\n").page.splitlines()[-1].split()
+
+
+BASE = [
+    (str(card + 10 * k), f"=U{k + 1}(J)", f"=UU{k + 1}") for card in (860, 1040) for k in range(3)
+]
+BASE_OF_V = [
+    (str(card + 10 * k), f"=V{k + 1}(J)", f"=VV{k + 1}") for card in (890, 1070) for k in range(3)
+]
+RESET = "\n".join(f"      {name}{k}(1)={name}{k}(4)" for name in "UV" for k in (1, 2, 3))
+
+
+@pytest.mark.skipif(compiler() is None, reason="no gfortran")
+@pytest.mark.parametrize(
+    ("case", "changes", "end", "first", "step"),
+    [
+        (1, [], "", "3.5000", "100"),
+        (1, [("800", "R1+A", "R1-A")], "", "3.5000", "100"),
+        (1, [("800", "U3(J)", "U1(J)")], "", "3.5000", "100"),
+        (1, [("1180", "DT/6.", "DT/5.")], "", "4.0000", "100"),
+        (
+            1,
+            [("1180", "KF(1)+2.*(KF(2)+KF(3))+KF(4)", "2.*(KF(1)+KF(4))+KF(2)+KF(3)")],
+            *("", "3.5000", "100"),
+        ),
+        (2, [], "", "1.1631", "25"),
+        (2, BASE, "", "0.9538", "25"),
+        (2, BASE, RESET, "0.6052", "13"),
+        (2, [*BASE, *BASE_OF_V], RESET, "0.9996", "32"),
+    ],
+)
+def test_changed_decks_print_what_lesson_and_notes_say(
+    case: int, changes: Sequence[tuple[str, str, str]], end: str, first: str, step: str
+) -> None:
+    found = _last_line(case, changes, end)
+    assert (found[0], found[3]) == (first, step)
+    told = {"0.9538": "be much closer", "0.9996": "stops at step 32"}.get(first, first)
+    assert told in LESSON + NOTES
 
 
 def test_addresses_of_the_laboratory_are_understood() -> None:

@@ -14,6 +14,7 @@ from docs.article import build as article
 from pyharness import read_scene
 from pyharness.cli import options
 from pyharness.cli.main import VERBS, main
+from pyharness.edition.origins import PAGE, origins_page
 from pyharness.history import figures
 from pyharness.history.timeline import timeline_page
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
@@ -155,7 +156,7 @@ def test_reference_lists_every_method_with_its_tolerances() -> None:
         "compare --scene docs/damped.toml --method auto,dop853",
         "compare --case 3 --program two-term --ablate", "plan --case 3",
         "claims --explain abstract-superior", "defects",
-        "defects stage-base", "defects 1660", "cards runge-kutta:860",
+        "defects stage-base", "defects 1660", "cards runge-kutta:860", "cards --origins",
         "deck --program two-term --dialect ftn", "limits --case 6",
         "family --case 5 --terms 1 --weighting galerkin", "rotations --case 6", "doctor",
         "verify --only orders",
@@ -176,6 +177,13 @@ def test_fields_of_json_are_a_page_of_the_schema() -> None:
     assert (ROOT / "docs/reference/json.md").read_text() == render()
 
 
+def test_origins_are_a_page_of_the_table() -> None:
+    """Lines are at most 120 characters long, except in tables."""
+    text = (ROOT / "docs" / PAGE).read_text()
+    assert text == origins_page()
+    assert all(len(line) <= 120 for line in text.splitlines() if not line.startswith("|"))
+
+
 def test_a_field_that_is_not_documented_is_found(printed: Printed) -> None:
     record = json.loads(printed("doctor --format json"))
     for changed in (record | {"more": 1}, record | {"missing": None}, {"schema": 1}):
@@ -192,6 +200,7 @@ def write_anew() -> None:
     (ROOT / "docs/reference/json.md").write_text(render())
     article.main()
     (ROOT / "docs/explanation/timeline.md").write_text(timeline_page())
+    (ROOT / "docs" / PAGE).write_text(origins_page())
     for path in DOCS:
 
         def anew(match: re.Match[str]) -> str:

@@ -11,12 +11,13 @@ from pyharness.model.facts import shipped
 
 # Suffixes of the pictures in the documents.
 _PICTURES = (".png", ".svg")
-# Documents to which an entry in the menu of the site links.
-_OF_THE_MENU = (
+# Documents to which other pages of the site link.
+_LINKED = (
     "index.md",
     "article/article.md",
     "explanation/findings.md",
     "explanation/methods.md",
+    "explanation/origins.md",
 )
 
 
@@ -26,7 +27,7 @@ def documents_folder(given: str | None = None) -> Path:
     Raise InputError if the folder lacks the documents. An installed package does not include them.
     """
     folder = shipped("docs") if given is None else Path(given)
-    missing = [name for name in _OF_THE_MENU if not (folder / name).is_file()]
+    missing = [name for name in _LINKED if not (folder / name).is_file()]
     if not missing:
         return folder
     if given is None:

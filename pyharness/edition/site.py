@@ -21,6 +21,7 @@ from pyharness.edition import (
     formulas,
     laboratory,
     ledger,
+    origins,
     parallel_decks,
     story,
 )
@@ -175,7 +176,8 @@ def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -
     progress(3, 5, "apparatus")
     entries = ledger.apparatus()
     yield Page(
-        "apparatus.html", "Apparatus", "apparatus.html", {"entries": entries},
+        "apparatus.html", "Apparatus", "apparatus.html",
+        {"entries": entries, "origins_of": origins.origins_of},
         [
             Found(f"apparatus.html#{each['id']}", each["id"], each["kind"],
                   ". ".join(each[name] for name in ("summary", "evidence", "why") if name in each))
@@ -210,7 +212,8 @@ def _listing() -> Iterator[Page]:
             path, f"{decks.TITLES[program]}: the program as printed", "deck.html", context, found
         )
     yield Page("listing/collation.html", "The three decks compared", "collation.html",
-               {"programs": decks.TITLES, "operations": parallel_decks.operations()})  # fmt: skip
+               {"programs": decks.TITLES, "operations": parallel_decks.operations(),
+                "origins_of": origins.origins_of_step})  # fmt: skip
     counts = {
         program: (title, len(deck(program).cards), len(decks.sheets(program)))
         for program, title in decks.TITLES.items()

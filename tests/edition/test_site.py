@@ -8,13 +8,14 @@ from itertools import pairwise
 
 import pytest
 
-from pyharness.edition import api, decks, documents, figures, site
+from pyharness.edition import api, decks, documents, figures, parallel_decks, site
 from pyharness.edition.ledger import judgements
-from pyharness.edition.markdown import document
+from pyharness.edition.markdown import document, slug
 from pyharness.history.ablation import entries
 from pyharness.history.claims.ledger import claims
 from pyharness.history.claims.report import kinds_table
 from pyharness.history.claims.sentences import sentences
+from pyharness.history.origins import disagreements
 from pyharness.history.text_digest import text_digest
 from pyharness.history.timeline import timeline
 from pyharness.model.facts import facts, shipped
@@ -288,6 +289,20 @@ def test_dates_that_the_report_names_are_on_the_page_about(built_site: dict[str,
     assert shown == [each.date for each in timeline() if each.certainty == "certain"]
     for each in timeline():
         assert each.date in built_site["docs/explanation/timeline.html"].decode()
+
+
+def test_disagreements_are_linked_from_operations_and_entries(
+    built_site: dict[str, bytes],
+) -> None:
+    links = {
+        page: re.findall(r'href="(?:\.\./)*([^"]*)"', built_site[page].decode())
+        for page in ("apparatus.html", "listing/collation.html")
+    }
+    shown = {each.row.what for each in parallel_decks.operations()}
+    for each in disagreements():
+        anchor = f"docs/explanation/origins.html#{slug(each.title)}"
+        assert links["apparatus.html"].count(anchor) == len(each.entries), each.id
+        assert links["listing/collation.html"].count(anchor) == len(shown & {*each.steps}), each.id
 
 
 def test_verdicts_are_counted_for_both() -> None:

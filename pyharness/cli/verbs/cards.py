@@ -10,6 +10,9 @@ from hashlib import sha256
 from pyharness.cli import options as shared
 from pyharness.history.cards_report import cards_report, classes_report, scan_report
 from pyharness.history.collation_report import collation_report
+from pyharness.history.origins import disagreements, mistakes
+from pyharness.history.origins_report import origins_report
+from pyharness.history.second_reading import second_reading_report
 from pyharness.model.errors import InputError
 from pyharness.model.pipes import read_input
 from pyharness.original.cards import chosen
@@ -25,6 +28,10 @@ OPTIONS = {
     "the cards that they name, and the differences from the scan that they explain.",
     "--collate": "Compare the card decks of the three programs, operation by operation, with each "
     "other and with sections II to V of the thesis.",
+    "--origins": "Show where the decks and the thesis disagree, and what each disagreement "
+    "suggests about the origin of a fault.",
+    "--second-reading": "Compare our text of a random sample of cards with a second reading of the "
+    "scan, and estimate how many misreadings remain.",
     "--scan FILE": "Compare our text of the cards, character by character, with the text of a scan "
     "of the thesis in this file.",
     **shared.outputs(FORMATS, plot=""),
@@ -38,30 +45,46 @@ def run(options: argparse.Namespace) -> int:
     With --scan, our text of the cards is compared with a scan of the thesis. With --collate, the
     decks of cards of the three programs are compared with each other. Return exit status 1 if one
     of these comparisons finds a difference that the apparatus, our list of recorded deviations,
-    does not explain. Otherwise return 0.
+    does not explain. With --origins, return 1 if the list of disagreements has a mistake. Otherwise
+    return 0.
     """
     if options.format == "tei":
         from pyharness.history.tei import tei_document
 
         # A TEI document has a header and an apparatus, which only the whole edition has.
-        shared.refuse(options, "--format tei", ("classes", "collate", "scan"))
+        shared.refuse(
+            options, "--format tei", ("classes", "collate", "origins", "second_reading", "scan")
+        )
         _no_card(options, "--format tei")
         shared.check_outputs(options)
         shared.emit(tei_document(), options.out)
         return 0
     if options.classes:
-        shared.refuse(options, "--classes", ("collate", "scan"))
+        shared.refuse(options, "--classes", ("collate", "origins", "second_reading", "scan"))
         _no_card(options, "--classes")
         shared.check_outputs(options)
         shared.show(classes_report(), options)
         return 0
     if options.collate:
-        shared.refuse(options, "--collate", ("scan",))
+        shared.refuse(options, "--collate", ("origins", "second_reading", "scan"))
         _no_card(options, "--collate")
         shared.check_outputs(options)
         found = rows()
         shared.show(collation_report(found), options)
         return 1 if faults(found) else 0
+    if options.origins:
+        shared.refuse(options, "--origins", ("second_reading", "scan"))
+        _no_card(options, "--origins")
+        shared.check_outputs(options)
+        told = mistakes()
+        shared.show(origins_report(disagreements(), told), options)
+        return 1 if told else 0
+    if options.second_reading:
+        shared.refuse(options, "--second-reading", ("scan",))
+        _no_card(options, "--second-reading")
+        shared.check_outputs(options)
+        shared.show(second_reading_report(), options)
+        return 0
     if options.scan is None:
         cards = chosen(shared.names(options.cards))
         shared.check_outputs(options)

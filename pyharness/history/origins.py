@@ -1,0 +1,180 @@
+"""Disagreements of the decks and the thesis, and what they suggest about the origin of faults.
+
+A deck consists of the cards (lines) of a program. The table `data/disagreements.toml` names each
+disagreement once, with the quoted cards and the formulas concerned. It keeps what the sources say
+apart from what we infer. The table `data/cards/collation.toml` has the steps to which it refers.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import combinations
+from typing import Any, NamedTuple
+
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS
+from pyharness.original.cards import deck, numbers, tight
+from pyharness.original.deck_collation import Row, rows
+
+CERTAINTIES = ("certain", "probable", "conjecture", "undecidable")
+"""The degrees of certainty of an inference."""
+
+
+class Disagreement(NamedTuple):
+    """A disagreement of the decks with each other or with the thesis, and its supposed origin.
+
+    Attributes
+    ----------
+    id, title : str
+        Identifier and title of the disagreement.
+    steps : tuple of str
+        The rows of the table that compares the decks, by their description.
+    equations : tuple of str
+        The numbers of the formulas of the thesis concerned.
+    where, says : str
+        The place in the thesis, and a few words from there. Both are empty if the thesis is silent.
+    cards : dict of str to dict of int to str
+        For each program, the quoted text of each card concerned.
+    differs, known, suggests : str
+        What differs, what the sources say, and what we infer from it.
+    origin : str
+        The kind of origin that is inferred.
+    certainty : str
+        The certainty of the inference, one of `CERTAINTIES`.
+    entries : tuple of str
+        The identifiers of the apparatus entries concerned.
+    unnoticed : str
+        Why the test cases of the thesis do not show the fault; empty if there is nothing to say.
+    """
+
+    id: str
+    title: str
+    steps: tuple[str, ...]
+    equations: tuple[str, ...]
+    where: str
+    says: str
+    cards: dict[str, dict[int, str]]
+    differs: str
+    known: str
+    suggests: str
+    origin: str
+    certainty: str
+    entries: tuple[str, ...]
+    unnoticed: str
+
+
+def disagreements() -> list[Disagreement]:
+    """Return all disagreements in the order of the table `data/disagreements.toml`."""
+    return [_disagreement(each) for each in facts("disagreements")["disagreement"]]
+
+
+def origins() -> dict[str, str]:
+    """Return the description of each kind of origin, by its name."""
+    return dict(facts("disagreements")["origin"])
+
+
+def unexplained_defects() -> dict[str, str]:
+    """Return, by identifier, why no disagreement explains certain defects of the apparatus."""
+    return dict(facts("disagreements")["unexplained"])
+
+
+def shared_statements() -> dict[tuple[str, str], int]:
+    """Return the number of statements that two decks share, for each pair of programs.
+
+    A statement that occurs several times in both decks counts as often as in the deck that has it
+    less often. Statement numbers, blanks and comments are ignored.
+    """
+    found = {program: Counter(_statements(program)) for program in PROGRAMS}
+    return {(a, b): (found[a] & found[b]).total() for a, b in combinations(PROGRAMS, 2)}
+
+
+def statement_count(program: str) -> int:
+    """Return the number of cards of a program that are not comments."""
+    return len(_statements(program))
+
+
+def mistakes() -> list[str]:
+    """Return one sentence for each mistake in the table of disagreements.
+
+    A quoted card must have the quoted text. Steps, formulas, entries and kinds of origin must
+    exist. An entry that names cards must name a quoted card. Each defect of the apparatus must be
+    in a disagreement, or among the defects without an explanation. Each step in which decks or
+    thesis differ must be in a disagreement, or among the steps that differ as their methods
+    require.
+    """
+    found = disagreements()
+    return [*_of_each(found), *_of_defects(found), *_of_steps(found)]
+
+
+def _of_each(found: list[Disagreement]) -> Iterator[str]:
+    known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}
+    steps = {row.what for row in rows()}
+    formulas = {each.get("number") for each in facts("formulas")["formula"]}
+    for name, count in Counter(each.id for each in found).items():
+        if count > 1:
+            yield f"{name}: is {count} times in the table"
+    for each in found:
+        for program, quotes in each.cards.items():
+            for number, text in quotes.items():
+                card = deck(program).cards.get(number)
+                if card is None or tight(card.text) != tight(text):
+                    yield f"{each.id}: {program}:{number} is not {text!r}"
+        yield from (f"{each.id}: no step {name!r}" for name in each.steps if name not in steps)
+        yield from (f"{each.id}: no formula {n!r}" for n in each.equations if n not in formulas)
+        for name in each.entries:
+            if name not in known:
+                yield f"{each.id}: no entry {name!r}"
+            elif known[name]["cards"] and not _names_a_quoted_card(known[name], each):
+                yield f"{each.id}: {name} names none of its cards"
+        if each.origin not in origins():
+            yield f"{each.id}: no origin {each.origin!r}"
+        if each.certainty not in CERTAINTIES:
+            yield f"{each.id}: no certainty {each.certainty!r}"
+
+
+def _of_defects(found: list[Disagreement]) -> Iterator[str]:
+    explained = {name for each in found for name in each.entries}
+    defects = [each["id"] for each in facts("apparatus")["entry"] if each["kind"] == "defect"]
+    given = unexplained_defects()
+    for name in defects:
+        if (name in explained) == (name in given):
+            yield f"{name}: must be in a disagreement or without an explanation, and not in both"
+    yield from (f"{name}: is no defect" for name in given if name not in defects)
+
+
+def _of_steps(found: list[Disagreement]) -> Iterator[str]:
+    named = {name for each in found for name in each.steps}
+    required = facts("disagreements")["as_required"]["steps"]
+    steps = {row.what: row for row in rows()}
+    yield from (f"as_required: no step {name!r}" for name in required if name not in steps)
+    for name, row in steps.items():
+        if _differs(row) and (name in named) == (name in required):
+            yield f"{name}: must be in a disagreement or as required, and not in both"
+
+
+def _differs(row: Row) -> bool:
+    return row.thesis == "differs" or row.decks in ("differ", "names", "order")
+
+
+def _names_a_quoted_card(entry: dict[str, Any], each: Disagreement) -> bool:
+    return any(
+        set(numbers(entry["cards"].get(program, ""))) & set(quotes)
+        for program, quotes in each.cards.items()
+    )
+
+
+def _statements(program: str) -> list[str]:
+    cards = deck(program).cards.values()
+    return [tight(card.text[6:]) for card in cards if not card.is_comment]
+
+
+def _disagreement(given: dict[str, Any]) -> Disagreement:
+    cards = {
+        program: {int(number): text for number, text in quotes.items()}
+        for program, quotes in given["cards"].items()
+    }
+    return Disagreement(
+        given["id"], given["title"], tuple(given["steps"]), tuple(given["equations"]),
+        given.get("where", ""), given.get("says", ""), cards, given["differs"], given["known"],
+        given["suggests"], given["origin"], given["certainty"], tuple(given["entries"]),
+        given.get("unnoticed", ""),
+    )  # fmt: skip

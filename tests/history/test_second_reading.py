@@ -1,0 +1,101 @@
+"""The second reading of a sample, and the estimate of the misreadings that remain."""
+
+import csv
+import json
+from itertools import product
+
+import pytest
+
+from pyharness.cli.main import main
+from pyharness.history.second_reading import (
+    chapman,
+    disagreeing,
+    misread_places,
+    read_cards,
+    recapture_interval,
+    recaptures,
+    sample,
+)
+from pyharness.original.cards import tight
+
+
+def test_sample_is_the_one_that_the_seed_draws() -> None:
+    read = {each.card.name for each in read_cards()}
+    assert read == {card.name for card in sample()}
+    assert len(read) == 120
+
+
+def test_chapman_corrects_lincoln_and_petersen() -> None:
+    assert chapman(10, 8, 8) == 10
+    assert chapman(20, 10, 5) == pytest.approx(21 * 11 / 6 - 1)
+    assert chapman(2000, 1000, 500) == pytest.approx(4000, rel=2e-3)
+
+
+def test_interval_contains_the_size_as_often_as_promised() -> None:
+    """All samples of a small population: the interval has the size in 95 % or more of them."""
+    size, first = 12, 7
+    held = every = 0
+    for marks in product((0, 1), repeat=size):
+        both = sum(marks[:first])
+        if both:
+            lower, upper = recapture_interval(first, sum(marks), both)
+            held += lower <= size <= upper
+            every += 1
+    assert held >= 0.95 * every
+
+
+def test_interval_contains_the_estimate() -> None:
+    for first, second, both in ((43, 42, 42), (20, 10, 5), (9, 9, 9), (30, 30, 20)):
+        lower, upper = recapture_interval(first, second, both)
+        assert first + second - both <= lower <= chapman(first, second, both) <= upper
+    with pytest.raises(ValueError, match="both must be positive"):
+        recapture_interval(3, 3, 0)
+
+
+def test_places_are_those_of_the_scan() -> None:
+    assert misread_places("A1XU2", "A1*U2") == {2: "*"}
+    assert misread_places("AB", "AB") == {}
+    assert misread_places("AXB", "AB") == {1: ""}
+    assert misread_places("AB", "A*B") == {0: "*"}
+    assert misread_places("B", "AB") == {-1: "A"}
+
+
+def test_the_readings_differ_in_a_name_alone() -> None:
+    assert [each.card.name for each in disagreeing()] == ["two-term:110", "four-term:2010"]
+    for each in disagreeing():
+        assert each.first.replace("WKA", "USA") == each.second
+
+
+def test_names_that_we_make_uniform_are_no_misreadings() -> None:
+    (found,) = (each for each in read_cards() if each.card.name == "four-term:480")
+    assert tight(found.card.text) == "M3=N3/I3"
+    assert found.scan == found.first == found.second == "M3=M3/I3"
+
+
+def test_few_misreadings_remain_if_the_readings_are_independent() -> None:
+    places, cards = recaptures()
+    assert (places.unit, cards.unit) == ("places", "cards")
+    assert cards.both == cards.second
+    for each in (places, cards):
+        assert each.first <= each.lower <= each.upper
+        assert each.uncorrected == each.upper - each.first <= 2
+
+
+def test_the_verb_shows_it_in_every_form(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "100")
+
+    def told(*options: str) -> str:
+        assert main(["cards", "--second-reading", *options]) == 0
+        return capsys.readouterr().out
+
+    assert max(map(len, told().splitlines())) <= 100
+    record = json.loads(told("--format", "json"))
+    assert record["sample"] == {"seed": 1982, "size": 120, "cards": 521}
+    assert [each["first"] for each in record["recaptures"]] == [e.first for e in recaptures()]
+    table = list(csv.DictReader(told("--format", "csv").splitlines()))
+    assert [each["unit"] for each in table] == ["places", "cards"]
+    for words in (["two-term"], ["--classes"], ["--origins"], ["--scan", "x"]):
+        assert main(["cards", "--second-reading", *words]) == 2
+        assert capsys.readouterr().err.count("\n") == 1

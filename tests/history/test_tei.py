@@ -1,6 +1,7 @@
 """The edition as TEI: it is valid and complete, and the scan can be reconstructed from it."""
 
 import lzma
+import re
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
@@ -13,9 +14,11 @@ import pytest
 import yaml
 from lxml import etree
 
+import pyharness
 from pyharness.cli.main import main
 from pyharness.history.cards_report import card_record
-from pyharness.history.tei import AUTHOR, SCHEMA, TITLE, tei_document
+from pyharness.history.tei import SCHEMA, tei_document
+from pyharness.history.tei_header import AUTHOR, TITLE
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.original.cards import chosen, tight
@@ -26,7 +29,7 @@ SOURCE = tomllib.loads((HERE / "tei_all.toml").read_text())
 TEI = "{http://www.tei-c.org/ns/1.0}"
 ID = "{http://www.w3.org/XML/1998/namespace}id"
 SPACE = "{http://www.w3.org/XML/1998/namespace}space"
-POINTERS = ("target", "corresp", "ana", "wit", "edRef")
+POINTERS = ("target", "corresp", "ana", "wit", "edRef", "resp", "source")
 TEXT = tei_document().decode()
 
 
@@ -244,6 +247,79 @@ def test_the_scan_alone_is_a_witness(root: xml.Element) -> None:
     ]
     for text in facts("cards/scan")["principles"].values():
         assert text in TEXT
+
+
+def _part(root: xml.Element, path: str) -> xml.Element:
+    found = root.find("/".join(f"{TEI}{name}" for name in path.split("/")))
+    assert found is not None, path
+    return found
+
+
+def test_header_says_who_is_responsible_and_since_when(root: xml.Element) -> None:
+    """The date is that of the changelog, and not of the day on which the document is written."""
+    responsible = _part(root, "teiHeader/fileDesc/titleStmt/respStmt")
+    names = [each.text for each in responsible.iter(TEI + "name")]
+    citation = yaml.safe_load((HERE.parents[1] / "CITATION.cff").read_text())
+    assert names == [each["name"] for each in citation["authors"]]
+    changelog = (HERE.parents[1] / "CHANGELOG.md").read_text()
+    versions = re.findall(r"^## (\S+)(?: \((\S+)\))?$", changelog, re.MULTILINE)
+    assert facts("edition")["released"] == dict(versions)
+    edition = _part(root, "teiHeader/fileDesc/editionStmt/edition")
+    date = _part(root, "teiHeader/fileDesc/publicationStmt/date")
+    version = edition.attrib["n"]
+    assert version == pyharness.__version__
+    released = dict(versions).get(version) or "no date"
+    assert date.text == released
+    assert (date.get("when") or "") == (released if released[:1].isdigit() else "")
+
+
+def test_rights_are_stated_with_their_place(root: xml.Element) -> None:
+    available = _part(root, "teiHeader/fileDesc/publicationStmt/availability")
+    rights = facts("edition")["rights"]
+    text = "".join(available.itertext())
+    assert all(rights[name] in text for name in ("status", "edition", "where", "says"))
+    (quote,) = available.iter(TEI + "quote")
+    assert (quote.text, quote.get("source")) == (rights["says"], "#S.text")
+
+
+def test_witness_is_described(root: xml.Element) -> None:
+    (witness,) = root.iter(TEI + "witness")
+    assert {each.get(ID) for each in witness.iter(TEI + "biblScope")} == {"S.text", "S.appendix"}
+    (sha256_,) = (each.text for each in witness.iter(TEI + "idno"))
+    assert sha256_ == facts("cards/scan")["witness"][0]["sha256"]
+    assert facts("edition")["witness"]["state"] in "".join(witness.itertext())
+    assert facts("edition")["witness"]["siglum"] == witness.get(ID)
+
+
+def test_every_entry_says_who_decides_and_from_which_source(root: xml.Element) -> None:
+    responsible = {each.get(ID) for each in root.iter(TEI + "respStmt")}
+    parts = {f"#{each.get(ID)}" for each in root.iter(TEI + "biblScope")}
+    entries = {each["id"]: each for each in facts("apparatus")["entry"]}
+    notes = [each for each in root.iter(TEI + "note") if each.get("type") == "entry"]
+    for each in [*notes, *root.iter(TEI + "app"), *root.iter(TEI + "supplied")]:
+        assert each.attrib["resp"][1:] in responsible
+    for each in [*notes, *root.iter(TEI + "app")]:
+        assert set(each.attrib["source"].split()) <= parts
+    for note in notes:
+        entry = entries[note.attrib[ID]]
+        assert ("#S.appendix" in note.attrib["source"]) == bool(entry["cards"])
+        # Grounds are categories and no sources.
+        assert not any("ground" in each for each in note.attrib["source"].split())
+
+
+def test_lost_page_is_an_entry(root: xml.Element) -> None:
+    (note,) = (each for each in root.iter(TEI + "note") if each.get(ID) == "missing-abstract")
+    assert "#kind.missing-text" in note.attrib["ana"]
+    assert note.attrib["source"] == "#S.text"
+
+
+def test_bibliography_is_that_of_the_data(root: xml.Element) -> None:
+    (works,) = root.iter(TEI + "listBibl")
+    assert [each.get(ID) for each in works] == [
+        f"work.{each['id']}" for each in facts("edition")["work"]
+    ]
+    assert facts("edition")["work"][0]["title"] == TITLE
+    assert facts("edition")["rights"]["licence"] == "MIT"
 
 
 def test_work_is_that_of_the_citation() -> None:

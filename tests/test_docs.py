@@ -14,7 +14,7 @@ from docs.article import build as article
 from pyharness import read_scene
 from pyharness.cli import options
 from pyharness.cli.main import VERBS, main
-from pyharness.edition.origins import PAGE, origins_page
+from pyharness.edition import origins, principles
 from pyharness.history import figures
 from pyharness.history.timeline import timeline_page
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
@@ -29,6 +29,11 @@ DOCS = sorted((ROOT / "docs").rglob("*.md"))
 README = ROOT / "README.md"
 CONTRIBUTING = ROOT / "CONTRIBUTING.md"
 SCENES = ROOT / "docs/reference/scene-files.md"
+# The documents that are made of data, and their text.
+BUILT = (
+    (origins.PAGE, origins.origins_page()),
+    (principles.PAGE, principles.principles_page()),
+)
 
 
 def _blocks() -> list[tuple[Path, str, str]]:
@@ -177,10 +182,10 @@ def test_fields_of_json_are_a_page_of_the_schema() -> None:
     assert (ROOT / "docs/reference/json.md").read_text() == render()
 
 
-def test_origins_are_a_page_of_the_table() -> None:
+@pytest.mark.parametrize(("page", "text"), BUILT)
+def test_page_is_made_of_the_data(page: str, text: str) -> None:
     """Lines are at most 120 characters long, except in tables."""
-    text = (ROOT / "docs" / PAGE).read_text()
-    assert text == origins_page()
+    assert (ROOT / "docs" / page).read_text() == text
     assert all(len(line) <= 120 for line in text.splitlines() if not line.startswith("|"))
 
 
@@ -199,8 +204,8 @@ def write_anew() -> None:
     os.environ["COLUMNS"] = "100"
     (ROOT / "docs/reference/json.md").write_text(render())
     article.main()
-    (ROOT / "docs/explanation/timeline.md").write_text(timeline_page())
-    (ROOT / "docs" / PAGE).write_text(origins_page())
+    for page, text in BUILT:
+        (ROOT / "docs" / page).write_text(text)
     for path in DOCS:
 
         def anew(match: re.Match[str]) -> str:

@@ -4,9 +4,9 @@ A disagreement is one of the card decks with each other, or with the text of the
 of the edition link to the parts of this document.
 """
 
-import textwrap
 from collections.abc import Iterator, Sequence
 
+from pyharness.edition.made_pages import paragraphs, table
 from pyharness.edition.markdown import slug
 from pyharness.history.origins import (
     Disagreement,
@@ -49,23 +49,23 @@ def origins_page() -> str:
     It has a table of all disagreements, and a part for each of them.
     """
     found = disagreements()
-    parts = ["# Where the faults came from\n", _filled(_HEAD)]
-    parts += ["## Statements that decks share\n", _filled(_SHARED)]
-    parts.append(_table("decks | shared statements | statements in each deck", _shared_rows()))
+    parts = ["# Where the faults came from\n", paragraphs(_HEAD)]
+    parts += ["## Statements that decks share\n", paragraphs(_SHARED)]
+    parts.append(table("decks | shared statements | statements in each deck", _shared_rows()))
     parts += ["## Why the tests of the thesis did not show the faults\n"]
-    parts.append(_filled(_UNNOTICED))
+    parts.append(paragraphs(_UNNOTICED))
     parts.append("## Kinds of origin\n")
     rows = [
         [name, text, str(sum(each.origin == name for each in found))]
         for name, text in origins().items()
     ]
-    parts.append(_table("origin | meaning | disagreements", rows))
+    parts.append(table("origin | meaning | disagreements", rows))
     parts.append("## All disagreements\n")
     rows = [
         [f"[{each.title}](#{slug(each.title)})", each.origin, each.certainty, _codes(each.entries)]
         for each in found
     ]
-    parts.append(_table("disagreement | inferred origin | certainty | apparatus", rows))
+    parts.append(table("disagreement | inferred origin | certainty | apparatus", rows))
     parts += [_part(each) for each in found]
     parts += ["## Defects without an explanation\n", *_unexplained()]
     return "\n".join(parts)
@@ -106,7 +106,7 @@ def _part(each: Disagreement) -> str:
         for number, text in quotes.items()
     ]
     if rows:
-        parts.append(_table("program | card | text", rows))
+        parts.append(table("program | card | text", rows))
     numbers = f"equation {', '.join(each.equations)}" if each.equations else ""
     thesis = "; ".join(text for text in (numbers, each.where) if text)
     if each.says:
@@ -128,22 +128,7 @@ def _unexplained() -> Iterator[str]:
 def _item(text: str) -> str:
     label, colon, rest = text.partition(":")
     bold = text if label.startswith("`") else f"**{label}{colon}**{rest}"
-    return textwrap.fill(
-        bold, 120, initial_indent="- ", subsequent_indent="  ", break_on_hyphens=False,
-        break_long_words=False,
-    )  # fmt: skip
-
-
-def _filled(text: str) -> str:
-    """Return paragraphs, which blank lines separate, with lines of at most 120 characters."""
-    parts = text.split("\n\n")
-    return "\n\n".join(textwrap.fill(" ".join(part.split()), 120) for part in parts) + "\n"
-
-
-def _table(head: str, rows: Sequence[Sequence[str]]) -> str:
-    heads = head.split(" | ")
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+    return paragraphs(f"- {bold}", "  ").rstrip()
 
 
 def _codes(names: Sequence[str]) -> str:

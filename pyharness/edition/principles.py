@@ -1,7 +1,6 @@
 """The document `docs/explanation/principles.md`, made from the tables of the edition."""
 
-import textwrap
-
+from pyharness.edition.made_pages import paragraphs, table
 from pyharness.history.tei_header import AUTHOR, CERTAINTY, KINDS
 from pyharness.model.facts import facts
 
@@ -51,61 +50,49 @@ def principles_page() -> str:
     }
     parts = [
         "# Principles of the edition\n",
-        _filled(_HEAD),
+        paragraphs(_HEAD),
         "## What is edited\n",
-        _filled(
+        paragraphs(
             f"The edition has the three programs in the appendix of {AUTHOR}, *{work['title']}* "
             f"({work['year']}). Its text is every card of the three programs. "
             "The sentences, claims, formulas and figures of sections I to VI are quoted and "
             "judged, but not edited."
         ),
-        _filled(_WITNESS.format(**{**edition["witness"], **witness})),
+        paragraphs(_WITNESS.format(**{**edition["witness"], **witness})),
         "## What is kept and what is changed\n",
-        _table(
+        table(
             "principle | what it covers", [[name, text] for name, text in principles.items()]
         ),
         "## How readings are marked\n",
-        _filled(_READINGS),
-        _table(
+        paragraphs(_READINGS),
+        table(
             "kind of entry | meaning | entries",
             [[f"`{name}`", text, str(counts.count(name))] for name, text in KINDS.items()],
         ),
         "## Certainty\n",
-        _filled(_CERTAINTY),
-        _table(
+        paragraphs(_CERTAINTY),
+        table(
             "certainty | `cert` | entries",
             [[name, f"`{value}`", str(sure.count(name))] for name, value in CERTAINTY.items()],
         ),
         "## Grounds\n",
-        _filled(_GROUNDS),
-        _table("ground | meaning", [[each["siglum"], each["what"]] for each in scan["ground"]]),
+        paragraphs(_GROUNDS),
+        table("ground | meaning", [[each["siglum"], each["what"]] for each in scan["ground"]]),
         "## Rights\n",
-        _filled(rights["status"]),
-        _filled(f"""{rights['where']}: "{rights['says']}"."""),
-        _filled(f"{rights['edition']} The licence is in the file `LICENSE`."),
+        paragraphs(rights["status"]),
+        paragraphs(f"""{rights['where']}: "{rights['says']}"."""),
+        paragraphs(f"{rights['edition']} The licence is in the file `LICENSE`."),
         "## Versions\n",
-        _filled(
+        paragraphs(
             f"The editors are {', '.join(edition['editors'])}. A citation names the version and "
             "the digest of the text, which `pyharness cards --classes` prints. The date of a "
             "version is its date in the file `CHANGELOG.md`, not the date on which a file was made."
         ),
         "## Bibliography\n",
         "".join(
-            _filled(f"- {each['author']}: *{each['title']}*. {each['imprint']}. "
+            paragraphs(f"- {each['author']}: *{each['title']}*. {each['imprint']}. "
                     f"Used for: {each['use']}.", "  ")
             for each in edition["work"]
         ),
     ]  # fmt: skip
     return "\n".join(parts)
-
-
-def _filled(text: str, indent: str = "") -> str:
-    """Return a paragraph with lines of at most 120 characters, the later ones with an indent."""
-    words = " ".join(text.split())
-    return textwrap.fill(words, 120, subsequent_indent=indent, break_on_hyphens=False) + "\n"
-
-
-def _table(head: str, rows: list[list[str]]) -> str:
-    heads = head.split(" | ")
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "".join("| " + " | ".join(line) + " |\n" for line in lines)

@@ -1,0 +1,28 @@
+"""Parts of Markdown documents that are made of data: paragraphs and tables."""
+
+import textwrap
+from collections.abc import Sequence
+
+_WIDTH = 120  # of the lines of a document, in characters
+
+
+def paragraphs(text: str, indent: str = "") -> str:
+    """Return paragraphs, which blank lines separate, with lines of at most 120 characters.
+
+    All lines of a paragraph but the first begin with `indent`.
+    """
+    return "\n\n".join(_filled(part, indent) for part in text.split("\n\n")) + "\n"
+
+
+def table(head: str, rows: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table. The text `head` has the heads of its columns, separated by bars."""
+    heads = head.split(" | ")
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+
+
+def _filled(text: str, indent: str) -> str:
+    words = " ".join(text.split())
+    return textwrap.fill(
+        words, _WIDTH, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False
+    )

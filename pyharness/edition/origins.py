@@ -107,7 +107,9 @@ def _part(each: Disagreement) -> str:
     ]
     if rows:
         parts.append(table("program | card | text", rows))
-    numbers = f"equation {', '.join(each.equations)}" if each.equations else ""
+    given = ", ".join(each.equations)
+    noun = "equations" if "," in given or "-" in given else "equation"
+    numbers = f"{noun} {given}" if given else ""
     thesis = "; ".join(text for text in (numbers, each.where) if text)
     if each.says:
         thesis += f": *{_escaped(each.says)}*"

@@ -33,6 +33,7 @@ SCENES = ROOT / "docs/reference/scene-files.md"
 BUILT = (
     (origins.PAGE, origins.origins_page()),
     (principles.PAGE, principles.principles_page()),
+    ("explanation/timeline.md", timeline_page()),
 )
 
 

@@ -8,6 +8,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+SHIPPED = ("web", "fortran", "codemeta.json", "CITATION.cff", "LICENSE")
+"""What an installed package has in its folder `data`, and a checkout beside the Python package."""
+
 _PACKAGE = Path(__file__).parent.parent
 _FOLDER = _PACKAGE / "data"
 
@@ -22,11 +25,19 @@ def facts(name: str) -> dict[str, Any]:
         return tomllib.load(file)
 
 
-def shipped(name: str) -> Path:
-    """Return the path of a project folder that a checkout has beside the Python package.
+def facts_folder() -> Path:
+    """Return the path of the folder `data` of this package, which has the facts.
 
-    `name` is ``docs``, ``web`` or a folder in ``fortran``, as in ``fortran/original``. An installed
-    package contains these folders, except ``docs``, in its folder ``data``.
+    In an installed package the folder also contains the files and folders `SHIPPED`.
+    """
+    return _FOLDER
+
+
+def shipped(name: str) -> Path:
+    """Return the path of a file or folder that a checkout has beside the Python package.
+
+    `name` is ``docs``, one of `SHIPPED`, or a folder in one of them, as in ``fortran/original``. An
+    installed package contains these files and folders, except ``docs``, in its folder ``data``.
     """
     installed = _FOLDER / name
     return installed if installed.exists() else _PACKAGE.parent / name

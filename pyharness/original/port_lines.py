@@ -14,7 +14,8 @@ from pyharness.model.facts import shipped
 
 _MARGIN = re.compile(r"^(.*?)\s*!\s*(\d+(?:[-,\s]+\d+)*)\s*$")
 _TWINS = Path(__file__).parent
-_PORT = "fortran/original"
+PORT = "fortran/original"
+"""The folder of the Fortran port in the source repository."""
 
 
 class Place(NamedTuple):
@@ -25,14 +26,19 @@ class Place(NamedTuple):
     text: str
 
 
+def port_file(program: str) -> str:
+    """Return the name of the file in the folder `PORT` with the Fortran port of a program."""
+    return f"{program.replace('-', '_')}.fypp"
+
+
 def port_lines(program: str) -> Iterator[tuple[Place, str]]:
     """Yield each line of a program's Fortran port that corresponds to cards, with their numbers.
 
     A card is a line of the printed program. The Fortran port names the cards in a comment at the
     end of the line. Their numbers are yielded as text, as in ``750-770, 800``.
     """
-    file = f"{program.replace('-', '_')}.fypp"
-    for number, text in enumerate(_lines(shipped(_PORT) / file), 1):
+    file = port_file(program)
+    for number, text in enumerate(_lines(shipped(PORT) / file), 1):
         if match := _MARGIN.match(text):
             yield Place(file, number, match[1].strip()), match[2]
 
@@ -44,7 +50,7 @@ def switch_at(place: Place) -> tuple[str, bool] | None:
     result is the name of the defect or reading, and whether it is active where the line is
     executed. It is None for a line that does not depend on a single switch.
     """
-    lines = _lines(shipped(_PORT) / place.file)
+    lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])
     beyond_else = False
     for line in filter(str.strip, reversed(lines[: place.line - 1])):

@@ -1,0 +1,129 @@
+"""Software Heritage identifiers (SWHIDs) of files, folders and cards, computed offline.
+
+A SWHID (ISO/IEC 18670) names a file or a folder by a SHA-1 hash of its content. Anyone who has the
+content can compute the identifier again, and the archive Software Heritage finds a copy by it.
+"""
+
+from collections.abc import Collection, Mapping
+from functools import cache
+from hashlib import sha1
+from pathlib import Path
+
+from pyharness.model.facts import SHIPPED, facts_folder, shipped
+from pyharness.model.listing import PROGRAMS
+from pyharness.original.cards import Card
+from pyharness.original.port_lines import PORT, port_file
+
+DATA = "pyharness/data"
+"""The folder of the edition's data in the source repository."""
+
+
+def content_identifier(content: bytes) -> str:
+    """Return the SWHID of a file with the bytes `content`, which begins with ``swh:1:cnt:``.
+
+    The hash in the identifier is the hash that git gives to the same file, as a blob.
+    """
+    return f"swh:1:cnt:{_hash('blob', content).hex()}"
+
+
+def directory_identifier(files: Mapping[str, bytes], executable: Collection[str] = ()) -> str:
+    """Return the SWHID of a folder with the given files, which begins with ``swh:1:dir:``.
+
+    The hash in the identifier is the hash that git gives to the same folder, as a tree.
+
+    Parameters
+    ----------
+    files : mapping of str to bytes
+        The content of each file by its path in the folder, as in ``cards/scan.toml``. The folder
+        can contain neither links nor empty folders.
+    executable : collection of str, optional
+        The paths of the files that are executable.
+    """
+    return f"swh:1:dir:{_tree(files, executable).hex()}"
+
+
+def identifier_of_lines(identifier: str, first: int, last: int | None = None) -> str:
+    """Return the SWHID `identifier` of a file, qualified by a range of its lines.
+
+    `first` and `last` are line numbers, counted from 1. Without `last`, the identifier names the
+    line `first` only.
+    """
+    return f"{identifier};lines={first}" + ("" if last is None else f"-{last}")
+
+
+@cache
+def source_files() -> dict[str, bytes]:
+    """Return the files of the edition's data and of the Fortran port, by their path in the source.
+
+    The path is that in the source repository, as in ``pyharness/data/apparatus.toml``. The result
+    is the same in an installed package, which has some of the files in other places.
+    """
+    folder = facts_folder()
+    found = {
+        f"{DATA}/{file.relative_to(folder).as_posix()}": file.read_bytes()
+        for file in folder.rglob("*")
+        if file.is_file() and file.relative_to(folder).parts[0] not in SHIPPED
+    }
+    for program in PROGRAMS:
+        found[f"{PORT}/{port_file(program)}"] = (shipped(PORT) / port_file(program)).read_bytes()
+    return dict(sorted(found.items()))
+
+
+def data_identifier() -> str:
+    """Return the SWHID of the folder `DATA`, the data of the edition, as in the source repository.
+
+    The folder has the cards, the apparatus, the claims and the other facts of the edition.
+    """
+    data = Path(DATA)
+    return directory_identifier(
+        {
+            str(Path(name).relative_to(data)): content
+            for name, content in source_files().items()
+            if Path(name).is_relative_to(data)
+        }
+    )
+
+
+def card_identifier(card: Card) -> str:
+    """Return the SWHID of a card: that of its deck's file, qualified by the line of the card.
+
+    The file is ``cards/<program>.toml`` in the folder `DATA`.
+    """
+    content = source_files()[f"{DATA}/cards/{card.program}.toml"]
+    return identifier_of_lines(content_identifier(content), card_lines(content)[card.number])
+
+
+@cache
+def card_lines(content: bytes) -> dict[int, int]:
+    """Return the line, counted from 1, of each card in the file of a deck, by card number.
+
+    `content` is the content of the file, in which each card has a line of its own.
+    """
+    lines = enumerate(content.decode().splitlines(), 1)
+    keys = ((line.partition(" = ")[0], number) for number, line in lines)
+    return {int(key): number for key, number in keys if key.isdigit()}
+
+
+def _hash(kind: str, content: bytes) -> bytes:
+    # The identifiers are defined by SHA-1; nothing here depends on its resistance to attacks.
+    return sha1(f"{kind} {len(content)}\0".encode() + content, usedforsecurity=False).digest()
+
+
+def _tree(files: Mapping[str, bytes], executable: Collection[str]) -> bytes:
+    """Return the hash of a folder as a git tree. The arguments are as in `directory_identifier`."""
+    folders: dict[str, dict[str, bytes]] = {}
+    entries = []
+    for path, content in files.items():
+        name, slash, rest = path.partition("/")
+        if slash:
+            folders.setdefault(name, {})[rest] = content
+        else:
+            mode = "100755" if path in executable else "100644"
+            entries.append((name, mode, name, _hash("blob", content)))
+    for name, within in folders.items():
+        runs = {path.removeprefix(f"{name}/") for path in executable if path.startswith(f"{name}/")}
+        # git sorts a folder as if its name ended with a slash.
+        entries.append((f"{name}/", "40000", name, _tree(within, runs)))
+    entries.sort(key=lambda entry: entry[0].encode())
+    body = b"".join(f"{mode} {name}\0".encode() + hashed for _, mode, name, hashed in entries)
+    return _hash("tree", body)

@@ -1,0 +1,140 @@
+"""Software Heritage identifiers: known values, agreement with git, and the lines of cards."""
+
+import os
+import random
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from pyharness.history.identifiers import (
+    DATA,
+    card_identifier,
+    card_lines,
+    content_identifier,
+    data_identifier,
+    directory_identifier,
+    identifier_of_lines,
+    source_files,
+)
+from pyharness.model import facts as tables
+from pyharness.model.facts import SHIPPED
+from pyharness.model.listing import PROGRAMS
+from pyharness.original.cards import deck
+from tests.test_packaging import ROOT
+
+EMPTY = "e69de29bb2d1d6434b8b29ae775ad8c2e48c5391"
+
+
+def _git(folder: Path, *arguments: str, content: bytes = b"") -> str:
+    if shutil.which("git") is None:
+        pytest.skip("no git here")
+    # Settings of the user, such as the conversion of line ends, have no effect.
+    environment = {
+        **os.environ, "GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_SYSTEM": os.devnull,
+        "GIT_CEILING_DIRECTORIES": str(folder.parent),
+    }  # fmt: skip
+    environment.pop("GIT_DIR", None)
+    environment.pop("GIT_INDEX_FILE", None)
+    done = subprocess.run(
+        ["git", *arguments],
+        cwd=folder, env=environment, input=content, capture_output=True, check=False,
+    )  # fmt: skip
+    if done.returncode:
+        pytest.skip(done.stderr.decode())
+    return done.stdout.decode().strip()
+
+
+def test_known_identifiers() -> None:
+    assert content_identifier(b"") == f"swh:1:cnt:{EMPTY}"
+    assert content_identifier(b"hello\n") == "swh:1:cnt:ce013625030ba8dba906f756967f9e9ca394464a"
+    assert directory_identifier({}) == "swh:1:dir:4b825dc642cb6eb9a060e54bf8d69288fbee4904"
+    # A folder with one empty file, from the documentation of git.
+    assert directory_identifier({"a": b""}) == "swh:1:dir:496d6428b9cf92981dc9495211e6e1120fb6f2ba"
+
+
+def test_lines_qualify_a_file() -> None:
+    assert identifier_of_lines(f"swh:1:cnt:{EMPTY}", 7) == f"swh:1:cnt:{EMPTY};lines=7"
+    assert identifier_of_lines(f"swh:1:cnt:{EMPTY}", 7, 9) == f"swh:1:cnt:{EMPTY};lines=7-9"
+
+
+@pytest.mark.external
+@pytest.mark.parametrize("content", [b"", b"\0\r\n\xff", "ω\n".encode(), bytes(range(256)) * 300])
+def test_git_has_the_same_identifier_of_a_file(tmp_path: Path, content: bytes) -> None:
+    found = _git(tmp_path, "hash-object", "--stdin", content=content)
+    assert content_identifier(content) == f"swh:1:cnt:{found}"
+
+
+@pytest.mark.external
+@pytest.mark.parametrize("seed", range(5))
+def test_git_has_the_same_identifier_of_a_folder(tmp_path: Path, seed: int) -> None:
+    """Random names include those whose order depends on whether they name a folder."""
+    draw = random.Random(seed)
+    files: dict[str, bytes] = {"a.b/x": b"1", "a-b": b"2", "a/b/c": b"3", "a0": b"4", "ü": b"5"}
+    for _ in range(20):
+        path = "/".join(
+            "".join(draw.choices("ab.-0_é", k=draw.randint(1, 3)))
+            for _ in range(draw.randint(1, 3))
+        )
+        parts = path.split("/")
+        above = {"/".join(parts[:n]) for n in range(1, len(parts))}
+        if set(parts) & {".", ".."} or above & set(files):
+            continue
+        if path not in files and not any(name.startswith(f"{path}/") for name in files):
+            files[path] = draw.randbytes(draw.randint(0, 40))
+    executable = sorted(files)[::3]
+    _git(tmp_path, "init", "--quiet")
+    for path, content in files.items():
+        file = tmp_path / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(content)
+        file.chmod(0o755 if path in executable else 0o644)
+    _git(tmp_path, "add", "--all", "--force")
+    assert directory_identifier(files, executable) == f"swh:1:dir:{_git(tmp_path, 'write-tree')}"
+
+
+@pytest.mark.external
+def test_git_has_the_same_identifiers_of_the_data_and_the_port() -> None:
+    if not (ROOT / ".git").exists():
+        pytest.skip("not a clone")
+    if _git(ROOT, "status", "--porcelain", "--", DATA):
+        pytest.skip("the data differ from those of the last commit")
+    assert data_identifier() == f"swh:1:dir:{_git(ROOT, 'rev-parse', f'HEAD:{DATA}')}"
+    for path, content in source_files().items():
+        assert content_identifier(content) == f"swh:1:cnt:{_git(ROOT, 'hash-object', path)}"
+
+
+def test_an_installation_has_the_same_identifiers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder of the data of an installed package has more files, and those of the port."""
+    before = data_identifier(), [*source_files().items()]
+    folder = tmp_path / "data"
+    shutil.copytree(ROOT / DATA, folder)
+    shutil.copytree(ROOT / "fortran/original", folder / "fortran/original")
+    for name in SHIPPED:
+        if (ROOT / name).is_file():
+            shutil.copy(ROOT / name, folder)
+    (folder / "web").mkdir()
+    (folder / "web/page.js").write_text("0;")
+    monkeypatch.setattr(tables, "_FOLDER", folder)
+    source_files.cache_clear()
+    try:
+        assert (data_identifier(), [*source_files().items()]) == before
+    finally:
+        source_files.cache_clear()
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_identifier_of_a_card_leads_to_its_line(program: str) -> None:
+    path = ROOT / DATA / f"cards/{program}.toml"
+    lines = path.read_text().splitlines()
+    found = deck(program)
+    assert list(card_lines(path.read_bytes())) == list(found.cards)
+    for number, card in found.cards.items():
+        identifier, _, line = card_identifier(card).partition(";lines=")
+        assert identifier == content_identifier(path.read_bytes())
+        row = tomllib.loads(lines[int(line) - 1])
+        assert row[str(number)]["text"] == card.text

@@ -1,6 +1,7 @@
 """The package as its users see it: types that accept valid calls, public names, citation."""
 
 import inspect
+import json
 import os
 import re
 import shutil
@@ -208,3 +209,38 @@ def test_the_citation_is_that_of_the_project() -> None:
     readme = " ".join((ROOT / "README.md").read_text().split())
     assert f"*{thesis['title']}*" in readme
     assert thesis["year"] == 1982
+
+
+def test_codemeta_agrees_with_the_project_and_the_citation() -> None:
+    codemeta = json.loads((ROOT / "codemeta.json").read_text())
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert codemeta["@context"] == "https://w3id.org/codemeta/3.0"
+    assert codemeta["@type"] == "SoftwareSourceCode"
+    assert codemeta["identifier"] == PROJECT["name"]
+    assert codemeta["name"] == citation["title"]
+    assert codemeta["version"] == citation["version"]
+    assert codemeta["license"] == f"https://spdx.org/licenses/{PROJECT['license']}"
+    assert codemeta["description"] == PROJECT["description"]
+    assert codemeta["keywords"] == PROJECT["keywords"]
+    assert [each["name"] for each in codemeta["author"]] == [
+        each["name"] for each in PROJECT["authors"]
+    ]
+    assert f"(c) {codemeta['copyrightYear']} " in (ROOT / "LICENSE").read_text()
+    assert codemeta["runtimePlatform"] == f"Python {PROJECT['requires-python']}"
+    assert [each["name"] + each["version"] for each in codemeta["softwareRequirements"]] == (
+        PROJECT["dependencies"]
+    )
+    systems = [each for each in PROJECT["classifiers"] if each.startswith("Operating System")]
+    assert {each.rpartition(":: ")[2] for each in systems} == {*codemeta["operatingSystem"]}
+    # A date and an address are in both files or in neither.
+    for name, other in (("datePublished", "date-released"), ("codeRepository", "repository-code")):
+        assert (name in codemeta) == (other in citation)
+        assert codemeta.get(name, "") == str(citation.get(other, ""))
+    thesis, (cited,) = codemeta["referencePublication"], citation["references"]
+    assert thesis["name"] == cited["title"]
+    assert thesis["datePublished"] == f"{cited['year']}-{cited['month']:02d}"
+    assert thesis["sourceOrganization"]["name"] == cited["institution"]["name"]
+    assert thesis["publisher"]["name"] == cited["publisher"]["name"]
+    (author,), (other_author,) = thesis["author"], cited["authors"]
+    assert author["familyName"] == other_author["family-names"]
+    assert author["givenName"] == other_author["given-names"]

@@ -86,18 +86,19 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
             raise
 
 
-def check_tree(path: str, mark: str, option: str) -> None:
+def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None:
     """Raise InputError if `write_tree` may not replace the folder `path`.
 
     The folder may be new or empty. Otherwise it may contain only a JSON file with the name `mark`,
-    and the files that this JSON file lists under the key `files`. The error message names `option`,
-    the option that gave the path. Callers make this check before any computation.
+    and the files that this JSON file lists under the key `files`. `kind` is the kind of the JSON
+    file, a key of `SCHEMAS`. The error message names `option`, the option that gave the path.
+    Callers make this check before any computation.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
     new, _ = _beside(folder)
     try:
-        reason = _why_not_anew(folder, mark)
+        reason = _why_not_anew(folder, mark, kind)
         # A temporary folder is made, because permissions do not show that a name is too long, or
         # that the file system accepts no file.
         if not reason:
@@ -112,17 +113,18 @@ def check_tree(path: str, mark: str, option: str) -> None:
         raise InputError(f"{option} '{path}': {reason.removeprefix(': ')}; give a new name")
 
 
-def _why_not_anew(folder: Path, mark: str) -> str:
+def _why_not_anew(folder: Path, mark: str, kind: str) -> str:
     """Return the reason why a folder may not be replaced, or an empty text if it may be.
 
     A folder may not be replaced if, for example, it has a file that no earlier run of the command
-    wrote. `mark` is the name of the JSON file that lists the files which an earlier run wrote.
+    wrote. `mark` is the name of the JSON file that lists the files which an earlier run wrote, and
+    `kind` the kind of this file, a key of `SCHEMAS`.
     """
     if Path.cwd().is_relative_to(folder):
         return "is the folder that you are in, or one above it"
     if not os.access(folder.parent, os.W_OK) or os.path.ismount(folder):
         return f"can't be made anew in '{folder.parent}'"
-    listed = {mark, *_listed(folder / mark)}
+    listed = {mark, *_listed(folder / mark, kind)}
     for file in sorted(folder.rglob("*")):
         name = file.relative_to(folder).as_posix()
         if name not in listed and (file.is_symlink() or not file.is_dir()):
@@ -130,7 +132,7 @@ def _why_not_anew(folder: Path, mark: str) -> str:
     return ""
 
 
-def _listed(mark: Path) -> Iterable[str]:
+def _listed(mark: Path, kind: str) -> Iterable[str]:
     try:
         described = json.loads(read_input(mark, "--out", _LARGEST_MARK, "a list of files"))
         files = described["files"]
@@ -138,7 +140,7 @@ def _listed(mark: Path) -> Iterable[str]:
         return ()
     if not isinstance(files, dict):
         return ()
-    check_schema(f"'{mark}'", "edition", described.get("schema"), "give a new name")
+    check_schema(f"'{mark}'", kind, described.get("schema"), "give a new name")
     return files
 
 

@@ -14,7 +14,7 @@ from pyharness.history.ablation import effects_of, entries
 from pyharness.history.apparatus_report import FIELDS, entry_report
 from pyharness.history.claims.evidence import evidence
 from pyharness.history.claims.evidence_report import evidence_report
-from pyharness.history.claims.ledger import Judgement, claims, judgement
+from pyharness.history.claims.ledger import Judgement
 from pyharness.history.claims.report import KINDS, claims_report, kinds_table
 from pyharness.history.claims.sentences import Sentence, sentences
 from pyharness.history.claims.stories import Story, story
@@ -39,14 +39,6 @@ class SentenceVerdicts(NamedTuple):
     def statements(self) -> str:
         """Return the statements of the claims that the sentence makes, as one text."""
         return " ".join(each.claim["statement"] for each in self.judged)
-
-
-def judgements() -> list[Judgement]:
-    """Return our verdicts on every claim of the thesis, for the original and corrected programs.
-
-    A `Judgement` has the verdicts on one claim.
-    """
-    return [judgement(entry["id"]) for entry in claims()]
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:

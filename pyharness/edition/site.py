@@ -28,6 +28,7 @@ from pyharness.edition import (
 from pyharness.edition.bundle import bundle
 from pyharness.edition.markdown import inline
 from pyharness.edition.report import MARK, listed
+from pyharness.history.claims.ledger import judgements
 from pyharness.history.claims.report import written
 from pyharness.history.claims.stories import prose
 from pyharness.history.tei import tei_document
@@ -132,7 +133,7 @@ def build_site(progress: Progress = no_progress, docs: Path | None = None) -> di
 
 def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -> Iterator[Page]:
     progress(1, 5, "claims")
-    judged = ledger.judgements()
+    judged = judgements()
     context = {
         "counts": ledger.counts(judged), "kinds": ledger.kinds(judged),
         "account": ledger.account(), "story": story.context(),

@@ -118,8 +118,7 @@ def _pages(program: str) -> list[_Page]:
 
 
 def _block(div: xml.Element, card: Card) -> xml.Element:
-    computes = card.number in deck(card.program).executable
-    kind = "comment" if card.is_comment else "executable" if computes else "specification"
+    kind = deck(card.program).statement_kind(card)
     block = named(div, "ab", _id(card), type="card", subtype=kind, n=str(card.number))
     if beside := parallels(card):
         block.set("corresp", " ".join(f"#{_id(each)}" for each in beside))

@@ -15,6 +15,7 @@ SCHEMAS = {
     "vector file": 1,
     "golden record": 1,
     "edition": 1,
+    "data package": 1,
     "port request": 1,
 }
 """The schema number that this version of the package writes and reads, for each kind of file.

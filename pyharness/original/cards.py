@@ -156,6 +156,12 @@ class Deck:
                 found.add(card.number)
         return frozenset(found)
 
+    def statement_kind(self, card: Card) -> str:
+        """Return the kind of a card: ``comment``, ``executable`` or ``specification``."""
+        if card.is_comment:
+            return "comment"
+        return "executable" if card.number in self.executable else "specification"
+
     @cached_property
     def absent(self) -> dict[int, str]:
         """Return, by card number, the reasons why the Fortran port omits executable cards.

@@ -17,16 +17,16 @@ def write(report: Report) -> str:
     return json_text({"schema": SCHEMA, **report.record()})
 
 
-def json_text(record: dict[str, Any]) -> str:
-    """Return a dictionary as strict JSON in one line.
+def json_text(record: dict[str, Any], indent: int | None = None) -> str:
+    """Return a dictionary as strict JSON, in one line or with `indent` blanks for each level.
 
     Floats are written so that they can be read back exactly. A number that is not finite becomes
     null, because strict JSON can't represent it.
     """
     try:
-        return json.dumps(record, allow_nan=False) + "\n"
+        return json.dumps(record, allow_nan=False, indent=indent) + "\n"
     except ValueError:
-        return json.dumps(_finite(record), allow_nan=False) + "\n"
+        return json.dumps(_finite(record), allow_nan=False, indent=indent) + "\n"
 
 
 def _finite(value: Any) -> Any:

@@ -9,10 +9,9 @@ from itertools import pairwise
 import pytest
 
 from pyharness.edition import api, decks, documents, figures, parallel_decks, site
-from pyharness.edition.ledger import judgements
 from pyharness.edition.markdown import document, slug
 from pyharness.history.ablation import entries
-from pyharness.history.claims.ledger import claims
+from pyharness.history.claims.ledger import claims, judgements
 from pyharness.history.claims.report import kinds_table
 from pyharness.history.claims.sentences import sentences
 from pyharness.history.origins import disagreements
@@ -306,7 +305,7 @@ def test_disagreements_are_linked_from_operations_and_entries(
 
 
 def test_verdicts_are_counted_for_both() -> None:
-    from pyharness.edition.ledger import counts, judgements
+    from pyharness.edition.ledger import counts
 
     judged = [each for each in judgements() if each.claim["id"].startswith("v2-case-2")]
     found = counts(judged)

@@ -17,6 +17,7 @@ from pyharness.checks.port_protocol import request
 from pyharness.cli.main import main
 from pyharness.cli.output import check_tree
 from pyharness.dynamics.scene_reader import read_scene
+from pyharness.edition.crate import PACKAGE_MARK
 from pyharness.edition.report import MARK
 from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.sweep_file import read_sweep
@@ -109,6 +110,12 @@ def edition(folder: Path) -> Reader:
     return Reader(path, lambda: check_tree(str(folder), MARK, "--out"))
 
 
+def data_package(folder: Path) -> Reader:
+    path = folder / PACKAGE_MARK
+    path.write_text(json.dumps({"schema": SCHEMAS["data package"], "files": {"LICENSE": None}}))
+    return Reader(path, lambda: check_tree(str(folder), PACKAGE_MARK, "--data", "data package"))
+
+
 def port_request(folder: Path) -> Reader:
     path = folder / "request"
     path.write_bytes(request(case_scene(1), Listing.original("two-term")) + b"\n")
@@ -136,6 +143,7 @@ FILES: dict[str, Callable[[Path], Reader]] = {
     "vector file": vector_file,
     "golden record": golden_record,
     "edition": edition,
+    "data package": data_package,
     "port request": port_request,
 }
 

@@ -1,4 +1,4 @@
-"""The verb `edition`: write the edition of the three programs as a static web site."""
+"""The verb `edition`: write the edition as a static web site, or as a package of plain data."""
 
 import argparse
 
@@ -9,6 +9,8 @@ FORMATS = ("table", "json")
 OPTIONS = {
     "--out DIR": "Write the web pages to this folder, which is created if missing; the first "
     "page is index.html.",
+    "--data DIR": "Write the data of the edition, without web pages, to this folder: cards, "
+    "apparatus, verdicts, figures and printed pages as CSV, JSON, TEI and text.",
     "--docs DIR": "Folder of the documents from which the pages are made (default: the folder docs "
     "of the source checkout).",
     "--format F": "Output format of the list of written files: table (default) or json.",
@@ -17,17 +19,22 @@ EXAMPLE = "edition --out pages"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Make all pages of the project's web site, write them to a folder, and print a list of files.
+    """Write the project's web site, or its data package, to a folder, and print a list of files.
 
     Return exit status 0.
     """
+    if options.data is not None:
+        shared.refuse(options, "--data", ("out", "docs"))
+        return _write_package(options)
     from pyharness.cli.output import check_tree, write_tree
     from pyharness.edition.libraries import check_libraries
     from pyharness.edition.report import MARK, edition_report
     from pyharness.views.render import render
 
     if options.out is None:
-        raise InputError("edition: give --out DIR, a folder for the pages")
+        raise InputError(
+            "edition: give --out DIR, a folder for the pages, or --data DIR, a folder for the data"
+        )
     check_tree(options.out, MARK, "--out")
     check_libraries()
     from pyharness.edition.documents import documents_folder
@@ -38,4 +45,20 @@ def run(options: argparse.Namespace) -> int:
     shared.end_progress()
     write_tree(options.out, content, "--out")
     shared.emit(render(edition_report(options.out, content), options.format or "table"), None)
+    return 0
+
+
+def _write_package(options: argparse.Namespace) -> int:
+    """Write the data package to the folder of --data, print a list of files, and return 0."""
+    from pyharness.cli.output import check_tree, write_tree
+    from pyharness.edition.crate import PACKAGE_MARK
+    from pyharness.edition.data_package import data_package
+    from pyharness.edition.report import package_report
+    from pyharness.views.render import render
+
+    check_tree(options.data, PACKAGE_MARK, "--data", "data package")
+    content = data_package(shared.progress)
+    shared.end_progress()
+    write_tree(options.data, content, "--data")
+    shared.emit(render(package_report(options.data, content), options.format or "table"), None)
     return 0

@@ -110,6 +110,14 @@ def judgement(identity: str, word: str = BINARY64) -> Judgement:
     return judge(claim(identity), word)
 
 
+def judgements() -> list[Judgement]:
+    """Return our verdicts on every claim of the thesis, for the original and corrected programs.
+
+    A `Judgement` has the verdicts on one claim.
+    """
+    return [judgement(entry["id"]) for entry in claims()]
+
+
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
     """Return the verdict on one claim, for the programs that the laboratory runs.
 

@@ -1,0 +1,148 @@
+"""The description of the data package by RO-Crate 1.1, a standard for research data."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from pyharness.edition.citation import (
+    codemeta,
+    data_description,
+    data_name,
+    release_date,
+    thesis_record,
+)
+from pyharness.history.identifiers import content_identifier, data_identifier
+from pyharness.history.text_digest import text_digest
+
+PACKAGE_MARK = "data-package.json"
+"""The file that marks a folder as a data package; it lists the files of the package."""
+CRATE = "ro-crate-metadata.json"
+MANIFEST = "manifest-sha256.txt"
+
+
+class Part(NamedTuple):
+    """A file of the data package, and its description.
+
+    `path` is the path of the file in the package. `title` and `description` say what the file
+    contains, and `media_type` is its format, as in ``text/csv``. `content` is empty for the files
+    that describe the other files.
+    """
+
+    path: str
+    title: str
+    description: str
+    media_type: str
+    content: bytes = b""
+
+
+KEPT = (
+    Part(
+        CRATE, "Description of the package, in the format RO-Crate 1.1", "", "application/ld+json"
+    ),
+    Part(
+        PACKAGE_MARK, "Software Heritage identifiers of the files of the package", "",
+        "application/json",
+    ),
+    Part(MANIFEST, "SHA-256 checksums of the files of the package", "", "text/plain"),
+)  # fmt: skip
+"""The files of the package that describe its other files."""
+
+
+def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
+    """Return the description of the data package by RO-Crate 1.1, as a dictionary for JSON.
+
+    `parts` are the files of the package, without the files `KEPT`. RO-Crate requires that each
+    entity is an item of one list, to which other items refer by its identifier.
+    """
+    described, thesis = codemeta(), thesis_record()
+    files = [
+        *(
+            {
+                "@id": each.path,
+                "@type": "File",
+                "name": each.title,
+                "description": each.description,
+                "encodingFormat": each.media_type,
+                "contentSize": str(len(each.content)),
+                "identifier": content_identifier(each.content),
+            }
+            for each in parts
+        ),
+        *(
+            {
+                "@id": each.path,
+                "@type": "File",
+                "name": each.title,
+                "encodingFormat": each.media_type,
+            }
+            for each in KEPT
+            if each.path != CRATE
+        ),
+    ]
+    people = [
+        *({"@id": f"#author-{number}", **each}
+          for number, each in enumerate(described["author"], 1)),
+        *({"@id": f"#thesis-author-{number}", **each, "name": f"{each['givenName']} "
+           f"{each['familyName']}"}
+          for number, each in enumerate(thesis["author"], 1)),
+    ]  # fmt: skip
+    licence = described["license"]
+    root = {
+        "@id": "./",
+        "@type": "Dataset",
+        "name": data_name(),
+        "description": data_description(),
+        "version": described["version"],
+        "datePublished": release_date(),
+        "license": {"@id": licence},
+        "author": _references(people, "#author-"),
+        "publisher": _references(people, "#author-"),
+        "keywords": described["keywords"],
+        "citation": {"@id": "#thesis"},
+        "isBasedOn": {"@id": "#thesis"},
+        "identifier": [{"@id": "#text"}, {"@id": "#data"}],
+        "hasPart": [{"@id": each["@id"]} for each in files],
+    }
+    publishers = [
+        {"@id": f"#thesis-{name}", **thesis[name]} for name in ("sourceOrganization", "publisher")
+    ]
+    graph: list[dict[str, Any]] = [
+        {
+            "@id": CRATE,
+            "@type": "CreativeWork",
+            "about": {"@id": "./"},
+            "conformsTo": {"@id": "https://w3id.org/ro/crate/1.1"},
+        },
+        root,
+        *files,
+        *people,
+        *publishers,
+        {
+            "@id": "#thesis",
+            **thesis,
+            "author": _references(people, "#thesis-author-"),
+            "sourceOrganization": {"@id": "#thesis-sourceOrganization"},
+            "publisher": {"@id": "#thesis-publisher"},
+        },
+        {
+            "@id": licence,
+            "@type": "CreativeWork",
+            "name": "MIT License",
+            "description": "The licence of the edition; the file LICENSE has its text.",
+        },
+        _value("#text", "digest of the text", text_digest()),
+        _value("#data", "Software Heritage identifier of the edition's data", data_identifier()),
+    ]
+    return {"@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph}
+
+
+def _references(entities: Sequence[dict[str, Any]], prefix: str) -> Any:
+    """Return references to the entities whose identifiers begin with `prefix`.
+
+    The result is a list, or a single reference, because RO-Crate advises against lists of one item.
+    """
+    found = [{"@id": each["@id"]} for each in entities if each["@id"].startswith(prefix)]
+    return found[0] if len(found) == 1 else found
+
+
+def _value(identifier: str, name: str, value: str) -> dict[str, str]:
+    return {"@id": identifier, "@type": "PropertyValue", "name": name, "value": value}

@@ -1,0 +1,193 @@
+"""The edition as a package of plain data: cards, apparatus, verdicts, figures and printed pages.
+
+The package is an RO-Crate (version 1.1), a folder that describes its files in one JSON file. It
+depends neither on the time nor on the machine, so that two runs write the same bytes.
+"""
+
+from collections.abc import Iterator, Mapping
+from hashlib import sha256
+from typing import Any
+
+from pyharness.edition.citation import bibtex, codemeta, data_description, data_name
+from pyharness.edition.crate import CRATE, KEPT, MANIFEST, PACKAGE_MARK, Part, crate_record
+from pyharness.history.ablation import entries
+from pyharness.history.apparatus_report import apparatus_report
+from pyharness.history.claims.ledger import judgements
+from pyharness.history.claims.report import claims_report
+from pyharness.history.figures import FigurePlan, curve_numbers, findings
+from pyharness.history.identifiers import (
+    card_identifier,
+    content_identifier,
+    data_identifier,
+    source_files,
+)
+from pyharness.history.tei import tei_document
+from pyharness.history.text_digest import text_digest
+from pyharness.model.facts import facts, shipped
+from pyharness.model.listing import PROGRAMS, Listing
+from pyharness.model.progress import Progress, no_progress
+from pyharness.model.report import numbers
+from pyharness.model.scene_file import case_scene
+from pyharness.model.schema import SCHEMAS
+from pyharness.original.cards import deck
+from pyharness.original.printer import page
+from pyharness.original.programs import run_program
+from pyharness.views.csv import csv_text
+from pyharness.views.json import json_text
+from pyharness.views.json import write as json_of
+
+_CSV, _JSON, _TEXT = "text/csv", "application/json", "text/plain"
+_COLUMNS = "card kind text scan entries port twin swhid"
+# The arithmetics of the pages: those of the machine's two ways to compile a program.
+_WORDS = ("cdc48", "cdc48-rounded")
+
+
+def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
+    """Compute the edition's data, and return all files of the data package.
+
+    The result maps the path of each file to its content. `progress` is called before each of four
+    parts of the work. Its arguments are the number of completed parts, the number of all parts, and
+    the name of the part.
+    """
+    parts = [*_parts(progress)]
+    parts.append(_readme(parts))
+    content = {each.path: each.content for each in parts}
+    content[CRATE] = _indented(crate_record(parts))
+    listed = {path: content_identifier(each) for path, each in content.items()}
+    mark = {
+        "schema": SCHEMAS["data package"],
+        "version": codemeta()["version"],
+        "text": text_digest(),
+        "data": data_identifier(),
+        # The manifest has the checksum of this file, so that its own identifier is not known here.
+        "files": {**listed, MANIFEST: None},
+    }
+    content[PACKAGE_MARK] = _indented(mark)
+    content[MANIFEST] = _manifest(content)
+    return dict(sorted(content.items()))
+
+
+def _parts(progress: Progress) -> Iterator[Part]:
+    progress(0, 4, "cards")
+    for program in PROGRAMS:
+        yield Part(
+            f"cards/{program}.csv", f"Cards of the {program} program",
+            "A row for each card. card: its number. kind: comment, executable or specification. "
+            "text: columns 1 to 72. scan: its line in the scan without blanks, empty if the scan "
+            "lacks the card. entries: the entries of the apparatus that name the card. port, twin: "
+            "the corresponding lines in our Fortran and Python versions. swhid: the line of the "
+            "card in the data of the edition, as a Software Heritage identifier.",
+            _CSV, _cards(program),
+        )  # fmt: skip
+    yield Part(
+        "edition.xml", "The edition in TEI P5",
+        "All cards with the characters of the scan beside ours, and the critical apparatus.",
+        "application/tei+xml", tei_document(),
+    )  # fmt: skip
+    yield Part(
+        "apparatus.json", "The critical apparatus",
+        "The defects, doubtful readings, conjectures and other entries, each with its cards and "
+        "its evidence; the output of `pyharness defects --format json`.",
+        _JSON, json_of(apparatus_report(entries())).encode(),
+    )  # fmt: skip
+    rows = [[path, content_identifier(each)] for path, each in source_files().items()]
+    yield Part(
+        "sources.csv", "Software Heritage identifiers of the sources",
+        "A row for each file of the edition's data and of the Fortran port, with its path in the "
+        "source repository.",
+        _CSV, csv_text(numbers("path swhid", rows)).encode(),
+    )  # fmt: skip
+    progress(1, 4, "claims")
+    yield Part(
+        "claims.json", "The claims of the thesis, and our verdicts",
+        "Verdicts for the programs as printed and as corrected, with the numbers behind them and "
+        "the assumptions; the output of `pyharness claims --format json`.",
+        _JSON, json_of(claims_report(judgements())).encode(),
+    )  # fmt: skip
+    progress(2, 4, "figures")
+    for each in findings():
+        yield Part(
+            f"figures/{each.plan.stem}.csv", f"{each.plan.title}, {each.plan.set} programs",
+            f"{_caption(each.plan)} time and recorded_time in s, omega in rad/s. recorded_time is "
+            "the variable TIME of the program.",
+            _CSV, csv_text(curve_numbers(each)).encode(),
+        )  # fmt: skip
+    progress(3, 4, "pages")
+    for program, case in facts("cases")["published"].items():
+        for word in _WORDS:
+            yield Part(
+                f"machine/{program}-case-{case}-{word}.txt",
+                f"Page that the {program} program prints in Case {case}, arithmetic {word}",
+                "The page of the deck as printed, computed by our programs. It is a prediction "
+                "for an emulated CDC CYBER computer.",
+                _TEXT, _page(program, case, word),
+            )  # fmt: skip
+    yield Part(
+        "citation.bib", "Citation of the edition and of the thesis", "BibTeX.",
+        "application/x-bibtex", bibtex().encode(),
+    )  # fmt: skip
+    for path, title, media_type in (
+        ("CITATION.cff", "Citation of the software, in the Citation File Format", "text/yaml"),
+        ("codemeta.json", "Description of the software, in the format CodeMeta", "text/json"),
+        ("LICENSE", "The licence of the edition", _TEXT),
+    ):
+        content = shipped(path).read_bytes()
+        yield Part(path, title, f"The file {path} of the source repository.", media_type, content)
+
+
+def _cards(program: str) -> bytes:
+    """Return the cards of a program as CSV, in the order of their numbers."""
+    found = deck(program)
+    rows = [
+        [
+            card.number, found.statement_kind(card), card.text.rstrip(), card.scan,
+            " ".join(card.entries),
+            *(" ".join(f"{place.file}:{place.line}" for place in places.get(card.number, ()))
+              for places in (found.port, found.twin)),
+            card_identifier(card),
+        ]
+        for card in found.cards.values()
+    ]  # fmt: skip
+    return csv_text(numbers(_COLUMNS, rows)).encode()
+
+
+def _caption(plan: FigurePlan) -> str:
+    return plan.caption if plan.caption.endswith(".") else f"{plan.caption}."
+
+
+def _page(program: str, case: int, word: str) -> bytes:
+    scene = case_scene(case)
+    run = run_program(scene, Listing.original(program), "python", word=word)
+    return page(scene, program, run).encode()
+
+
+def _readme(parts: list[Part]) -> Part:
+    """Return the file of the package that people read first, which lists all other files."""
+    described = codemeta()
+    rows = [
+        *((each.path, each.title) for each in parts),
+        *((each.path, each.title) for each in KEPT),
+    ]
+    lines = [
+        f"# {data_name()}", "", data_description(), "",
+        f"Version {described['version']}, text {text_digest()}. Licence: {described['license']}. "
+        "`citation.bib` has the citation.", "",
+        "| file | content |", "| --- | --- |", *(f"| {path} | {title} |" for path, title in rows),
+        "", f"`{CRATE}` describes the columns of each table.", "",
+        f"Check the files with: `sha256sum -c {MANIFEST}`", "",
+    ]  # fmt: skip
+    return Part(
+        "README.md", "What the package contains", "A list of all files.", "text/markdown",
+        "\n".join(lines).encode(),
+    )  # fmt: skip
+
+
+def _manifest(content: Mapping[str, bytes]) -> bytes:
+    """Return the checksums of the files `content` in the form that `sha256sum -c` reads."""
+    lines = (f"{sha256(content[path]).hexdigest()}  {path}\n" for path in sorted(content))
+    return "".join(lines).encode()
+
+
+def _indented(record: dict[str, Any]) -> bytes:
+    """Return a dictionary as strict JSON, indented so that people can read it."""
+    return json_text(record, indent=2).encode()

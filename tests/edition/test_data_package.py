@@ -1,0 +1,237 @@
+"""The data package: complete, the same in every run, and enough to repeat results."""
+
+import csv
+import io
+import json
+import re
+import shutil
+import subprocess
+import sys
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pyharness.cli.main import main
+from pyharness.edition.crate import CRATE, KEPT, MANIFEST, PACKAGE_MARK
+from pyharness.edition.data_package import data_package
+from pyharness.edition.report import package_report
+from pyharness.history.ablation import entries
+from pyharness.history.claims.report import KINDS
+from pyharness.history.figures import plans
+from pyharness.history.identifiers import (
+    content_identifier,
+    data_identifier,
+    directory_identifier,
+    source_files,
+)
+from pyharness.history.tei import tei_document
+from pyharness.history.text_digest import text_digest
+from pyharness.model.listing import PROGRAMS
+from pyharness.views.render import render
+from tests.conftest import Printed
+from tests.test_packaging import ROOT
+
+Package = dict[str, bytes]
+
+
+@pytest.fixture(scope="module")
+def package() -> Package:
+    """Return the files of the data package by path."""
+    return data_package()
+
+
+def _json(package: Package, path: str) -> Any:
+    return json.loads(package[path])
+
+
+def _rows(package: Package, path: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(package[path].decode())))
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_deck_is_made_of_the_table_alone(
+    package: Package, program: str, printed: Printed
+) -> None:
+    rows = _rows(package, f"cards/{program}.csv")
+    lines = [f"{row['text']:72} {int(row['card']):7d}\n" for row in rows]
+    assert printed(f"deck --program {program}") == "".join(lines)
+
+
+def test_verdicts_are_counted_from_the_package_alone(package: Package, printed: Printed) -> None:
+    """The counts of the last table of `pyharness claims`, from `claims.json`."""
+    found = _json(package, "claims.json")["claims"]
+    table = printed("claims").partition("Number of verdicts by kind")[2].splitlines()
+    heads = ["yes", "in part", "no", "FALSE", "n/t", "?"]
+    verdicts = [
+        "reproduced", "reproduced in part", "not reproduced", "false", "not testable", "undecided",
+    ]  # fmt: skip
+    assert [*KINDS] == [kind for kind in KINDS if any(row.startswith(kind) for row in table)]
+    assert not {each[state] for each in found for state in ("original", "corrected")} - {*verdicts}
+    for kind in KINDS:
+        of_kind = [each for each in found if each["kind"] == kind]
+        told = []
+        for verdict in verdicts:
+            pair = [sum(each[state] == verdict for each in of_kind)
+                    for state in ("original", "corrected")]  # fmt: skip
+            told.append("-" if pair == [0, 0] else f"{pair[0]} / {pair[1]}")
+        assert len(told) == len(heads)
+        (row,) = (line for line in table if line.startswith(kind))
+        assert row.split() == " ".join([kind, str(len(of_kind)), *told]).split()
+
+
+def test_outputs_of_verbs_are_in_the_package(package: Package, printed: Printed) -> None:
+    assert package["claims.json"].decode() == printed("claims --format json")
+    assert package["apparatus.json"].decode() == printed("defects --format json")
+    assert package["edition.xml"] == tei_document()
+    assert len(_json(package, "apparatus.json")["entries"]) == len(entries())
+    for path in ("CITATION.cff", "codemeta.json", "LICENSE"):
+        assert package[path] == (ROOT / path).read_bytes()
+
+
+def test_figures_and_pages_are_those_of_the_documents(package: Package) -> None:
+    assert {f"figures/{each.stem}.csv" for each in plans()} == {
+        path for path in package if path.startswith("figures/")
+    }
+    for name in ("figure-07", "figure-09", "figure-11-corrected"):
+        stored = (ROOT / f"docs/figures/{name}.csv").read_bytes()
+        assert package[f"figures/{name}.csv"] == stored
+    machine = {f"machine/{file.name}": file for file in (ROOT / "docs/machine").iterdir()}
+    assert {*machine} == {path for path in package if path.startswith("machine/")}
+    for path, file in machine.items():
+        assert package[path] == file.read_bytes()
+
+
+def test_identifiers_are_those_of_the_files(package: Package) -> None:
+    mark = _json(package, PACKAGE_MARK)
+    assert (mark["text"], mark["data"]) == (text_digest(), data_identifier())
+    assert {*mark["files"]} == {*package} - {PACKAGE_MARK}
+    for path, identifier in mark["files"].items():
+        assert identifier == (None if path == MANIFEST else content_identifier(package[path]))
+    sources = {row["path"]: row["swhid"] for row in _rows(package, "sources.csv")}
+    assert sources == {path: content_identifier(each) for path, each in source_files().items()}
+    for program in PROGRAMS:
+        of_file = sources[f"pyharness/data/cards/{program}.toml"]
+        cards = _rows(package, f"cards/{program}.csv")
+        assert all(row["swhid"].startswith(f"{of_file};lines=") for row in cards)
+        assert len({row["swhid"] for row in cards}) == len(cards)
+    record = json.loads(render(package_report("there", package), "json"))
+    assert record["identifiers"]["package"] == directory_identifier(package)
+
+
+def test_manifest_has_the_checksums(package: Package, tmp_path: Path) -> None:
+    lines = [line.split("  ", 1) for line in package[MANIFEST].decode().splitlines()]
+    assert {path for _, path in lines} == {*package} - {MANIFEST}
+    for checksum, path in lines:
+        assert checksum == sha256(package[path]).hexdigest()
+    if shutil.which("sha256sum") is None:
+        return
+    for path, content in package.items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_bytes(content)
+    check = ["sha256sum", "-c", "--strict", "--quiet", MANIFEST]
+    assert subprocess.run(check, cwd=tmp_path, check=False).returncode == 0
+    (tmp_path / "claims.json").write_text("{}")
+    done = subprocess.run(check, cwd=tmp_path, capture_output=True, check=False)
+    assert done.returncode != 0
+
+
+def test_the_crate_describes_every_file(package: Package) -> None:
+    """The rules of RO-Crate 1.1 for the root, the files and the references."""
+    crate = _json(package, CRATE)
+    assert crate["@context"] == "https://w3id.org/ro/crate/1.1/context"
+    graph = {each["@id"]: each for each in crate["@graph"]}
+    assert len(graph) == len(crate["@graph"])
+    assert graph[CRATE]["conformsTo"] == {"@id": "https://w3id.org/ro/crate/1.1"}
+    assert graph[CRATE]["about"] == {"@id": "./"}
+    root = graph["./"]
+    assert root["@type"] == "Dataset"
+    assert re.fullmatch(r"\d{4}(-\d\d-\d\d)?", root["datePublished"])
+    assert all(root[name] for name in ("name", "description", "license", "author", "citation"))
+    parts = [each["@id"] for each in root["hasPart"]]
+    assert sorted(parts) == sorted({*package} - {CRATE})
+    for path in parts:
+        assert graph[path]["@type"] == "File"
+        assert graph[path]["name"]
+        if path not in {each.path for each in KEPT}:
+            assert graph[path]["contentSize"] == str(len(package[path]))
+            assert graph[path]["identifier"] == content_identifier(package[path])
+
+    def check(value: Any) -> None:
+        """Check that a value has no nested entity, and refers to entities of the list only."""
+        if isinstance(value, list):
+            for each in value:
+                check(each)
+        elif isinstance(value, dict):
+            assert list(value) == ["@id"]
+            assert value["@id"] in graph or value["@id"].startswith("https://w3id.org/ro/crate/")
+
+    for each in graph.values():
+        for value in each.values():
+            check(value)
+
+
+def test_the_readme_lists_every_file(package: Package) -> None:
+    listed = re.findall(r"^\| (\S+\.\S+|LICENSE) \|", package["README.md"].decode(), re.MULTILINE)
+    assert sorted(listed) == sorted({*package} - {"README.md"})
+
+
+def test_nothing_depends_on_the_time_or_the_machine(package: Package) -> None:
+    """Another process with other settings writes the same bytes, and without optional packages."""
+    script = (
+        "import os, sys, time; from hashlib import sha256\n"
+        "for name in ('jinja2', 'markdown_it', 'markupsafe', 'matplotlib', 'latex2mathml'):\n"
+        "    sys.modules[name] = None\n"
+        "from pyharness.edition.data_package import data_package\n"
+        "for path, each in data_package().items(): print(sha256(each).hexdigest(), path)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        env={"PYTHONPATH": ":".join(filter(None, sys.path)), "TZ": "Asia/Tokyo",
+             "PYTHONHASHSEED": "7", "LC_ALL": "C"},
+        cwd="/", capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.splitlines() == [
+        f"{sha256(each).hexdigest()} {path}" for path, each in package.items()
+    ]
+    for path, content in package.items():
+        assert str(ROOT).encode() not in content, path
+        assert b"\r" not in content, path
+        content.decode()
+
+
+def test_the_command_writes_the_package(
+    package: Package, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.setattr("pyharness.edition.data_package.data_package", lambda progress: package)
+    folder = tmp_path / "package"
+    for _ in range(2):  # an earlier package is replaced
+        assert main(["edition", "--data", str(folder)]) == 0
+        told = capsys.readouterr().out
+        assert directory_identifier(package) in told
+        assert f"sha256sum -c {MANIFEST}" in told
+        files = [each for each in folder.rglob("*") if each.is_file()]
+        assert {each.relative_to(folder).as_posix(): each.read_bytes() for each in files} == package
+        assert [each.name for each in tmp_path.iterdir()] == ["package"]
+    (folder / "notes.txt").write_text("mine")
+    assert main(["edition", "--data", str(folder)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "holds 'notes.txt', which was not made by this verb; give a new name" in line
+    assert (folder / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["edition.json", "manifest-sha256.txt", "thesis.txt"])
+def test_a_folder_that_is_no_package_is_refused_before_any_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Neither the pages of the edition nor another kind of package is replaced."""
+    monkeypatch.setattr(
+        "pyharness.edition.data_package.data_package", lambda progress: pytest.fail("worked")
+    )
+    (tmp_path / name).write_text(json.dumps({"schema": 1, "files": {}}))
+    assert main(["edition", "--data", str(tmp_path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"holds '{name}', which was not made by this verb" in line
+    assert [each.name for each in tmp_path.iterdir()] == [name]

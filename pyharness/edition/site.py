@@ -26,11 +26,13 @@ from pyharness.edition import (
     story,
 )
 from pyharness.edition.bundle import bundle
+from pyharness.edition.citation import bibtex, linked_data
 from pyharness.edition.markdown import inline
 from pyharness.edition.report import MARK, listed
 from pyharness.history.claims.ledger import judgements
 from pyharness.history.claims.report import written
 from pyharness.history.claims.stories import prose
+from pyharness.history.identifiers import DATA, data_identifier
 from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import text_digest
 from pyharness.history.timeline import timeline
@@ -141,7 +143,11 @@ def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -
         "timeline": timeline(),
     }  # fmt: skip
     yield Page("index.html", "Story", "index.html", context)
-    yield Page("about.html", "About this edition", "about.html", context)
+    cited = {
+        "bibtex": bibtex(), "linked_data": linked_data(), "data_identifier": data_identifier(),
+        "data_folder": DATA,
+    }  # fmt: skip
+    yield Page("about.html", "About this edition", "about.html", {**context, **cited})
     progress(2, 5, "listing")
     yield from _listing()
     yield Page("laboratory.html", "Laboratory", "laboratory.html", laboratory.context())
@@ -268,6 +274,7 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
     content["assets/story-data.js"] = script("storyData", story.context()["data"])
     content["assets/laboratory.js"] = bundle(web / "laboratory" / "laboratory.js").encode()
     content["assets/laboratory-data.js"] = script("laboratoryData", laboratory.context()["data"])
+    content["assets/about.js"] = bundle(web / "about" / "about.js").encode()
     content["assets/body.js"] = bundle(web / "body" / "body.js").encode()
     content["assets/body-data.js"] = script("bodyData", body.data())
     content |= {f"figures/{name}": file for name, file in body.files().items()}

@@ -1,5 +1,6 @@
 """The data package: complete, the same in every run, and enough to repeat results."""
 
+import contextlib
 import csv
 import io
 import json
@@ -8,10 +9,11 @@ import shutil
 import subprocess
 import sys
 from hashlib import sha256
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from pyharness.cli.main import main
 from pyharness.edition.crate import CRATE, KEPT, MANIFEST, PACKAGE_MARK
@@ -31,6 +33,7 @@ from pyharness.history.text_digest import text_digest
 from pyharness.model.listing import PROGRAMS
 from pyharness.views.render import render
 from tests.conftest import Printed
+from tests.json_reference import schema_of
 from tests.test_packaging import ROOT
 
 Package = dict[str, bytes]
@@ -117,6 +120,7 @@ def test_identifiers_are_those_of_the_files(package: Package) -> None:
         assert all(row["swhid"].startswith(f"{of_file};lines=") for row in cards)
         assert len({row["swhid"] for row in cards}) == len(cards)
     record = json.loads(render(package_report("there", package), "json"))
+    Draft202012Validator(schema_of("edition")).validate(record)
     assert record["identifiers"]["package"] == directory_identifier(package)
 
 
@@ -220,6 +224,38 @@ def test_the_command_writes_the_package(
     (line,) = capsys.readouterr().err.splitlines()
     assert "holds 'notes.txt', which was not made by this verb; give a new name" in line
     assert (folder / "notes.txt").read_text() == "mine"
+
+
+def test_the_examples_of_the_guide_run(
+    package: Package, tmp_path: Path, printed: Printed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("pandas")
+    text = (ROOT / "docs/how-to/data-package.md").read_text()
+    blocks = re.findall(r"```py\n(.*?)```", text, re.DOTALL)
+    for path in ("cards/two-term.csv", "claims.json"):
+        file = tmp_path / "package" / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(package[path])
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    told = []
+    for block in blocks:
+        buffer = io.StringIO()
+        with contextlib.redirect_stdout(buffer):
+            exec(block, names)
+        told.append(buffer.getvalue())
+    listed, counted, made = told
+    assert "entries" in listed.splitlines()[0]
+    (row,) = (each for each in printed("claims").splitlines() if re.match(r"result +\d", each))
+    reproduced = row.split()[2]
+    assert re.search(rf"^reproduced +{reproduced}$", counted, re.MULTILINE)
+    assert made == printed("deck --program two-term")
+    # The table of the guide names every file.
+    table = re.findall(r"^\| (`.*?`) \|", text, re.MULTILINE)
+    patterns = [each.strip("`") for row in table for each in row.split(", ")]
+    patterns = [each.replace("PROGRAM", "*") for each in patterns] + ["README.md", CRATE]
+    for path in package:
+        assert any(PurePath(path).match(each) for each in patterns), path
 
 
 @pytest.mark.parametrize("name", ["edition.json", "manifest-sha256.txt", "thesis.txt"])

@@ -1,4 +1,4 @@
-// The buttons that copy the command or the address of the experiment.
+// Buttons that copy a text of the page, such as a command, or the address of a link.
 
 const element = (id) => document.getElementById(id);
 

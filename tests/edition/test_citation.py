@@ -1,0 +1,72 @@
+"""The citation: BibTeX and linked data of the page about the edition."""
+
+import json
+import re
+
+import pytest
+
+from pyharness.edition import citation
+from pyharness.edition.citation import bibtex, codemeta, linked_data, release_date
+from pyharness.history.identifiers import DATA, data_identifier
+from pyharness.history.text_digest import text_digest
+from pyharness.model.facts import facts
+from tests.edition.pages import pages
+
+
+def _fields(entry: str) -> dict[str, str]:
+    return dict(re.findall(r"^  (\w+) = \{(.*)\},$", entry, re.MULTILINE))
+
+
+def test_bibtex_cites_the_edition_and_the_thesis() -> None:
+    edition, thesis = bibtex().split("\n\n")
+    assert edition.startswith(f"@misc{{pyharness-{codemeta()['version']},\n")
+    assert thesis.startswith("@mastersthesis{jacobs-1982,\n")
+    for entry in (edition, thesis):
+        assert entry.count("{") == entry.count("}")
+        assert not set(entry) & set("&%$#_~^\\")  # which BibTeX would not take as they are
+        assert entry.isascii()
+    found = _fields(edition)
+    assert found["version"] == codemeta()["version"]
+    assert found["year"] == release_date()[:4]
+    assert text_digest() in found["note"]
+    assert data_identifier() in found["note"]
+    assert _fields(thesis)["author"] == "Jacobs, Richard"
+    assert facts("account")["work"]["author"] == "Richard Jacobs"
+    assert (_fields(thesis)["year"], _fields(thesis)["month"]) == ("1982", "3")
+    assert facts("account")["work"]["published"] == "March 1982"
+
+
+def test_the_date_is_that_of_the_publication_if_there_is_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert release_date() == str(codemeta()["copyrightYear"])
+    published = {**codemeta(), "datePublished": "2031-05-06"}
+    monkeypatch.setattr(citation, "codemeta", lambda: published)
+    assert release_date() == "2031-05-06"
+    assert "year = {2031}" in bibtex()
+    assert linked_data()["@graph"][0]["datePublished"] == "2031-05-06"
+
+
+def test_the_page_has_the_citation_and_the_linked_data(built_site: dict[str, bytes]) -> None:
+    page = pages(built_site)["about.html"]
+    text = "".join(page.text)
+    assert bibtex() in text
+    assert data_identifier() in text
+    assert DATA in text
+    html = built_site["about.html"].decode()
+    (data,) = re.findall(r'<script type="application/ld\+json">(.*?)</script>', html, re.DOTALL)
+    assert json.loads(data) == linked_data()
+    software, dataset = linked_data()["@graph"]
+    assert software["@type"] == "SoftwareSourceCode"
+    assert dataset["@type"] == "Dataset"
+    assert 50 <= len(dataset["description"]) <= 5000  # as search engines for data sets require
+    assert data_identifier() in dataset["identifier"]
+    for each in (software, dataset):
+        assert each["license"] == "https://spdx.org/licenses/MIT"
+        assert each["version"] == codemeta()["version"]
+    # The button needs no network: it copies the text of an element of the page.
+    (button,) = (each for tag, each in page.elements if tag == "button" and "data-of" in each)
+    assert str(button["class"]).split() == ["button", "copy"]
+    assert button["data-of"] in page.anchors
+    assert "copied" in page.anchors
+    assert b"navigator.clipboard.writeText" in built_site["assets/about.js"]

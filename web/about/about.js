@@ -1,0 +1,5 @@
+// The button that copies the citation.
+
+import { startCopying } from "../laboratory/copying.js";
+
+startCopying();

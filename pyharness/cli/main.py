@@ -36,7 +36,7 @@ _GROUPS = {
         "verify": "check all programs and methods against each other and against the truth",
         "stress": "test the numerical stability of every method against derived bounds",
         "bench": "measure run time against error of our and of third-party integrators",
-        "edition": "write the edition as a static web site with a laboratory, or as a data package",
+        "edition": "write the edition as a web site or as a data package",
     },
 }
 VERBS = {verb: about for group in _GROUPS.values() for verb, about in group.items()}

@@ -1,7 +1,7 @@
 """The edition as a package of plain data: cards, apparatus, verdicts, figures and printed pages.
 
-The package is an RO-Crate (version 1.1), a folder that describes its files in one JSON file. It
-depends neither on the time nor on the machine, so that two runs write the same bytes.
+The package is an RO-Crate (version 1.1), a folder that describes its files in one JSON file. The
+files have neither times nor paths of the machine, so that two runs write the same bytes.
 """
 
 from collections.abc import Iterator, Mapping

@@ -15,7 +15,7 @@ from pyharness.edition import ledger, story
 from pyharness.edition.decks import TITLES
 from pyharness.history.ablation import CaseEffects, effects_of, entries, entry
 from pyharness.history.cards_report import scan_report
-from pyharness.history.claims.ledger import judgement
+from pyharness.history.claims.ledger import judgement, judgements
 from pyharness.history.claims.report import kinds_table
 from pyharness.history.claims.stories import prose
 from pyharness.history.limits import limit
@@ -98,7 +98,7 @@ def values() -> dict[str, Any]:
             "cases": _cases_table(),
             "faults": _faults_table(),
             "errors": _errors_table(),
-            "verdicts": _markdown(kinds_table(ledger.judgements())),
+            "verdicts": _markdown(kinds_table(judgements())),
         },
     }  # fmt: skip
 
@@ -116,7 +116,7 @@ def _number(claim: str, programs: str, pattern: str, form: str = "max", digits: 
     if not fitting:
         raise ValueError(f"claim {claim} has no number {pattern!r}")
     if form == "of":
-        return next(iter(fitting)).split()[1]
+        return str(next(iter(fitting)).split()[1])
     x = min(fitting.values()) if form == "min" else max(fitting.values())
     return f"{prose(100.0 * x, 2)} %" if form == "%" else prose(x, digits)
 
@@ -153,7 +153,7 @@ def _faults() -> dict[str, Any]:
 
 
 def _claims() -> dict[str, str]:
-    judged = ledger.judgements()
+    judged = judgements()
     results = [each for each in judged if each.claim["kind"] == "result"]
     first, second = ledger.counts(judged)["reproduced"]
     resting = [each for each in results if all(other.survives for other in each.survivals)]

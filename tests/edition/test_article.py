@@ -13,9 +13,8 @@ from jinja2 import Environment, UndefinedError, nodes
 from docs.article.build import ARTICLE, HERE, METADATA, abstract_of, built, rendered, wrapped
 from docs.article.values import values
 from pyharness.cli.main import VERBS
-from pyharness.edition.ledger import judgements
 from pyharness.history.ablation import entries
-from pyharness.history.claims.ledger import judgement
+from pyharness.history.claims.ledger import judgement, judgements
 
 ROOT = Path(__file__).parents[2]
 TEMPLATE = (HERE / f"{ARTICLE}.in").read_text()

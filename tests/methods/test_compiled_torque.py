@@ -194,7 +194,7 @@ def test_the_attitude_of_a_torque(library: Any) -> None:
 
 
 def test_an_attitude_that_is_used_late_is_nan(library: Any) -> None:
-    """What happens at time 0 does not show that the function uses the attitude."""
+    """At time 0 nothing shows that the function uses the attitude."""
     found = solve(replace(BRICK, torque=opaque(library.late)), [0.4, 1.0], "dop853", 1e-8)
     assert (found.ended, len(found.time)) == ("overflow", 1)
 

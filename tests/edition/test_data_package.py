@@ -2,12 +2,14 @@
 
 import contextlib
 import csv
+import importlib
 import io
 import json
 import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path, PurePath
 from typing import Any
@@ -205,11 +207,17 @@ def test_nothing_depends_on_the_time_or_on_settings(package: Package) -> None:
         content.decode()
 
 
+def _replace(monkeypatch: pytest.MonkeyPatch, made: Callable[..., Any]) -> None:
+    """Replace the function that makes the package, where the verb finds it."""
+    module = importlib.import_module("pyharness.edition.data_package")
+    monkeypatch.setattr(module, "data_package", made)
+
+
 def test_the_command_writes_the_package(
     package: Package, tmp_path: Path, capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    monkeypatch.setattr("pyharness.edition.data_package.data_package", lambda progress: package)
+    _replace(monkeypatch, lambda progress: package)
     folder = tmp_path / "package"
     for _ in range(2):  # an earlier package is replaced
         assert main(["edition", "--data", str(folder)]) == 0
@@ -263,9 +271,7 @@ def test_a_folder_that_is_no_package_is_refused_before_any_work(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     """Neither the pages of the edition nor another kind of package is replaced."""
-    monkeypatch.setattr(
-        "pyharness.edition.data_package.data_package", lambda progress: pytest.fail("worked")
-    )
+    _replace(monkeypatch, lambda progress: pytest.fail("worked"))
     (tmp_path / name).write_text(json.dumps({"schema": 1, "files": {}}))
     assert main(["edition", "--data", str(tmp_path)]) == 2
     (line,) = capsys.readouterr().err.splitlines()

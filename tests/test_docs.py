@@ -14,9 +14,8 @@ from docs.article import build as article
 from pyharness import read_scene
 from pyharness.cli import options
 from pyharness.cli.main import VERBS, main
-from pyharness.edition import origins, principles
+from pyharness.edition import origins, principles, timeline_page
 from pyharness.history import figures
-from pyharness.history.timeline import timeline_page
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.report import Report
 from pyharness.views import render as views
@@ -33,7 +32,7 @@ SCENES = ROOT / "docs/reference/scene-files.md"
 BUILT = (
     (origins.PAGE, origins.origins_page()),
     (principles.PAGE, principles.principles_page()),
-    ("explanation/timeline.md", timeline_page()),
+    (timeline_page.PAGE, timeline_page.timeline_page()),
 )
 
 

@@ -10,13 +10,14 @@ from collections.abc import Iterator
 from itertools import combinations
 from typing import Any, NamedTuple
 
+from pyharness.history.tei_header import CERTAINTY
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.original.cards import deck, numbers, tight
 from pyharness.original.deck_collation import Row, rows
 
-CERTAINTIES = ("certain", "probable", "conjecture", "undecidable")
-"""The degrees of certainty of an inference."""
+CERTAINTIES = tuple(CERTAINTY)
+"""The degrees of certainty of an inference, which are those of the apparatus."""
 
 
 class Disagreement(NamedTuple):

@@ -1,4 +1,4 @@
-"""The dates of the thesis, each with its source, and the page of the documents that shows them.
+"""The dates of the thesis, each with its source.
 
 The data are in `data/timeline.toml`. No entry has a date that its source does not support.
 """
@@ -13,10 +13,6 @@ CERTAINTIES = {
     "unknown": "no source dates the event",
 }
 """The degrees of certainty of a date, each with its meaning."""
-_INTRODUCTION = """\
-This page lists the events in the history of the thesis with their dates and sources. A date is here
-only if the text of the thesis supports it. The last column says how certain the date of an event
-is; the event itself is reported by its source:"""
 _MONTHS = (
     *("January", "February", "March", "April", "May", "June"),
     *("July", "August", "September", "October", "November", "December"),
@@ -92,30 +88,6 @@ def timeline() -> tuple[Event, ...]:
 def gaps() -> tuple[Gap, ...]:
     """Return the questions that the text of the thesis does not answer."""
     return tuple(Gap(**row) for row in facts("timeline")["gap"])
-
-
-def timeline_page() -> str:
-    """Return the text, in Markdown, of the document `docs/explanation/timeline.md`."""
-    lines = [
-        "# Timeline",
-        "",
-        _INTRODUCTION,
-        "",
-        *(f"- *{name}*: {meaning};" for name, meaning in CERTAINTIES.items()),
-    ]
-    lines[-1] = lines[-1].removesuffix(";") + "."
-    lines += [
-        "",
-        "| date | event | source in the thesis | certainty of the date |",
-        "|---|---|---|---|",
-    ]
-    for each in timeline():
-        sure = f"{each.certainty}: {each.why}" if each.why else each.certainty
-        lines.append(f"| {each.date} | {each.what} | {each.where} | {sure} |")
-    lines += ["", "## What the sources do not say", ""]
-    lines += ["| question | what we know |", "|---|---|"]
-    lines += [f"| {each.question} | {each.answer} |" for each in gaps()]
-    return "\n".join(lines) + "\n"
 
 
 def _in_words(month: str) -> str:

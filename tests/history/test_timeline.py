@@ -6,17 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from pyharness.history.timeline import CERTAINTIES, Event, gaps, timeline, timeline_page
+from pyharness.history.timeline import CERTAINTIES, Event, gaps, timeline
 from pyharness.model.facts import facts
 
 ROOT = Path(__file__).parents[2]
 THESIS = ROOT.parent / "shared" / "thesis" / "thesis.txt"
 EVENTS = {each.id: each for each in timeline()}
-
-
-def test_page_is_current() -> None:
-    """`python -m tests.test_docs` writes it anew."""
-    assert (ROOT / "docs/explanation/timeline.md").read_text() == timeline_page()
 
 
 @pytest.mark.parametrize("event", EVENTS.values(), ids=EVENTS)

@@ -248,6 +248,23 @@ def test_the_limits_of_work_and_phase(library: Any, monkeypatch: pytest.MonkeyPa
         solve(replace(BRICK, torque=opaque(library.turning)), 300.0, "dop853", 1e-3)
 
 
+def test_all_integrations_have_one_work_limit(
+    library: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits, counts = [], []
+
+    def watched(*given: Any) -> Any:
+        found = integrated(*given)
+        limits.append(given[-1])
+        counts.append(found.evaluations)
+        return found
+
+    monkeypatch.setattr(scipy_state, "integrated", watched)
+    solve(replace(BRICK, torque=opaque(library.damped)), 5.0, "dop853", 1e-9)
+    assert len(limits) > 2
+    assert (-np.diff(limits)).tolist() == counts[:-1]
+
+
 def test_ctrl_c_ends_an_integration(library: Any) -> None:
     scene = replace(BRICK, torque=opaque(library.turning))
     # A process in the background may ignore the signal of Ctrl-C itself.

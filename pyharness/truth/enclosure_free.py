@@ -123,9 +123,10 @@ def _on_ellipse(axis: int, a: list[Fraction], w: list[Fraction], t: Fraction) ->
 class _Orbit:
     """A motion that is not steady, with coefficients that are not 0.
 
-    The components of omega about three `axes` are `sizes` times cn(u), sn(u) and dn(u), where
-    u = `start` + `rate` t. By DLMF Table 22.13.1 they satisfy Euler's equations. The parameter is
-    m = k**2. On the separatrix m = 1, and cn and dn are sech, and sn is tanh.
+    The components of omega about three `axes` are `sizes` (rad/s) times cn(u), sn(u) and dn(u),
+    where u = `start` + `rate` t, with `rate` in 1/s. By DLMF Table 22.13.1 they satisfy Euler's
+    equations. The parameter is `m` = k**2, and `square` is the square of the size of dn. On the
+    separatrix m = 1; cn and dn are then sech, and sn is tanh.
     """
 
     def __init__(self, a: list[Fraction], w: list[Fraction]) -> None:

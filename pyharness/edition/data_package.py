@@ -21,17 +21,16 @@ from pyharness.history.identifiers import (
     data_identifier,
     source_files,
 )
+from pyharness.history.listing_output import our_page
 from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.report import numbers
-from pyharness.model.scene_file import case_scene
 from pyharness.model.schema import SCHEMAS
 from pyharness.original.cards import deck
-from pyharness.original.printer import page
-from pyharness.original.programs import run_program
+from pyharness.original.decks import card_steps
 from pyharness.views.csv import csv_text
 from pyharness.views.json import json_text
 from pyharness.views.json import write as json_of
@@ -120,7 +119,8 @@ def _parts(progress: Progress) -> Iterator[Part]:
                 f"Page that the {program} program prints in Case {case}, arithmetic {word}",
                 "The page of the deck as printed, computed by our programs. It is a prediction "
                 "for an emulated CDC CYBER computer.",
-                _TEXT, _page(program, case, word),
+                _TEXT,
+                our_page(Listing.original(program), case, card_steps(program), word).encode(),
             )  # fmt: skip
     yield Part(
         "citation.bib", "Citation of the edition and of the thesis", "BibTeX.",
@@ -153,12 +153,6 @@ def _cards(program: str) -> bytes:
 
 def _caption(plan: FigurePlan) -> str:
     return plan.caption if plan.caption.endswith(".") else f"{plan.caption}."
-
-
-def _page(program: str, case: int, word: str) -> bytes:
-    scene = case_scene(case)
-    run = run_program(scene, Listing.original(program), "python", word=word)
-    return page(scene, program, run).encode()
 
 
 def _readme(parts: list[Part]) -> Part:

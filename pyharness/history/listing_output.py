@@ -4,69 +4,32 @@ Our programs print their pages in each of several arithmetics. The digits that a
 real or emulated, therefore show in which arithmetic its program ran.
 """
 
-import re
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from itertools import zip_longest
+from dataclasses import asdict, replace
+from functools import cache
 
+from pyharness.history.printed_page import (
+    SHOWN,
+    Fit,
+    compare_rows,
+    compared_steps,
+    has_rows,
+    printed_numbers,
+    rows_of_form,
+    split_page,
+    verdict,
+)
 from pyharness.model.errors import InputError
-from pyharness.model.listing import Listing
+from pyharness.model.listing import Listing, names_of
 from pyharness.model.pipes import read_input
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.report import Column, Report, Section, Table, words
 from pyharness.model.scene_file import case_scene
+from pyharness.original.decks import card_steps
 from pyharness.original.printer import page
-from pyharness.original.programs import WORD_NAMES, run_program
+from pyharness.original.programs import BINARY64, WORD_NAMES, run_program
 
-# A number as FORMAT writes it: asterisks if it does not fit, R or I (CDC) if it is not finite.
-_FIELD = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)|\*+|[-+]?[RI]")
-_SHOWN = 5
 _LARGEST = 1 << 24  # largest size of a page's file, in bytes
-
-
-@dataclass(frozen=True)
-class Difference:
-    """A printed number that differs between a page from another machine and a page of our program.
-
-    `row` is the row of the number, and `place` its position within the row; both count from 1.
-    `theirs` and `ours` are the numbers as printed by the other machine and by our program.
-    """
-
-    row: int
-    place: int
-    theirs: str
-    ours: str
-
-
-@dataclass(frozen=True)
-class Fit:
-    """The comparison of a page from another machine with a page that our programs print.
-
-    Attributes
-    ----------
-    program, listing, word : str
-        The program of our page, the label of its listing (``original`` or ``corrected``), and the
-        name of the arithmetic in which it ran.
-    case : int
-        The number of the case of our page in Table 1.
-    fields : int
-        How many numbers are compared. A number is also counted if the other page has none at its
-        place.
-    differences : tuple of Difference
-        The numbers that the two pages print differently.
-    """
-
-    program: str
-    case: int
-    listing: str
-    word: str
-    fields: int
-    differences: tuple[Difference, ...]
-
-    @property
-    def is_whole(self) -> bool:
-        """Return whether the page of the other machine and our page print every number alike."""
-        return not self.differences
 
 
 def read_page(path: str) -> list[list[str]]:
@@ -77,8 +40,8 @@ def read_page(path: str) -> list[list[str]]:
     """
     where = f"--listing-output '{path}'"
     content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
-    found = _numbers(content.decode("ascii", "replace"))
-    if not any(len(line) >= 6 for line in found):
+    found = printed_numbers(content.decode("ascii", "replace"))
+    if not has_rows(found):
         raise InputError(
             f"{where}: it has no row of numbers; give a page as a program printed it to TAPE6"
         )
@@ -94,25 +57,28 @@ def fits(
     """Compare a page from another machine with those of our pages that have the same form.
 
     `lines` are the lines of numbers of the page, from `read_page`. Our pages are printed by the
-    `programs` in the `cases`, original and corrected, in every arithmetic that we emulate. Two
-    pages have the same form if their moments and torques (in the heading) and their numbers of
-    columns agree. Return the comparisons, sorted by the number of differences, the smallest first.
-    Raise InputError if none of our pages has the form of the page. `progress` is called before each
-    comparison.
+    `programs` in the `cases`, with the `listings_of` each program, in every arithmetic that we
+    emulate. Two pages have the same form if their moments and torques (in the heading) and their
+    numbers of columns agree. Our runs have as many steps as the text of the thesis says, or as the
+    cards say if the page has more rows. Return the comparisons, sorted by the number of
+    differences, the smallest first. Raise InputError if none of our pages has the form of the page.
+    `progress` is called before each comparison.
     """
     found: list[Fit] = []
-    every = len(programs) * len(cases) * 2 * len(WORD_NAMES)
+    listings = {program: listings_of(program) for program in programs}
+    every = len(cases) * len(WORD_NAMES) * sum(map(len, listings.values()))
     for program in programs:
         for case in cases:
-            head, width = _form(program, case)
-            theirs = [line for line in lines if len(line) == width]
-            begins = any(list(lines[at : at + len(head)]) == head for at in range(len(lines)))
-            if not (begins and theirs):
+            head, (row, *_) = split_page(_lines(Listing.original(program), case, 1))
+            theirs = rows_of_form(lines, head, len(row))
+            if not theirs:
                 continue
-            for listing in (Listing.original(program), Listing.corrected(program)):
+            steps = compared_steps(len(theirs), case_scene(case).steps, card_steps(program))
+            for name, listing in listings[program].items():
                 for word in WORD_NAMES:
                     progress(len(found), every, f"{program}, case {case}, {word}")
-                    found.append(_fit(theirs, listing, case, word))
+                    ours = split_page(_lines(listing, case, steps, word))[1]
+                    found.append(Fit(program, case, name, word, *compare_rows(theirs, ours)))
     if not found:
         raise InputError(
             f"--listing-output: no page of {', '.join(programs)} in case "
@@ -122,74 +88,57 @@ def fits(
     return sorted(found, key=lambda each: len(each.differences))
 
 
-def _form(program: str, case: int) -> tuple[list[list[str]], int]:
-    """Return the lines of numbers in the heading of our page, and how many numbers each row has.
+def listings_of(program: str) -> dict[str, Listing]:
+    """Return the listings of a program whose pages are compared, by name.
 
-    Our page is the one that the program `program` prints in the case `case`.
+    The names are ``original`` and ``corrected``, and ``original with`` and the name of a reading,
+    for each reading (an interpretation of a doubtful card) that we do not adopt.
     """
-    scene = replace(case_scene(case), steps=1)
-    *head, row = _numbers(
-        page(scene, program, run_program(scene, Listing.original(program), "python"))
-    )
-    return head, len(row)
+    readings = names_of("reading", program)
+    return {
+        "original": Listing.original(program),
+        "corrected": Listing.corrected(program),
+        **{f"original with {name}": Listing.original(program, [name]) for name in readings},
+    }
 
 
-def _fit(theirs: Sequence[Sequence[str]], listing: Listing, case: int, word: str) -> Fit:
-    scene = case_scene(case)
-    trajectory = run_program(scene, listing, "python", word=word)
-    ours = _numbers(page(scene, listing.program, trajectory))[-trajectory.steps :]
-    none: Sequence[str] = ()
-    places = [
-        (row, place, x, y)
-        for row, (a, b) in enumerate(zip_longest(theirs, ours, fillvalue=none), 1)
-        for place, (x, y) in enumerate(zip_longest(a, b, fillvalue="-"), 1)
-    ]
-    apart = tuple(Difference(*each) for each in places if each[2] != each[3])
-    return Fit(listing.program, case, listing.label, word, len(places), apart)
+@cache
+def our_page(listing: Listing, case: int, steps: int, word: str) -> str:
+    """Return the page that a listing prints in a case with `steps` steps, in the arithmetic `word`.
+
+    The page ends earlier if the run stops. It is computed once and cached.
+    """
+    scene = replace(case_scene(case), steps=steps)
+    return page(scene, listing.program, run_program(scene, listing, "python", word=word))
 
 
-def _numbers(text: str) -> list[list[str]]:
-    """Return the lines of `text` that contain only numbers, each as a list of its numbers."""
-    lines = [line.split() for line in text.splitlines()]
-    return [line for line in lines if line and all(map(_FIELD.fullmatch, line))]
+def _lines(listing: Listing, case: int, steps: int, word: str = BINARY64) -> list[list[str]]:
+    """Return the lines of our page that contain only numbers, each as a list of its numbers."""
+    return printed_numbers(our_page(listing, case, steps, word))
 
 
 def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
     """Return the report on which program, listing and arithmetic print the page in file `path`.
 
-    A listing is the original or the corrected form of a program. `found` has the comparisons of
+    A listing is a form of a program, one of `listings_of`. `found` has the comparisons of
     this page with the pages of our programs, the page with the fewest differences first. If every
     comparison has differences, the report shows the first differences from the first page.
     """
     best = found[0]
-    whole = [each for each in found if each.is_whole]
-    told = [
-        f"{path}: {'printed so by' if whole else 'by none; the nearest is'} {name_of(each)}"
-        for each in whole or [best]
-    ]
     rows = [
         [each.program, each.case, each.listing, each.word, each.fields, len(each.differences)]
         for each in found
     ]
-    text: list[Section] = [told, [Table(_TABLE, rows)]]
-    if not whole:
-        first = [list(asdict(each).values()) for each in best.differences[:_SHOWN]]
+    text: list[Section] = [verdict(path, found), [Table(_TABLE, rows)]]
+    if not best.is_whole:
+        first = [list(asdict(each).values()) for each in best.differences[:SHOWN]]
         text.append(["the first numbers that differ:", Table(_APART, first)])
     return Report(
         "verify",
         text,
-        record=lambda: {"page": path, "passed": bool(whole), "fits": [asdict(f) for f in found]},
+        record=lambda: {"page": path, "passed": best.is_whole, "fits": [asdict(f) for f in found]},
         data=Table(_TABLE, rows),
     )
-
-
-def name_of(fit: Fit) -> str:
-    """Return text that names our page, as in `two-term, case 2, original, in binary64`.
-
-    The text has the program, the case, the listing (original or corrected) and the arithmetic of
-    the page in a comparison.
-    """
-    return f"{fit.program}, case {fit.case}, {fit.listing}, in {fit.word}"
 
 
 _TABLE = (*words("program case listing word"), Column("numbers"), Column("differ"))

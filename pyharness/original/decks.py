@@ -111,6 +111,12 @@ def deck_text(
     return "".join(f"{cards[n]:72}{_MARK if n in marked else '':1}{n:7d}\n" for n in sorted(cards))
 
 
+def card_steps(program: str) -> int:
+    """Return the number of steps on the cards of a program, the upper limit of its DO statement."""
+    number = facts("cards/alterations")["case"][program]["steps"]
+    return int(deck(program).cards[number].text.split(",")[1])
+
+
 def corrected_cards(program: str) -> dict[int, str]:
     """Return the text of each card of the corrected program, by card number.
 

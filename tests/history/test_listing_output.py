@@ -6,8 +6,10 @@ import pytest
 
 from pyharness import InputError, case_scene, run_program
 from pyharness.cli.main import main
-from pyharness.history.listing_output import Difference, fits, read_page
+from pyharness.history.listing_output import fits, our_page, read_page
+from pyharness.history.printed_page import Difference, printed_numbers, split_page
 from pyharness.model.listing import Listing
+from pyharness.original.decks import card_steps
 from pyharness.original.printer import page
 
 MACHINE = Path(__file__).parents[2] / "docs" / "machine"
@@ -82,12 +84,34 @@ def test_moments_of_no_case_are_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.stem)
 def test_shipped_pages_are_what_is_printed(path: Path) -> None:
+    """The pages are those of the cards, with the steps of their DO statements."""
     program, _, rest = path.stem.partition("-case-")
     case, _, word = rest.partition("-")
-    scene = case_scene(int(case))
-    assert path.read_text() == page(
-        scene, program, run_program(scene, Listing.original(program), "python", word=word)
-    )
+    steps = card_steps(program)
+    text = path.read_text()
+    assert text == our_page(Listing.original(program), int(case), steps, word)
+    stopped = run_program(case_scene(int(case)), Listing.original(program)).stop
+    _, rows = split_page(printed_numbers(text))
+    assert len(rows) == (steps if stopped is None else stopped.step)
+
+
+@pytest.mark.parametrize("rows", [300, 250, 100])
+def test_page_of_the_cards_has_more_rows_than_the_text_says(tmp_path: Path, rows: int) -> None:
+    """The DO statement says 300 steps, and the text 100; a page of another length is not whole."""
+    assert card_steps("two-term") == 300
+    text = our_page(Listing.original("two-term"), 2, 300, "cdc48")
+    (tmp_path / "page").write_text("".join(text.splitlines(keepends=True)[: 4 + rows]))
+    best = fits(read_page(str(tmp_path / "page")), ["two-term"], [2])[0]
+    assert best.is_whole == (rows != 250)
+    assert best.fields == 8 * max(rows, 100 if rows == 100 else 300)
+
+
+def test_a_page_tells_its_reading(tmp_path: Path) -> None:
+    """A compiler that adds 1 to the DO variable prints another page of the Runge-Kutta program."""
+    text = our_page(Listing.original("runge-kutta", ["do-variable"]), 5, 100, "cdc48")
+    (tmp_path / "page").write_text(text)
+    found = fits(read_page(str(tmp_path / "page")), ["runge-kutta"], [5])
+    assert {each.listing for each in found if each.is_whole} == {"original with do-variable"}
 
 
 def test_command_exits_with_1_where_no_word_prints_it(

@@ -13,6 +13,7 @@ from typing import Any
 from pyharness.compare.comparison import Comparison, ProgramFinding, compare_programs
 from pyharness.edition import ledger, story
 from pyharness.edition.decks import TITLES
+from pyharness.edition.package_runs import FAULTS_CASE
 from pyharness.history.ablation import CaseEffects, effects_of, entries, entry
 from pyharness.history.cards_report import scan_report
 from pyharness.history.claims.ledger import judgement, judgements
@@ -33,8 +34,6 @@ from pyharness.original.word import WORDS
 from pyharness.truth import reference
 from pyharness.views import markdown
 
-# The case in which the table of the faults shows their effects; the cards give its initial omega.
-_FAULTS_CASE = 5
 _FINER = 10  # the step size of the thesis over that of its experiment with a small step
 
 
@@ -308,8 +307,8 @@ def _faults_table() -> str:
         of_program = [effects for effects in every if effects.program == program]
         rows.append(_effects_row("none", program, of_program, corrected=True))
     heads = (
-        "fault", "program", f"omega, Case {_FAULTS_CASE} (rad/s)",
-        f"velocity, Case {_FAULTS_CASE} (m/s)", "cases that stop",
+        "fault", "program", f"omega, Case {FAULTS_CASE} (rad/s)",
+        f"velocity, Case {FAULTS_CASE} (m/s)", "cases that stop",
     )  # fmt: skip
     return _table(heads, rows)
 
@@ -318,7 +317,7 @@ def _effects_row(
     fault: str, program: str, found: Sequence[CaseEffects], corrected: bool = False
 ) -> list[Any]:
     outcomes = {each.case: each.corrected if corrected else each.kept_alone for each in found}
-    shown = outcomes[_FAULTS_CASE]
+    shown = outcomes[FAULTS_CASE]
     stopped = sum(each.stop is not None for each in outcomes.values())
     can_stop = program == "runge-kutta"
     count = f"{stopped} of {len(outcomes)}" if can_stop else "-"

@@ -10,6 +10,7 @@ from typing import Any
 
 from pyharness.edition.citation import bibtex, codemeta, data_description, data_name
 from pyharness.edition.crate import CRATE, KEPT, MANIFEST, PACKAGE_MARK, Part, crate_record
+from pyharness.edition.package_runs import run_parts
 from pyharness.history.ablation import entries
 from pyharness.history.apparatus_report import apparatus_report
 from pyharness.history.claims.ledger import judgements
@@ -44,7 +45,7 @@ _WORDS = ("cdc48", "cdc48-rounded")
 def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     """Compute the edition's data, and return all files of the data package.
 
-    The result maps the path of each file to its content. `progress` is called before each of four
+    The result maps the path of each file to its content. `progress` is called before each of five
     parts of the work. Its arguments are the number of completed parts, the number of all parts, and
     the name of the part.
     """
@@ -67,7 +68,7 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
 
 
 def _parts(progress: Progress) -> Iterator[Part]:
-    progress(0, 4, "cards")
+    progress(0, 5, "cards")
     for program in PROGRAMS:
         yield Part(
             f"cards/{program}.csv", f"Cards of the {program} program",
@@ -96,14 +97,14 @@ def _parts(progress: Progress) -> Iterator[Part]:
         "source repository.",
         _CSV, csv_text(numbers("path swhid", rows)).encode(),
     )  # fmt: skip
-    progress(1, 4, "claims")
+    progress(1, 5, "claims")
     yield Part(
         "claims.json", "The claims of the thesis, and our verdicts",
         "Verdicts for the programs as printed and as corrected, with the numbers behind them and "
         "the assumptions; the output of `pyharness claims --format json`.",
         _JSON, json_of(claims_report(judgements())).encode(),
     )  # fmt: skip
-    progress(2, 4, "figures")
+    progress(2, 5, "figures")
     for each in findings():
         yield Part(
             f"figures/{each.plan.stem}.csv", f"{each.plan.title}, {each.plan.set} programs",
@@ -111,7 +112,9 @@ def _parts(progress: Progress) -> Iterator[Part]:
             "the variable TIME of the program.",
             _CSV, csv_text(curve_numbers(each)).encode(),
         )  # fmt: skip
-    progress(3, 4, "pages")
+    progress(3, 5, "runs")
+    yield from run_parts()
+    progress(4, 5, "pages")
     for program, case in facts("cases")["published"].items():
         for word in _WORDS:
             yield Part(

@@ -20,6 +20,7 @@ from jsonschema import Draft202012Validator
 from pyharness.cli.main import main
 from pyharness.edition.crate import CRATE, KEPT, MANIFEST, PACKAGE_MARK
 from pyharness.edition.data_package import data_package
+from pyharness.edition.decks import TITLES
 from pyharness.edition.report import package_report
 from pyharness.history.ablation import entries
 from pyharness.history.claims.report import KINDS
@@ -39,6 +40,9 @@ from tests.json_reference import schema_of
 from tests.test_packaging import ROOT
 
 Package = dict[str, bytes]
+GUIDE = ROOT / "docs/how-to/data-package.md"
+ARTICLE = ROOT / "docs/article/article.md"
+SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 
 
 @pytest.fixture(scope="module")
@@ -238,8 +242,8 @@ def test_the_examples_of_the_guide_run(
     package: Package, tmp_path: Path, printed: Printed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("pandas")
-    text = (ROOT / "docs/how-to/data-package.md").read_text()
-    blocks = re.findall(r"```py\n(.*?)```", text, re.DOTALL)
+    text = GUIDE.read_text()
+    blocks = _blocks("Read the tables")
     for path in ("cards/two-term.csv", "claims.json"):
         file = tmp_path / "package" / path
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -261,9 +265,86 @@ def test_the_examples_of_the_guide_run(
     # The table of the guide names every file.
     table = re.findall(r"^\| (`.*?`) \|", text, re.MULTILINE)
     patterns = [each.strip("`") for row in table for each in row.split(", ")]
-    patterns = [each.replace("PROGRAM", "*") for each in patterns] + ["README.md", CRATE]
+    patterns = [re.sub("PROGRAM|N(?=[.])", "*", each) for each in patterns] + ["README.md", CRATE]
     for path in package:
         assert any(PurePath(path).match(each) for each in patterns), path
+
+
+def _blocks(heading: str) -> list[str]:
+    """Return the blocks of Python in a section of the guide."""
+    (section,) = re.findall(
+        rf"^## {heading}\n(.*?)^## ", GUIDE.read_text(), re.DOTALL | re.MULTILINE
+    )
+    return re.findall(r"```py\n(.*?)```", section, re.DOTALL)
+
+
+def _in_the_article(letter: str) -> list[list[str]]:
+    """Return the cells of a table of the article, with its numbers as Python writes them."""
+    before = ARTICLE.read_text().partition(f"*Table {letter}.")[0].rstrip().split("\n\n")[-1]
+    rows = [line.strip("| ").split(" | ") for line in before.splitlines()[2:]]
+    names = {title: program for program, title in TITLES.items()}
+    return [[_plain(names.get(cell, cell)) for cell in row] for row in rows]
+
+
+def _plain(cell: str) -> str:
+    """Return a cell with every number in the shortest form of a float."""
+    cell = re.sub(r"\s\u00d7\s10(\S+)", lambda found: "e" + found[1].translate(SUPERSCRIPTS), cell)
+    number = r"(?<![\w.])\d+(\.\d+)?(e[-+]?\d+)?(?!\w)"
+    return re.sub(number, lambda found: repr(float(found[0])), cell.strip("`"))
+
+
+def _computed(package: Package, folder: Path) -> dict[str, list[list[str]]]:
+    """Return the tables that the code of the guide computes, by letter, from the package alone.
+
+    The code runs in a process with Python's standard library alone, in a folder with the package
+    alone.
+    """
+    for path, content in package.items():
+        (folder / "package" / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / "package" / path).write_bytes(content)
+    code = "".join(_blocks("Compute three tables of the article"))
+    code += "import sys\nassert not {'pyharness', 'numpy', 'pandas'} & {*sys.modules}\n"
+    # -S leaves site-packages out of the path, -I the settings of the user and PYTHONPATH.
+    done = subprocess.run(
+        [sys.executable, "-I", "-S", "-c", code],
+        cwd=folder, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    found: dict[str, list[list[str]]] = {}
+    for line in done.stdout.splitlines():
+        letter, *cells = line.split(" | ")
+        found.setdefault(letter, []).append([_plain(cell) for cell in cells])
+    return found
+
+
+def test_three_tables_of_the_article_follow_from_the_package_alone(
+    package: Package, tmp_path: Path
+) -> None:
+    found = _computed(package, tmp_path)
+    assert [len(rows) for rows in found.values()] == [14, 7, 5]
+    for letter, rows in found.items():
+        assert rows == _in_the_article(letter), letter
+
+
+@pytest.mark.parametrize(
+    ("letter", "path", "before", "after"),
+    [
+        ("B", "runs/runs.csv", "stage-base,100,complete,,", "stage-base,9,stopped,9,U1"),
+        ("B", "runs/case-5.csv", "e-kutta,stage-base,50,0.5,", "e-kutta,stage-base,50,0.5,1"),
+        ("C", "runs/case-3.csv", "reference,,50,0.5,", "reference,,50,0.5,9"),
+        ("C", "runs/runs.csv", "stopped,25,V2", "stopped,26,V2"),
+        ("D", "claims.json", '"original": "reproduced"', '"original": "undecided"'),
+    ],
+)  # fmt: skip
+def test_an_altered_number_changes_a_table(
+    package: Package, tmp_path: Path, letter: str, path: str, before: str, after: str
+) -> None:
+    """The comparison with the article can fail: a package with one changed number differs."""
+    text = package[path].decode()
+    assert before in text
+    altered = {**package, path: text.replace(before, after, 1).encode()}
+    found = _computed(altered, tmp_path)
+    differing = [each for each, rows in found.items() if rows != _in_the_article(each)]
+    assert differing == [letter]
 
 
 @pytest.mark.parametrize("name", ["edition.json", "manifest-sha256.txt", "thesis.txt"])

@@ -1,0 +1,102 @@
+"""The runs of the programs in the data package, from which a reader computes errors and stops.
+
+The tables of the article on errors (Table C) and on the effects of the faults (Table B) follow from
+these runs and the reference solutions, which are beside them.
+"""
+
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+from pyharness.edition.crate import Part
+from pyharness.history.ablation import case_truth
+from pyharness.model.facts import facts_folder
+from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
+from pyharness.model.report import numbers
+from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.model.trajectory import Trajectory
+from pyharness.original.programs import run_program
+from pyharness.views.csv import csv_text
+
+FAULTS_CASE = 5
+"""The case in which the effects of single faults are shown; the cards give its initial omega."""
+
+_ENDS = "case program listing steps ended stop_step stop_variable"
+_ROWS = "program listing step time omega1 omega2 omega3 velocity1 velocity2 velocity3"
+_CSV = "text/csv"
+_LISTING = (
+    "listing: original, corrected, or the name of a fault that is kept alone in the corrected "
+    "program."
+)
+
+
+def run_parts() -> Iterator[Part]:
+    """Yield the files of the data package on the runs: the cases, the ends, and the results."""
+    yield Part(
+        "cases.toml", "The cases of Table 1 of the thesis",
+        "Moments of inertia in kg m2, torque in N m, initial omega in rad/s, and the numbers that "
+        "all programs share; data of the edition.",
+        "application/toml", (facts_folder() / "cases.toml").read_bytes(),
+    )  # fmt: skip
+    yield Part(
+        "runs/runs.csv", "How the runs of the programs end",
+        f"A row for each run. {_LISTING} steps: the completed steps. ended: complete, stopped or "
+        "overflow. stop_step, stop_variable: where the stop test of the Runge-Kutta program ended "
+        "the run.",
+        _CSV, csv_text(numbers(_ENDS, [*_ends()])).encode(),
+    )  # fmt: skip
+    for case in case_numbers():
+        yield Part(
+            f"runs/case-{case}.csv", f"Results of the programs at every step, Case {case}",
+            f"A row for each step, first of the reference solution. {_LISTING} time in s, omega in "
+            "rad/s, velocity (translational) in m/s. Results of single faults are given for Case "
+            f"{FAULTS_CASE} alone.",
+            _CSV, csv_text(numbers(_ROWS, [*_rows(case)])).encode(),
+        )  # fmt: skip
+
+
+@cache
+def _listings() -> dict[tuple[str, str], Listing]:
+    """Return the listings that are run, by the name of the program and of the listing.
+
+    The listings with one fault are in the order of the apparatus.
+    """
+    found = {}
+    for program in PROGRAMS:
+        found[program, "original"] = Listing.original(program)
+        found[program, "corrected"] = Listing.corrected(program)
+    for name in names_of("defect"):
+        for program in PROGRAMS:
+            if name in names_of("defect", program):
+                found[program, name] = subset(program, "corrected", keep=[name])
+    return found
+
+
+@cache
+def _run(case: int, listing: Listing) -> Trajectory:
+    return run_program(case_scene(case), listing)
+
+
+def _ends() -> Iterator[list[Any]]:
+    """Yield a row for each run: how many steps it completed, and how it ended."""
+    for case in case_numbers():
+        for (program, name), listing in _listings().items():
+            run = _run(case, listing)
+            stop = [None, None] if run.stop is None else [run.stop.step, run.stop.variable]
+            yield [case, program, name, run.steps, run.ended, *stop]
+
+
+def _rows(case: int) -> Iterator[list[Any]]:
+    """Yield the rows of the reference solution and of the runs of a case."""
+    truth = case_truth(case)
+    yield from _of_curve("reference", "", truth)
+    for (program, name), listing in _listings().items():
+        if case == FAULTS_CASE or name in ("original", "corrected"):
+            yield from _of_curve(program, name, _run(case, listing))
+
+
+def _of_curve(program: str, listing: str, curve: Any) -> Iterator[list[Any]]:
+    """Yield a row for each step of a trajectory, or of a reference solution."""
+    states = zip(curve.time.tolist(), curve.omega.tolist(), curve.velocity.tolist(), strict=True)
+    for step, (time, omega, velocity) in enumerate(states, 1):
+        yield [program, listing, step, time, *omega, *velocity]

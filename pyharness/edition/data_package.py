@@ -1,4 +1,4 @@
-"""The edition as a package of plain data: cards, apparatus, verdicts, figures and printed pages.
+"""The edition as a package of plain data: cards, apparatus, verdicts, runs and printed pages.
 
 The package is an RO-Crate (version 1.1), a folder that describes its files in one JSON file. The
 files have neither times nor paths of the machine, so that two runs write the same bytes.
@@ -10,6 +10,7 @@ from typing import Any
 
 from pyharness.edition.citation import bibtex, codemeta, data_description, data_name
 from pyharness.edition.crate import CRATE, KEPT, MANIFEST, PACKAGE_MARK, Part, crate_record
+from pyharness.edition.machine_bundle import machine_parts
 from pyharness.edition.package_runs import run_parts
 from pyharness.history.ablation import entries
 from pyharness.history.apparatus_report import apparatus_report
@@ -22,24 +23,20 @@ from pyharness.history.identifiers import (
     data_identifier,
     source_files,
 )
-from pyharness.history.listing_output import our_page
 from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import text_digest
-from pyharness.model.facts import facts, shipped
-from pyharness.model.listing import PROGRAMS, Listing
+from pyharness.model.facts import shipped
+from pyharness.model.listing import PROGRAMS
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.report import numbers
 from pyharness.model.schema import SCHEMAS
 from pyharness.original.cards import deck
-from pyharness.original.decks import card_steps
 from pyharness.views.csv import csv_text
 from pyharness.views.json import json_text
 from pyharness.views.json import write as json_of
 
 _CSV, _JSON, _TEXT = "text/csv", "application/json", "text/plain"
 _COLUMNS = "card kind text scan entries port twin swhid"
-# The arithmetics of the pages: those of the machine's two ways to compile a program.
-_WORDS = ("cdc48", "cdc48-rounded")
 
 
 def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
@@ -115,16 +112,7 @@ def _parts(progress: Progress) -> Iterator[Part]:
     progress(3, 5, "runs")
     yield from run_parts()
     progress(4, 5, "pages")
-    for program, case in facts("cases")["published"].items():
-        for word in _WORDS:
-            yield Part(
-                f"machine/{program}-case-{case}-{word}.txt",
-                f"Page that the {program} program prints in Case {case}, arithmetic {word}",
-                "The page of the deck as printed, computed by our programs. It is a prediction "
-                "for an emulated CDC CYBER computer.",
-                _TEXT,
-                our_page(Listing.original(program), case, card_steps(program), word).encode(),
-            )  # fmt: skip
+    yield from machine_parts()
     yield Part(
         "citation.bib", "Citation of the edition and of the thesis", "BibTeX.",
         "application/x-bibtex", bibtex().encode(),

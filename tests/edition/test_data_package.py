@@ -21,6 +21,7 @@ from pyharness.cli.main import main
 from pyharness.edition.crate import CRATE, KEPT, MANIFEST, PACKAGE_MARK
 from pyharness.edition.data_package import data_package
 from pyharness.edition.decks import TITLES
+from pyharness.edition.machine_bundle import outcomes_table
 from pyharness.edition.report import package_report
 from pyharness.history.ablation import entries
 from pyharness.history.claims.report import KINDS
@@ -31,9 +32,14 @@ from pyharness.history.identifiers import (
     directory_identifier,
     source_files,
 )
+from pyharness.history.listing_output import fits, read_page
+from pyharness.history.printed_page import main as judge
+from pyharness.history.printed_page import stored_fits
 from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import text_digest
+from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
+from pyharness.original.programs import WORD_NAMES
 from pyharness.views.render import render
 from tests.conftest import Printed
 from tests.json_reference import schema_of
@@ -107,7 +113,7 @@ def test_figures_and_pages_are_those_of_the_documents(package: Package) -> None:
         stored = (ROOT / f"docs/figures/{name}.csv").read_bytes()
         assert package[f"figures/{name}.csv"] == stored
     machine = {f"machine/{file.name}": file for file in (ROOT / "docs/machine").iterdir()}
-    assert {*machine} == {path for path in package if path.startswith("machine/")}
+    assert len(machine) == 6
     for path, file in machine.items():
         assert package[path] == file.read_bytes()
 
@@ -209,6 +215,97 @@ def test_nothing_depends_on_the_time_or_on_settings(package: Package) -> None:
         assert str(ROOT).encode() not in content, path
         assert b"\r" not in content, path
         content.decode()
+
+
+def _judged(package: Package, folder: Path, text: str) -> subprocess.CompletedProcess[str]:
+    """Run the script of the package on a printed page, with Python's standard library alone."""
+    for path, content in package.items():
+        if path.startswith("machine/"):
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_bytes(content)
+    # As a printer prints it: with a banner, carriage control and a job log.
+    printed = "1JACOBS\n\n" + text.replace("\n", "  \n") + "\n 12.30.07.LGO.\n"
+    (folder / "printed.txt").write_text(printed)
+    return subprocess.run(
+        [sys.executable, "-I", "-S", "machine/judge.py", "printed.txt"],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("altered", [False, True])
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_the_script_judges_a_page_like_the_command(
+    package: Package, tmp_path: Path, program: str, altered: bool
+) -> None:
+    """The script and `verify` count the same numbers and differences, for every stored page."""
+    case = facts("cases")["published"][program]
+    text = package[f"machine/{program}-case-{case}-cdc48.txt"].decode()
+    if altered:
+        *lines, last = text.splitlines()
+        text = "\n".join([*lines, last.replace("10.0000", "10.0001").replace("9.0005", "9.0006")])
+    done = _judged(package, tmp_path, text)
+    lines_of_page = read_page(str(tmp_path / "printed.txt"))
+    stored = stored_fits(lines_of_page, tmp_path / "machine")
+    by_the_verb = fits(lines_of_page, PROGRAMS, [case])
+    assert {*stored} == {*by_the_verb}
+    assert [len(each.differences) for each in stored] == sorted(
+        len(each.differences) for each in by_the_verb
+    )
+    assert stored[0].is_whole != altered
+    assert done.returncode == int(altered), done.stderr
+    for each in stored:
+        assert f"{len(each.differences):6d} {each.fields:5d} {each.name}\n" in done.stdout
+    assert ("by none; the nearest is" in done.stdout) == altered
+    assert (f"printed so by {program}, case {case}, original, in cdc48\n" in done.stdout) != altered
+
+
+@pytest.mark.parametrize("text", ["", "1.0 2.0\n", "1 2 3 4 5 6 7 8\n"])
+def test_the_script_refuses_what_is_no_page(package: Package, tmp_path: Path, text: str) -> None:
+    done = _judged(package, tmp_path, text)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "it has no page with the moments, torques and columns" in done.stderr
+
+
+def test_the_script_tells_a_wrong_call(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert judge([], tmp_path) == 2
+    assert "usage: python judge.py FILE" in capsys.readouterr().err
+    assert judge([str(tmp_path / "missing.txt")], tmp_path) == 2
+    assert "missing.txt: it can't be read (No such file" in capsys.readouterr().err
+
+
+def test_jobs_are_those_of_the_command(package: Package, printed: Printed) -> None:
+    jobs = {path for path in package if path.startswith("machine/jobs/")}
+    assert len(jobs) == 10
+    for program in PROGRAMS:
+        for system in ("nos", "nosbe"):
+            command = f"deck --program {program} --dialect ftn --system {system}"
+            path = f"machine/jobs/{program}-{system}"
+            assert package[f"{path}.job"].decode() == printed(command)
+            rounded = f"{path}-rounded.job"
+            assert (rounded in jobs) == (program != "runge-kutta")
+            if rounded in jobs:
+                assert package[rounded].decode() == printed(f"{command} --round")
+
+
+def test_every_page_is_listed_with_its_runs(package: Package) -> None:
+    rows = _rows(package, "machine/pages.csv")
+    named = {f"machine/{row['page']}" for row in rows}
+    pages = {path for path in package if re.fullmatch(r"machine/.*\.txt", path)}
+    assert named == pages
+    assert {row["word"] for row in rows} == {*WORD_NAMES}
+    assert {row["listing"] for row in rows if row["program"] == "runge-kutta"} == {
+        "original", "corrected", "original with do-variable",
+    }  # fmt: skip
+    readme = package["machine/README.md"].decode()
+    for path in (*pages, *(path for path in package if path.endswith(".job"))):
+        assert f"| `{path.removeprefix('machine/')}` |" in readme
+    guide = (ROOT / "docs/how-to/machine.md").read_text()
+    assert outcomes_table() in guide
+    assert outcomes_table() in readme
+
+
+def test_the_package_is_small(package: Package) -> None:
+    assert sum(map(len, package.values())) < 3e6
 
 
 def _replace(monkeypatch: pytest.MonkeyPatch, made: Callable[..., Any]) -> None:

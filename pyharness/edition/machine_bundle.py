@@ -1,0 +1,141 @@
+"""The folder `machine` of the data package: what a reader with an emulated CDC computer needs.
+
+It has the jobs for the computer, the pages to expect, a script that compares a printed page with
+them, and a table of what each outcome would teach.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from pyharness.edition.crate import Part
+from pyharness.history import printed_page
+from pyharness.history.listing_output import listings_of, our_page
+from pyharness.model.facts import facts
+from pyharness.model.listing import Listing
+from pyharness.model.report import numbers
+from pyharness.model.scene_file import case_scene
+from pyharness.original.decks import SYSTEMS, card_steps, deck_text, job_text
+from pyharness.original.programs import WORD_NAMES
+from pyharness.views.csv import csv_text
+
+# The arithmetics of the machine, one for each of its two ways to compile a program.
+_MACHINE = ("cdc48", "cdc48-rounded")
+_COLUMNS = "program case listing word steps card_steps page"
+_SYSTEMS = {"nos": "NOS", "nosbe": "NOS/BE"}
+_TEXT = "text/plain"
+
+
+def machine_parts() -> Iterator[Part]:
+    """Yield the files of the folder `machine` of the data package."""
+    texts: dict[str, str] = {}
+    rows: list[list[Any]] = []
+    for program, case in facts("cases")["published"].items():
+        steps = case_scene(case).steps, card_steps(program)
+        for (listing, word), text in _pages(program, case).items():
+            name = _stored(texts, _name(program, case, listing, word), text)
+            rows.append([program, case, listing, word, *steps, name])
+    for name, text in texts.items():
+        program, case, listing, word = next(row[:4] for row in rows if row[-1] == name)
+        yield Part(
+            f"machine/{name}",
+            f"Page that the {program} program prints in Case {case}, {listing}, arithmetic {word}",
+            "Computed by our programs; for the listing original in the arithmetics cdc48 and "
+            "cdc48-rounded it is a prediction for an emulated CDC CYBER computer.",
+            _TEXT, text.encode(),
+        )  # fmt: skip
+    yield Part(
+        f"machine/{printed_page.PAGES}", "The pages, by program, case, listing and arithmetic",
+        "A row for each run. listing: original, corrected, or original with another reading of a "
+        "doubtful card. steps: the steps according to the text of the thesis; card_steps: those on "
+        "the cards. page: the file of the page, which several runs may share.",
+        "text/csv", csv_text(numbers(_COLUMNS, rows)).encode(),
+    )  # fmt: skip
+    jobs = [*_jobs(texts)]
+    yield from jobs
+    yield Part(
+        "machine/judge.py", "Script that compares a printed page with the pages",
+        "Needs Python's standard library alone. It is the module of the software with which the "
+        "command pyharness verify --listing-output compares pages.",
+        "text/x-python", Path(printed_page.__file__).read_bytes(),
+    )  # fmt: skip
+    readme = facts("machine")["readme"].format(
+        jobs=_markdown(
+            ["job", "content"],
+            [[f"`{each.path.removeprefix('machine/')}`", each.title] for each in jobs],
+        ),
+        pages=_markdown(["page", "rows", "printed by"], _shared(texts, rows)),
+        outcomes=outcomes_table(),
+    )
+    yield Part(
+        "machine/README.md", "How to run the jobs, and what each outcome would teach",
+        "A guide for readers with an emulated CDC CYBER computer.",
+        "text/markdown", readme.encode(),
+    )  # fmt: skip
+
+
+def outcomes_table() -> str:
+    """Return a table in Markdown of what would be learned from each outcome of a job."""
+    rows = [[each["seen"], each["learned"], each["open"]] for each in facts("machine")["outcome"]]
+    return _markdown(["outcome", "what would be learned", "what remains open"], rows)
+
+
+def _pages(program: str, case: int) -> dict[tuple[str, str], str]:
+    """Return the pages of a program in a case, by listing and word; the machine's words first."""
+    words = [*_MACHINE, *(word for word in WORD_NAMES if word not in _MACHINE)]
+    return {
+        (name, word): our_page(listing, case, card_steps(program), word)
+        for name, listing in listings_of(program).items()
+        for word in words
+    }
+
+
+def _name(program: str, case: int, listing: str, word: str) -> str:
+    form = "" if listing == "original" else f"{listing.replace(' ', '-')}-"
+    return f"{program}-case-{case}-{form}{word}.txt"
+
+
+def _stored(texts: dict[str, str], name: str, text: str) -> str:
+    """Store a page under its name, or return the name of an equal page that is already stored.
+
+    The pages of the original programs in the words of the machine are stored in any case.
+    """
+    program = name.partition("-case-")[0]
+    same = [known for known in texts if known.startswith(program) and texts[known] == text]
+    if same and not name.removeprefix(program)[len("-case-N-") :].startswith("cdc48"):
+        return same[0]
+    texts[name] = text
+    return name
+
+
+def _jobs(texts: dict[str, str]) -> Iterator[Part]:
+    """Yield the jobs, with rounding for the programs whose pages depend on it."""
+    for program, case in facts("cases")["published"].items():
+        first, second = (texts[_name(program, case, "original", word)] for word in _MACHINE)
+        for system in SYSTEMS:
+            for rounds in (False, True) if first != second else (False,):
+                text = deck_text(Listing.original(program), dialect="ftn")
+                option = ", with the option ROUND" if rounds else ""
+                yield Part(
+                    f"machine/jobs/{program}-{system}{'-rounded' if rounds else ''}.job",
+                    f"The {program} program as printed, for {_SYSTEMS[system]}{option}",
+                    "A batch job for the compiler FTN; user name and password are to be filled in.",
+                    _TEXT, job_text(text, system, rounds).encode(),
+                )  # fmt: skip
+
+
+def _shared(texts: dict[str, str], rows: list[list[Any]]) -> Iterator[list[str]]:
+    """Yield a row for each page: its file, its number of rows, and the runs that print it."""
+    for name, text in texts.items():
+        _, printed = printed_page.split_page(printed_page.printed_numbers(text))
+        words: dict[str, list[str]] = {}
+        for _, _, listing, word, *_, page in rows:
+            if texts[page] == text and page.partition("-case-")[0] == name.partition("-case-")[0]:
+                words.setdefault(listing, []).append(f"`{word}`")
+        by = "; ".join(f"{listing} in {', '.join(found)}" for listing, found in words.items())
+        yield [f"`{name}`", str(len(printed)), by]
+
+
+def _markdown(heads: list[str], rows: Any) -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -1,15 +1,17 @@
 """The header of the TEI document, and the elements that all its parts use.
 
-The header describes the edition and its witness, the scan. It also lists the kinds, the degrees of
-certainty and the grounds of the entries of the critical apparatus.
+The header describes the edition and its witness, the scan. It also lists the revisions of the text,
+and the kinds, the degrees of certainty and the grounds of the entries of the critical apparatus.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 from xml.etree import ElementTree as xml
 
 import pyharness
+from pyharness.history.revisions import Revision, revisions
 from pyharness.model.facts import facts
+from pyharness.original.cards import deck, numbers
 
 TITLE = "A Digital Computer Approach to the Unsymmetric Rigid Body Problem"
 AUTHOR = "Richard Jacobs"
@@ -68,6 +70,7 @@ def add_header(root: xml.Element) -> None:
     with_text(printed, "biblScope", "appendix", unit="section")
     _witnesses(xml.SubElement(source, "listWit"), scan["witness"], edition["witness"])
     _encoding(xml.SubElement(header, "encodingDesc"), scan)
+    _revisions(xml.SubElement(header, "revisionDesc"))
 
 
 def sources(entry: dict[str, Any]) -> str:
@@ -168,6 +171,33 @@ def _taxonomy(
     for each, what in categories:
         category = named(taxonomy, "category", class_of(name, each))
         with_text(category, "catDesc", f"{each}: {what}")
+
+
+def _revisions(described: xml.Element) -> None:
+    """Append the revisions of the text to the element `revisionDesc`, newest first."""
+    for revision in revisions():
+        change = with_text(
+            described, "change", f"{revision.what} ", when=revision.date, who=f"#{EDITORS}",
+            target=" ".join(_targets(revision)),
+        )  # fmt: skip
+        if revision.digest:
+            with_text(change, "idno", revision.digest, type="text-digest")
+
+
+def _targets(revision: Revision) -> Iterator[str]:
+    """Yield pointers to the entries and cards that a revision added or changed.
+
+    Removed entries are no longer in the document. A deck of which all cards changed has one pointer
+    to the whole deck.
+    """
+    present = {entry["id"] for entry in facts("apparatus")["entry"]}
+    yield from (f"#{id}" for id in (*revision.added, *revision.changed) if id in present)
+    for program, cards in revision.cards.items():
+        changed = numbers(cards)
+        if changed == list(deck(program).cards):
+            yield f"#{program}"
+        else:
+            yield from (f"#{program}.{number}" for number in changed)
 
 
 def _when(released: str) -> dict[str, str]:

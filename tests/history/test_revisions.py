@@ -1,0 +1,69 @@
+"""The history of the text: the newest revision is the present text, and no entry is forgotten."""
+
+import re
+from datetime import date
+from xml.etree import ElementTree as xml
+
+from pyharness.history.revisions import revisions
+from pyharness.history.tei import tei_document
+from pyharness.history.text_digest import text_digest
+from pyharness.model.facts import facts
+from pyharness.original.cards import find, numbers
+
+TEI = "{http://www.tei-c.org/ns/1.0}"
+
+
+def test_newest_revision_is_the_present_text() -> None:
+    assert revisions()[0].digest == text_digest(), (
+        "the text has changed: add a revision at the beginning of pyharness/data/revisions.toml"
+    )
+
+
+def test_revisions_are_in_the_order_of_time_and_each_has_a_text_of_its_own() -> None:
+    dates = [date.fromisoformat(each.date) for each in revisions()]
+    assert dates == sorted(dates, reverse=True)
+    digests = [each.digest for each in revisions()]
+    known = [each for each in digests if each]
+    assert all(re.fullmatch("[0-9a-f]{12}", each) for each in known)
+    assert len({*known}) == len(known)
+    # Only the oldest texts were not yet data.
+    assert not any(digests[len(known) :])
+
+
+def test_entries_of_all_revisions_are_those_of_the_apparatus() -> None:
+    entries: set[str] = set()
+    for each in reversed(revisions()):
+        assert each.added or each.changed or each.removed or each.cards
+        assert not entries & {*each.added}
+        assert entries >= {*each.changed, *each.removed}
+        entries = entries - {*each.removed} | {*each.added}
+    assert entries == {each["id"] for each in facts("apparatus")["entry"]}
+
+
+def test_cards_of_all_revisions_are_those_of_the_decks() -> None:
+    for each in revisions():
+        for program, cards in each.cards.items():
+            assert [find(program, number).number for number in numbers(cards)] == numbers(cards)
+    first = [each for each in revisions() if each.digest][-1]
+    for program, cards in first.cards.items():
+        assert numbers(cards) == [int(number) for number in facts(f"cards/{program}")["cards"]]
+
+
+def test_header_of_tei_has_every_revision() -> None:
+    root = xml.fromstring(tei_document())
+    described = root.find(f"{TEI}teiHeader/{TEI}revisionDesc")
+    assert described is not None
+    assert len(described) == len(revisions())
+    for change, each in zip(described, revisions(), strict=True):
+        assert (change.get("when"), change.get("who")) == (each.date, "#editors")
+        assert (change.text or "").strip() == each.what
+        assert [idno.text for idno in change] == ([each.digest] if each.digest else [])
+        targets = change.attrib["target"].split()
+        present = {*each.added, *each.changed} & {row["id"] for row in facts("apparatus")["entry"]}
+        assert {target[1:].split(".")[0] for target in targets} == {*present, *each.cards}
+        for program, cards in each.cards.items():
+            named = [f"#{program}.{number}" for number in numbers(cards)]
+            found = [target for target in targets if target.split(".")[0] == f"#{program}"]
+            assert found == (
+                [f"#{program}"] if len(named) == len(facts(f"cards/{program}")["cards"]) else named
+            )

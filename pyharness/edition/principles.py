@@ -1,6 +1,7 @@
 """The document `docs/explanation/principles.md`, made from the tables of the edition."""
 
 from pyharness.edition.made_pages import paragraphs, table
+from pyharness.history.revisions import CHANGES, Revision, revisions
 from pyharness.history.tei_header import AUTHOR, CERTAINTY, KINDS
 from pyharness.model.facts import facts
 
@@ -10,7 +11,8 @@ PAGE = "explanation/principles.md"
 _HEAD = """\
 This page states the rules of the edition: what is edited, what is changed, and how each change is
 marked. This page is for readers who want to cite the edition or to check it. The page is made from
-the files `edition.toml`, `apparatus.toml` and `cards/scan.toml` in `pyharness/data`.
+the files `edition.toml`, `apparatus.toml`, `revisions.toml` and `cards/scan.toml` in
+`pyharness/data`.
 """
 _WITNESS = """\
 The edition has one *witness* (source of the text), the scan, with the siglum {siglum}. The scan is
@@ -31,6 +33,11 @@ Each entry has one of four degrees of certainty. The second column is the value 
 _GROUNDS = """\
 A *ground* is a reason for an entry. It is no witness, because it does not transmit the text of a
 card. Each entry names its grounds by their letters.
+"""
+_HISTORY = """\
+These are the revisions of the text, newest first. The text consists of the cards and the apparatus.
+Each revision has the digest of the text after it, by the present definition of the digest. A
+revision has no digest if the cards were not yet data at that time.
 """
 
 
@@ -88,6 +95,9 @@ def principles_page() -> str:
             "the digest of the text, which `pyharness cards --classes` prints. The date of a "
             "version is its date in the file `CHANGELOG.md`, not the date on which a file was made."
         ),
+        "## History of the text\n",
+        paragraphs(_HISTORY),
+        "".join(_revision(each) for each in revisions()),
         "## Bibliography\n",
         "".join(
             paragraphs(f"- {each['author']}: *{each['title']}*. {each['imprint']}. "
@@ -96,3 +106,16 @@ def principles_page() -> str:
         ),
     ]  # fmt: skip
     return "\n".join(parts)
+
+
+def _revision(revision: Revision) -> str:
+    """Return a revision of the text as an item of a list."""
+    digest = f"digest `{revision.digest}`" if revision.digest else "no digest"
+    parts = [f"- **{revision.date}**, {digest}. {revision.what}"]
+    for name, heading in CHANGES.items():
+        if entries := getattr(revision, name):
+            parts.append(f"{heading.capitalize()}: {', '.join(f'`{id}`' for id in entries)}.")
+    if revision.cards:
+        cards = "; ".join(f"{program} {cards}" for program, cards in revision.cards.items())
+        parts.append(f"Cards: {cards}.")
+    return paragraphs(" ".join(parts), "  ")

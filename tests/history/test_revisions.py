@@ -4,7 +4,8 @@ import re
 from datetime import date
 from xml.etree import ElementTree as xml
 
-from pyharness.history.revisions import revisions
+from pyharness.edition.principles import principles_page
+from pyharness.history.revisions import CHANGES, revisions
 from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import facts
@@ -67,3 +68,17 @@ def test_header_of_tei_has_every_revision() -> None:
             assert found == (
                 [f"#{program}"] if len(named) == len(facts(f"cards/{program}")["cards"]) else named
             )
+
+
+def test_page_has_every_revision() -> None:
+    page = " ".join(principles_page().split())
+    for each in revisions():
+        assert " ".join(f"- **{each.date}**, {_digest(each.digest)}. {each.what}".split()) in page
+        for name, heading in CHANGES.items():
+            if entries := getattr(each, name):
+                listed = ", ".join(f"`{id}`" for id in entries)
+                assert f"{heading.capitalize()}: {listed}." in page
+
+
+def _digest(digest: str) -> str:
+    return f"digest `{digest}`" if digest else "no digest"

@@ -89,12 +89,34 @@ def test_commands_run(
         assert printed(words) or any(tmp_path.iterdir())
 
 
-def _last_line(case: int, changes: Sequence[tuple[str, str, str]], end: str = "") -> list[str]:
-    """Change the cards of the Runge-Kutta deck as a student does, and return U1 and the step.
+ORIGINAL = Listing.original("runge-kutta")
+MINUS_A = ("800", "R1+A", "R1-A")
+U1_FOR_U3 = ("800", "U3(J)", "U1(J)")
+FIFTHS = ("1180", "DT/6.", "DT/5.")
+WEIGHTS = ("1180", "KF(1)+2.*(KF(2)+KF(3))+KF(4)", "2.*(KF(1)+KF(4))+KF(2)+KF(3)")
+I2_30 = ("200", "40.", "30.")
+I3_20 = ("210", "40.", "20.")
+BASE = [
+    (str(card + 10 * k), f"=U{k + 1}(J)", f"=UU{k + 1}") for card in (860, 1040) for k in range(3)
+]
+BASE_OF_V = [
+    (str(card + 10 * k), f"=V{k + 1}(J)", f"=VV{k + 1}") for card in (890, 1070) for k in range(3)
+]
+RESET = "\n".join(f"      {name}{k}(1)={name}{k}(4)" for name in "UV" for k in (1, 2, 3))
 
-    A change is a card, and an old and a new text. `end` is inserted after card 1530.
+
+def _last_line(
+    case: int,
+    changes: Sequence[tuple[str, str, str]],
+    end: str = "",
+    listing: Listing = ORIGINAL,
+) -> list[str]:
+    """Change the cards of the Runge-Kutta deck as a student does, and return the last line.
+
+    A change is a card, and an old and a new text. `end` is inserted after card 1530. The result is
+    the last line of the printed page, divided into its words.
     """
-    lines = deck_text(Listing.original("runge-kutta"), case_scene(case), "gfortran").splitlines()
+    lines = deck_text(listing, case_scene(case), "gfortran").splitlines()
     for card, old, new in changes:
         (index,) = [n for n, line in enumerate(lines) if line.split()[-1] == card]
         assert old in lines[index]
@@ -105,28 +127,20 @@ def _last_line(case: int, changes: Sequence[tuple[str, str, str]], end: str = ""
     return run_deck("\n".join(lines) + "\n").page.splitlines()[-1].split()
 
 
-BASE = [
-    (str(card + 10 * k), f"=U{k + 1}(J)", f"=UU{k + 1}") for card in (860, 1040) for k in range(3)
-]
-BASE_OF_V = [
-    (str(card + 10 * k), f"=V{k + 1}(J)", f"=VV{k + 1}") for card in (890, 1070) for k in range(3)
-]
-RESET = "\n".join(f"      {name}{k}(1)={name}{k}(4)" for name in "UV" for k in (1, 2, 3))
-
-
 @pytest.mark.skipif(compiler() is None, reason="no gfortran")
 @pytest.mark.parametrize(
     ("case", "changes", "end", "first", "step"),
     [
         (1, [], "", "3.5000", "100"),
-        (1, [("800", "R1+A", "R1-A")], "", "3.5000", "100"),
-        (1, [("800", "U3(J)", "U1(J)")], "", "3.5000", "100"),
-        (1, [("1180", "DT/6.", "DT/5.")], "", "4.0000", "100"),
-        (
-            1,
-            [("1180", "KF(1)+2.*(KF(2)+KF(3))+KF(4)", "2.*(KF(1)+KF(4))+KF(2)+KF(3)")],
-            *("", "3.5000", "100"),
-        ),
+        (1, [MINUS_A], "", "3.5000", "100"),
+        (1, [U1_FOR_U3], "", "3.5000", "100"),
+        (1, [FIFTHS], "", "4.0000", "100"),
+        (1, [WEIGHTS], "", "3.5000", "100"),
+        (1, [I2_30], "", "2.6210", "100"),
+        (1, [I2_30, MINUS_A], "", "3.4844", "100"),
+        (1, [I2_30, U1_FOR_U3], "", "2.6946", "100"),
+        (1, [I2_30, FIFTHS], "", "2.9451", "100"),
+        (1, [I2_30, WEIGHTS], "", "2.6184", "100"),
         (2, [], "", "1.1631", "25"),
         (2, BASE, "", "0.9538", "25"),
         (2, BASE, RESET, "0.6052", "13"),
@@ -140,6 +154,19 @@ def test_changed_decks_print_what_lesson_and_notes_say(
     assert (found[0], found[3]) == (first, step)
     told = {"0.9538": "be much closer", "0.9996": "stops at step 32"}.get(first, first)
     assert told in LESSON + NOTES
+
+
+@pytest.mark.skipif(compiler() is None, reason="no gfortran")
+def test_other_moments_in_case_1_have_the_effects_that_the_notes_say() -> None:
+    corrected = Listing.corrected("runge-kutta")
+    for changes in ([I2_30], [I2_30, WEIGHTS]):
+        assert _last_line(1, changes, listing=corrected)[0] == "1.4609"
+    assert "prints U1 = 1.4609 both with and without change 4" in NOTES
+    assert _last_line(1, [I3_20])[3] == "57"
+    assert "the stop test ends the run at step 57" in " ".join(NOTES.split())
+    for change in (MINUS_A, U1_FOR_U3, WEIGHTS):
+        other_i1 = [("190", "40.", "30.")]
+        assert _last_line(1, [*other_i1, change]) == _last_line(1, other_i1)
 
 
 def test_addresses_of_the_laboratory_are_understood() -> None:

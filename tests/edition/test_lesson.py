@@ -2,6 +2,7 @@
 
 import html
 import re
+import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -167,6 +168,24 @@ def test_other_moments_in_case_1_have_the_effects_that_the_notes_say() -> None:
     for change in (MINUS_A, U1_FOR_U3, WEIGHTS):
         other_i1 = [("190", "40.", "30.")]
         assert _last_line(1, [*other_i1, change]) == _last_line(1, other_i1)
+
+
+@pytest.mark.skipif(compiler() is None, reason="no gfortran")
+@pytest.mark.parametrize("program", ["runge-kutta", "two-term"])
+def test_decks_are_compiled_and_run_as_the_lesson_says(
+    program: str, printed: Printed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```sh\n(.*?)```", EXERCISES, re.DOTALL)
+    (block,) = (each for each in blocks if "gfortran -std" in each and program in each)
+    for line in block.splitlines():
+        if line.startswith("pyharness "):
+            printed(line.removeprefix("pyharness "))
+        else:
+            subprocess.run(line, shell=True, check=True, stdout=subprocess.DEVNULL)
+    (case,) = re.findall(r"--case (\d)", block)
+    page = printed(f"run --case {case} --program {program} --format printer")
+    assert Path("TAPE6").read_text().split()[-7:] == page.split()[-7:]
 
 
 def test_addresses_of_the_laboratory_are_understood() -> None:

@@ -3,11 +3,14 @@
 import html
 import re
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import cos, sin
 from pathlib import Path
 
 import pytest
 
+from pyharness import run_program
 from pyharness.edition.documents import page_of
 from pyharness.edition.laboratory import data
 from pyharness.history.ablation import entries
@@ -106,26 +109,42 @@ BASE_OF_V = [
 RESET = "\n".join(f"      {name}{k}(1)={name}{k}(4)" for name in "UV" for k in (1, 2, 3))
 
 
+def _page(
+    deck: str, changes: Sequence[tuple[str, str, str]], added: Mapping[str, str] = {}
+) -> list[list[str]]:
+    """Change cards of a deck as a student does, and return the words of each line of its page.
+
+    A change is a card, and an old and a new text. `added` has the text to insert after a card, by
+    the number of the card.
+    """
+    lines = deck.splitlines()
+
+    def index_of(card: str) -> int:
+        (index,) = [n for n, line in enumerate(lines) if line.split()[-1] == card]
+        return index
+
+    for card, old, new in changes:
+        index = index_of(card)
+        assert old in lines[index]
+        text = lines[index][:72].replace(old, new).rstrip()
+        lines[index] = f"{text:72}{lines[index][72:]}"
+    for card, text in added.items():
+        lines.insert(index_of(card) + 1, text)
+    return [line.split() for line in run_deck("\n".join(lines) + "\n").page.splitlines()]
+
+
 def _last_line(
     case: int,
     changes: Sequence[tuple[str, str, str]],
     end: str = "",
     listing: Listing = ORIGINAL,
 ) -> list[str]:
-    """Change the cards of the Runge-Kutta deck as a student does, and return the last line.
+    """Return the words of the last line that a changed Runge-Kutta deck prints.
 
-    A change is a card, and an old and a new text. `end` is inserted after card 1530. The result is
-    the last line of the printed page, divided into its words.
+    `end` is inserted after card 1530.
     """
-    lines = deck_text(listing, case_scene(case), "gfortran").splitlines()
-    for card, old, new in changes:
-        (index,) = [n for n, line in enumerate(lines) if line.split()[-1] == card]
-        assert old in lines[index]
-        text = lines[index][:72].replace(old, new).rstrip()
-        lines[index] = f"{text:72}{lines[index][72:]}"
-    (index,) = [n for n, line in enumerate(lines) if line.split()[-1] == "1530"]
-    lines[index + 1 : index + 1] = end.splitlines()
-    return run_deck("\n".join(lines) + "\n").page.splitlines()[-1].split()
+    deck = deck_text(listing, case_scene(case), "gfortran")
+    return _page(deck, changes, {"1530": end} if end else {})[-1]
 
 
 @pytest.mark.skipif(compiler() is None, reason="no gfortran")
@@ -168,6 +187,38 @@ def test_other_moments_in_case_1_have_the_effects_that_the_notes_say() -> None:
     for change in (MINUS_A, U1_FOR_U3, WEIGHTS):
         other_i1 = [("190", "40.", "30.")]
         assert _last_line(1, [*other_i1, change]) == _last_line(1, other_i1)
+
+
+@pytest.mark.skipif(compiler() is None, reason="no gfortran")
+def test_mended_deck_is_stopped_by_v2_as_the_notes_say() -> None:
+    deck = deck_text(ORIGINAL, case_scene(2), "gfortran")
+    quotient = "      WRITE(6,*)XL1/XL2,YL1/YL2,ZL1/ZL2,FL1/FL2,GL1/GL2"
+    *_, last, quotients = _page(deck, BASE, {"1530": RESET, "1390": quotient})
+    assert last[:4] == [*(f"{each:.4f}" for each in (sin(0.65), cos(0.65), 10)), "13"]
+    assert [float(each) > 500 for each in quotients] == [False, True, False, False, False]
+    assert round(float(quotients[1])) == 6694
+    assert last[5] == "0.0116"
+    no_limit = [*BASE, ("1390", "500.", "1.E30")]
+    later = _page(deck, no_limit, {"1530": RESET})[-100:]
+    assert max(float(each[5]) for each in later[:30]) == float(last[5])
+    for told in ("its quotient was 6694", "right: 0.6052, 0.7961 and 10.0000", "0.0116 m/s"):
+        assert told in " ".join(NOTES.split())
+
+
+@pytest.mark.skipif(compiler() is None, reason="no gfortran")
+def test_two_term_deck_has_the_effects_that_lesson_and_notes_say() -> None:
+    deck = deck_text(Listing.original("two-term"), case_scene(2), "gfortran")
+    at_rest = [("310", "1.", "0."), ("320", "10.", "0.")]
+    first = [_page(deck, [*at_rest, ("610", "20.", force)])[-100] for force in ("20.", "200.")]
+    assert [each[5] for each in first] == ["0.0014", "0.0096"]
+    assert "is 0.0096 instead of 0.0014 m/s" in " ".join(NOTES.split())
+    deck = deck_text(Listing.original("two-term"), case_scene(5), "gfortran")
+    cards = [line.split()[-1] for line in deck.splitlines() if ".01 " in line]
+    assert cards == ["670", "730", "1660"]
+    halved = [("690", "100,1", "200,1"), *((card, ".01", ".005") for card in cards)]
+    scene = replace(case_scene(5), step_size=0.005, steps=200)
+    omega = run_program(scene, Listing.original("two-term")).omega[-1]
+    assert _page(deck, halved)[-1][:4] == [*(f"{each:.4f}" for each in omega), "200"]
 
 
 @pytest.mark.skipif(compiler() is None, reason="no gfortran")

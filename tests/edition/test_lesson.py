@@ -54,6 +54,19 @@ def test_notes_have_the_exercises_of_the_lesson() -> None:
             assert head in each
 
 
+def test_plans_of_the_class_agree_with_the_times() -> None:
+    minutes = [int(each) for each in re.findall(r"^\| \[\d\].*\| (\d+) min \|$", NOTES, re.M)]
+    assert len(minutes) == 6
+    text = " ".join(NOTES.split())
+    assert f"exercises together take an estimated {sum(minutes)} minutes" in text
+    assert "take three to four hours" in " ".join(LESSON.split())
+    assert 180 < sum(minutes) < 240
+    assert minutes[2] + minutes[5] <= 90 - 10 - 20
+    for first, second in ((4, 5), (1, 4), (2, 6)):
+        assert minutes[first - 1] + minutes[second - 1] <= 120 - 10 - 20
+    assert max(minutes) + 6 * 7 <= 120 - 10 - 20
+
+
 def test_cards_are_those_of_the_decks() -> None:
     quoted = 0
     for part in re.split(r"(?=\*\*Cards\*\*)", EXERCISES)[1:]:

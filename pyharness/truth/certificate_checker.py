@@ -1,0 +1,255 @@
+"""Check a certificate: a proof that balls contain the solution of Euler's equations.
+
+The program needs nothing but Python, and takes nothing from the program that found the proof. It
+computes with integers, and with fractions of integers where it reads numbers. Its arguments are
+files of certificates; its exit status is 1 unless all of them hold.
+
+The equations are y' = f(t, y) for the angular velocity omega, and for the sines and cosines of the
+torque. In a step of the length h, the solution is approximated by a polynomial p(s), s from 0 to 1,
+whose coefficients are those of Taylor's recurrences. The proof does not depend on their accuracy,
+because it bounds the defect d = p' - h f(p) of the polynomial itself. The error e = y - p obeys
+|e|' <= h mu |e| + |d|, where mu bounds the logarithmic norm of the Jacobian of f in a tube around p
+(Dahlquist 1958). If the error stays less than the radius of the tube, the bound is proved.
+
+A number y is stored as an integer, y times 2**bits. A time is stored as an integer over 2**clock.
+The norm of an error of omega is sqrt(sum (e_i / scale_i)**2), with scales in units of 2**-20.
+"""
+
+import json
+import sys
+from collections.abc import Sequence
+from fractions import Fraction
+from math import ceil, isqrt, lcm
+from operator import mul
+from typing import Any
+
+FORMAT = "pyharness-certificate-1"
+SCALE_BITS = 20
+UNIT = 1 << 64  # the factor by which an error grows in a step is an integer over this number
+
+Expansion = tuple[list[list[int]], list[int], int]
+
+
+class NotProvedError(Exception):
+    """The certificate does not prove what it states."""
+
+
+def over(numerator: int, denominator: int) -> int:
+    """Return a quotient of integers, rounded up; the denominator is positive."""
+    return -(-numerator // denominator)
+
+
+class System:
+    """Euler's equations of a scene, with integer coefficients: equations 13-15 of the thesis.
+
+    They are D y_i' = P y_j y_k + C + R t + sum (S s_f + G c_f), with i, j, k in cyclic order. Each
+    frequency f of the torque has two further unknowns, with s_f' = f c_f and c_f' = -f s_f. A row
+    of `rows` is D and the list of P, C, R, and S, G of each frequency.
+    """
+
+    def __init__(self, scene: dict[str, Any], bits: int, clock: int, scales: Sequence[int]) -> None:
+        self.bits, self.clock, self.scales = bits, clock, scales
+        torque, moments = scene["torque"], [Fraction(1)] * 3
+        if "coefficients" in scene:
+            factors = [Fraction(x) for x in scene["coefficients"]]
+        else:
+            moments = [Fraction(x) for x in scene["moments"]]
+            factors = [(moments[i - 2] - moments[i - 1]) / moments[i] for i in range(3)]
+        waves = [(*wave, 0) for wave in torque["sines"]] + [(*w, 1) for w in torque["cosines"]]
+        self.frequencies = sorted({Fraction(frequency) for _, frequency, _ in waves})
+        self.rows = []
+        for i, moment in enumerate(moments):
+            pushes = [Fraction(torque[each][i]) for each in ("constant", "rate")]
+            pushes += [Fraction(0)] * (2 * len(self.frequencies))
+            for amplitude, frequency, kind in waves:
+                place = 2 + 2 * self.frequencies.index(Fraction(frequency)) + kind
+                pushes[place] += Fraction(amplitude[i])
+            terms = [factors[i], *(push / moment for push in pushes)]
+            common = lcm(*(each.denominator for each in terms))
+            self.rows.append((common, [int(each * common) for each in terms]))
+
+    def expand(self, state: Sequence[int], time: int, h: int, order: int) -> Expansion:
+        """Return the polynomials of a step, and bounds of their defects in units of 2**-bits.
+
+        The defects are those of the three components of omega, and a sum of those of the waves.
+        """
+        series, bits, clock = [[x] for x in state], self.bits, self.clock
+        wave_defect = 0
+        for n, frequency in enumerate(self.frequencies):
+            sine, cosine = series[3 + 2 * n], series[4 + 2 * n]
+            turn, scale = h * frequency.numerator, frequency.denominator << clock
+            for k in range(order):
+                new = turn * cosine[k] // (scale * (k + 1)), -turn * sine[k] // (scale * (k + 1))
+                sine.append(new[0])
+                cosine.append(new[1])
+            for each, other, factor in ((sine, cosine, turn), (cosine, sine, -turn)):
+                rests = [scale * k * each[k] - factor * other[k - 1] for k in range(1, order + 1)]
+                wave_defect += over(sum(map(abs, rests)) + abs(factor * other[order]), scale)
+        pushes = []
+        for _, (_, constant, rate, *amplitudes) in self.rows:
+            # The shifts are exact, because there are at least as many bits as those of the clock.
+            push = [(constant << bits) + (rate * time << bits - clock), rate * h << bits - clock]
+            push += [0] * (order - 1)
+            for amplitude, wave in zip(amplitudes, series[3:], strict=True):
+                if amplitude:
+                    push = [p + amplitude * x for p, x in zip(push, wave, strict=True)]
+            pushes.append(push)
+        rests = [0, 0, 0]
+        for k in range(2 * order + 1):
+            low = max(0, k - order)
+            parts = [each[low : k - low + 1] for each in series[:3]]
+            for i, (common, (factor, *_)) in enumerate(self.rows):
+                rate = factor * sum(map(mul, parts[i - 2], reversed(parts[i - 1])))
+                rest = h * (rate + (pushes[i][k] << bits if k <= order else 0))
+                if k < order:
+                    scale = (k + 1) * common << bits + clock
+                    series[i].append(rest // scale)
+                    rest %= scale
+                rests[i] += abs(rest)
+        defects = [over(x, row[0] << bits + clock) for x, row in zip(rests, self.rows, strict=True)]
+        return series, defects, wave_defect
+
+    def norm(self, errors: Sequence[int]) -> int:
+        """Return a bound of the norm of three errors of omega."""
+        parts = [
+            over(abs(x) << SCALE_BITS, scale) for x, scale in zip(errors, self.scales, strict=True)
+        ]
+        return isqrt(sum(x * x for x in parts)) + 1
+
+    def forced(self, h: int) -> int:
+        """Return a bound of h times the norm of the Jacobian of omega by the waves, over UNIT."""
+        total = 0
+        for (common, (_, _, _, *amplitudes)), scale in zip(self.rows, self.scales, strict=True):
+            push = sum(map(abs, amplitudes)) * abs(h) << SCALE_BITS
+            total += over(push * UNIT, common * scale << self.clock)
+        return total
+
+    def growth(self, series: Sequence[Sequence[int]], tube: int, h: int) -> int:
+        """Return a bound of h mu, for the Jacobian of omega by itself, over UNIT.
+
+        The symmetric part of the Jacobian by omega is a sum of three matrices, one for each
+        component of omega. The norm of such a matrix is proportional to this component, whose mean
+        absolute value in the step is at most its root mean square.
+        """
+        growth, factors = 0, []
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            (d1, (p1, *_)), (d2, (p2, *_)) = self.rows[i], self.rows[j]
+            s1, s2 = self.scales[i], self.scales[j]
+            both = Fraction(abs(p1 * d2 * s2 * s2 + p2 * d1 * s1 * s1), 2 * d1 * d2 * s1 * s2)
+            factors.append(both * abs(h) / (1 << self.bits + self.clock))
+        for factor, each, scale in zip(factors, series, self.scales, strict=False):
+            # The mean takes work, and matters for a factor that is not small.
+            size = mean(each) if factor * 1000 > max(factors) else sum(map(abs, each))
+            growth += ceil(factor * UNIT * (size + over(tube * scale, 1 << SCALE_BITS)))
+        return growth
+
+    def radii(
+        self, radius: int, wave_radius: int, expansion: Expansion, tube: int, h: int
+    ) -> tuple[int, int]:
+        """Return the radii of omega and of the waves at the end of a step.
+
+        Raise NotProvedError if the step is too long, or if the solution may leave the tube.
+        """
+        series, defects, wave_defect = expansion
+        growth = self.growth(series, tube, h)
+        if growth > UNIT:
+            raise NotProvedError("errors grow too much in it")
+        # The linearised equations of the waves rotate their errors.
+        wave_radius += wave_defect
+        source = radius + self.norm(defects) + over(self.forced(h) * wave_radius, UNIT)
+        radius = over(source * exponential(growth), UNIT)
+        if radius >= tube:
+            raise NotProvedError("the solution may leave the tube")
+        return radius, wave_radius
+
+
+def mean(polynomial: Sequence[int]) -> int:
+    """Return a bound of the mean absolute value of a polynomial from 0 to 1."""
+    last, total = len(polynomial) - 1, 0
+    for k in range(2 * last + 1):
+        part = polynomial[max(0, k - last) : k + 1]
+        total += over(sum(map(mul, part, reversed(part))), k + 1)
+    return isqrt(total) + 1
+
+
+def exponential(x: int) -> int:
+    """Return a bound of the exponential of a number from 0 to 1; both are over UNIT."""
+    total = term = UNIT
+    for k in range(1, 20):
+        term = over(term * x, k * UNIT)
+        total += term
+    # The rest of the series is less than its last term.
+    return total + term
+
+
+def check_row(row: dict[str, Any], system: System, middle: Sequence[int], radius: int) -> None:
+    """Check that the balls of a row contain those of the end of a step."""
+    for text, x, scale in zip(row["omega"], middle, system.scales, strict=True):
+        own = Fraction(radius * scale, 1 << SCALE_BITS)
+        distance = abs(Fraction(text) * (1 << system.bits) - x)
+        if distance + own > Fraction(row["radius"]) * (1 << system.bits):
+            raise NotProvedError(f"the row at {row['time']} s does not contain the solution")
+
+
+def check(certificate: dict[str, Any]) -> int:
+    """Check a certificate, as read from JSON; return the number of its steps.
+
+    Raise NotProvedError if a step does not hold, or if a row does not follow from the steps.
+    """
+    if certificate["format"] != FORMAT:
+        raise NotProvedError(f"its format is not {FORMAT}")
+    bits, clock, order = (certificate[each] for each in ("bits", "clock", "order"))
+    scene, scales, rows = certificate["scene"], certificate["scales"], [*certificate["rows"]]
+    whole = [bits, clock, order, *scales]
+    whole += [
+        x for h, tube, radius, middle in certificate["steps"] for x in (h, tube, radius, *middle)
+    ]
+    if any(type(x) is not int for x in whole) or not (0 < clock <= bits and order > 1):
+        raise NotProvedError("a number is not an integer, or not in its range")
+    if min(scales) <= 0 or min(map(Fraction, scene.get("moments", [1]))) <= 0:
+        raise NotProvedError("a scale or a moment of inertia is not positive")
+    system = System(scene, bits, clock, scales)
+    middle = [int(Fraction(x) * (1 << bits)) for x in scene["omega"]]
+    waves = [0, 1 << bits] * len(system.frequencies)
+    radius, wave_radius, time = system.norm([1, 1, 1]), 0, 0
+    for number, (h, tube, stated, after) in enumerate(certificate["steps"], 1):
+        try:
+            expansion = system.expand([*middle, *waves], time, h, order)
+            radius, wave_radius = system.radii(radius, wave_radius, expansion, tube, h)
+            ends = [sum(each) for each in expansion[0]]
+            moved = [x - y for x, y in zip(ends[:3], after, strict=True)]
+            if radius + system.norm(moved) > stated:
+                raise NotProvedError("its ball does not contain the solution")
+            middle, waves, radius, time = after, ends[3:], stated, time + h
+            while rows and Fraction(rows[0]["time"]) == Fraction(time, 1 << clock):
+                check_row(rows.pop(0), system, middle, radius)
+        except NotProvedError as problem:
+            raise NotProvedError(f"step {number}: {problem}") from None
+    if rows:
+        raise NotProvedError(f"no step ends at {rows[0]['time']} s")
+    return len(certificate["steps"])
+
+
+def main(names: Sequence[str]) -> int:
+    """Check certificates in files, and print a line for each; return 1 if one does not hold."""
+    failed = False
+    for name in names:
+        try:
+            with open(name, encoding="ascii") as file:
+                print(f"{name}: proved in {check(json.load(file))} steps")
+        except (
+            NotProvedError,
+            ArithmeticError,
+            LookupError,
+            TypeError,
+            ValueError,
+            OSError,
+        ) as why:
+            print(f"{name}: not proved: {type(why).__name__}: {why}")
+            failed = True
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

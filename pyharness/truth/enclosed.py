@@ -1,0 +1,114 @@
+"""The results of an enclosure: balls that contain the solution of a scene at requested times."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from pyharness.model.scene import Scene
+
+
+class Balls(NamedTuple):
+    """Balls at one time: their middles, as exact fractions, and one radius for all of them."""
+
+    middle: tuple[Fraction, ...]
+    radius: Fraction
+
+
+@dataclass(frozen=True, eq=False)
+class Enclosure:
+    """Balls that contain the true solution of one scene at requested times.
+
+    The attitude is a unit quaternion, scalar first. The transition matrix has the derivatives of
+    omega (and of the quaternion, which is not normalised, if the scene has an attitude) by the
+    three components of omega at time 0, row by row. A quantity that was not requested is None.
+    """
+
+    time: tuple[float, ...]  # s
+    omega: tuple[Balls, ...]  # rad/s
+    how: str  # a text that states how the balls were found
+    steps: int = 0  # 0 for a solution in closed form
+    attitude: tuple[Balls, ...] | None = None
+    velocity: tuple[Balls, ...] | None = None  # m/s
+    transition: tuple[Balls, ...] | None = None
+    energy: tuple[Balls, ...] | None = None  # rotational energy, J
+
+    @property
+    def radius(self) -> float:
+        """A bound of the radius of all balls of omega (rad/s)."""
+        return max((rounded_up(each.radius) for each in self.omega), default=0.0)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return a dictionary for JSON for each time, with decimal numbers as strings.
+
+        The numbers are rounded, and each radius includes the rounding error.
+        """
+        rows = []
+        for n, time in enumerate(self.time):
+            row = row_of(time, self.omega[n])
+            for name in ("attitude", "velocity", "transition", "energy"):
+                found = getattr(self, name)
+                if found is not None:
+                    row[name], row[f"{name}_radius"] = decimals(found[n])
+            rows.append(row)
+        return rows
+
+
+def with_energy(scene: Scene, found: Enclosure) -> Enclosure:
+    """Return an enclosure with the balls of the rotational energy, if the scene has moments."""
+    if scene.moments is None:
+        return found
+    energies = []
+    for middle, radius in found.omega:
+        pairs = list(zip(map(Fraction, scene.moments), middle, strict=True))
+        energy = sum((i * w * w / 2 for i, w in pairs), Fraction(0))
+        error = sum((i * (abs(w) * radius + radius * radius / 2) for i, w in pairs), Fraction(0))
+        energies.append(Balls((energy,), error))
+    return replace(found, energy=tuple(energies))
+
+
+def row_of(time: float, omega: Balls) -> dict[str, Any]:
+    """Return balls of omega at `time` (s) as a dictionary for JSON, rounded outward."""
+    texts, radius = decimals(omega)
+    return {"time": time, "omega": texts, "radius": radius}
+
+
+def decimals(balls: Balls) -> tuple[list[str], float]:
+    """Return the middles of balls as decimal strings, and a radius that includes their rounding."""
+    digits = _digits(balls.radius)
+    radius = rounded_up(balls.radius + Fraction(1, 2 * 10**digits))
+    return [_decimal(x, digits) for x in balls.middle], radius
+
+
+def rounded_up(x: Fraction) -> float:
+    """Return a binary64 number of four digits that is at least x, which is not negative."""
+    # One of the factors exceeds the rounding errors of the conversion to a decimal string.
+    candidates = (float(f"{float(x) * factor:.3e}") for factor in (1.0, 1.001, 1.01))
+    return next((each for each in candidates if Fraction(each) >= x), 5e-324)
+
+
+def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
+    """Return the largest radius of balls of omega, over the largest one that is allowed.
+
+    The allowed radius is 10**-digits, times the largest component of omega if it exceeds 1 rad/s.
+    """
+    largest = Fraction(0)
+    for middle, radius in omega:
+        largest = max(largest, radius * 10**digits / max(Fraction(1), *map(abs, middle)))
+    return largest
+
+
+def _digits(radius: Fraction) -> int:
+    """Return a number of digits after the point with which rounding adds little to a radius."""
+    if not radius:
+        return 40
+    excess = radius.denominator.bit_length() - radius.numerator.bit_length()
+    return max(0, int(excess * 0.30103) + 3)
+
+
+def _decimal(x: Fraction, digits: int) -> str:
+    """Return a fraction as a decimal string with so many digits after the point."""
+    whole = round(abs(x) * 10**digits)
+    sign = "-" if x < 0 and whole else ""
+    text = str(whole).rjust(digits + 1, "0")
+    return sign + (f"{text[:-digits]}.{text[-digits:]}" if digits else text)

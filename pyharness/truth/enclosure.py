@@ -1,0 +1,131 @@
+"""Proved enclosures: balls that contain the true solution of a scene.
+
+There are three provers. Torque-free motion has a closed form (`enclosure_free`). Taylor steps in
+integer arithmetic (`certificate`) are for torques that depend on time alone, and need no library.
+Taylor steps in ball arithmetic (`enclosure_steps`) are for everything else. The first and the last
+need python-flint.
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+from importlib.util import find_spec
+
+from pyharness.model.errors import InputError
+from pyharness.model.progress import Progress, no_progress
+from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.values import integer
+from pyharness.truth.certificate import has_certificate, prove
+from pyharness.truth.enclosed import Enclosure, with_energy
+
+MOST_DIGITS = 1000
+
+
+def can_enclose(scene: Scene) -> bool:
+    """Return whether the libraries that are installed suffice for the enclosure of a scene."""
+    return _has_flint() or (has_certificate(scene) and scene.attitude is None)
+
+
+def enclose(
+    scene: Scene,
+    times: Sequence[float],
+    digits: int = 30,
+    *,
+    velocity: bool = False,
+    transition: bool = False,
+    effort: float = 1.0,
+    progress: Progress = no_progress,
+) -> Enclosure:
+    """Return balls that contain the true solution of a scene at requested times.
+
+    Parameters
+    ----------
+    scene : Scene
+        The problem. Its torque must be recorded; if it depends on the attitude, the scene needs
+        one.
+    times : sequence of numbers
+        Times (s) of one sign, each farther from 0 than the one before; the first may be 0.
+    digits : int
+        A ball of omega has at most the radius 10**-digits, times the largest component of omega if
+        it exceeds 1 rad/s.
+    velocity, transition : bool
+        Whether to enclose the translational velocity (m/s), and the derivatives of omega and of the
+        attitude by omega at time 0.
+    effort : number
+        A factor on the limit of the number of steps.
+    progress : function
+        It is called with the percentage of the last time that is done, 100, and the time reached.
+
+    Returns
+    -------
+    Enclosure
+        The balls of omega, of the attitude if the scene has one, of the requested quantities, and
+        of the rotational energy if the scene has moments.
+
+    Raises
+    ------
+    InputError
+        If the times are not in order, if python-flint is needed and not installed, if the torque is
+        opaque, if the solution can't be enclosed up to the last time, or if the work limit is
+        exceeded.
+    """
+    checked_scene(scene, True, True, True, True)
+    if not 1 <= integer("digits", digits) <= MOST_DIGITS:
+        raise InputError(f"digits: {digits}; allowed: 1 to {MOST_DIGITS}")
+    times = [float(t) for t in times]
+    _check_order(times)
+    if scene.changing is not None:
+        scene.changing.check(times)
+    free = scene.torque.is_zero and _is_bounded(scene) and not (velocity or transition)
+    if free and _has_flint():
+        found = _in_closed_form(scene, times, digits)
+    elif has_certificate(scene) and scene.attitude is None and not (velocity or transition):
+        found = prove(scene, times, digits, effort, progress).enclosure
+    elif _has_flint():
+        from pyharness.truth.enclosure_steps import enclose_steps
+
+        found = enclose_steps(scene, times, digits, velocity, transition, effort, progress)
+    else:
+        raise InputError(
+            "prove: this scene needs python-flint, which is not installed; install it with "
+            "'pip install python-flint', or pyharness[proofs]"
+        )
+    return with_energy(scene, found)
+
+
+def _in_closed_form(scene: Scene, times: Sequence[float], digits: int) -> Enclosure:
+    from pyharness.truth.balls import balls
+    from pyharness.truth.enclosure_free import enclose_free
+
+    turns = scene.attitude is not None
+    rows = enclose_free(scene, times, digits, turns)
+    return Enclosure(
+        tuple(times),
+        tuple(balls(row[:3]) for row in rows),
+        "elliptic functions in ball arithmetic",
+        attitude=tuple(balls(row[3:]) for row in rows) if turns else None,
+    )
+
+
+def _is_bounded(scene: Scene) -> bool:
+    """Return whether the body has constant moments, or coefficients with bounded motions.
+
+    A body with coefficients has no attitude in closed form.
+    """
+    if scene.coefficients is not None:
+        signs = {(a > 0.0) - (a < 0.0) for a in scene.coefficients}
+        return scene.attitude is None and (signs == {0} or signs >= {1, -1})
+    return scene.moments is not None
+
+
+def _has_flint() -> bool:
+    return find_spec("flint") is not None
+
+
+def _check_order(times: Sequence[float]) -> None:
+    away = [abs(t) for t in times]
+    one_side = bool(times) and (min(times) >= 0.0 or max(times) <= 0.0)
+    if not (one_side and all(t1 < t2 for t1, t2 in itertools.pairwise(away))):
+        raise InputError("prove: times do not lead away from 0 on one side; give times that do")
+    if not all(map(math.isfinite, times)):
+        raise InputError("prove: a time is not finite; allowed: finite numbers, in seconds")

@@ -1,0 +1,140 @@
+"""The equations of motion of a scene, for numbers of any kind that `balls` has."""
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+from flint import arb
+
+from pyharness.dynamics.system import rates_of_inertia
+from pyharness.model.attitude import IDENTITY, quaternion_rates
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import of_law
+from pyharness.model.tape import evaluate
+from pyharness.model.torque_law import TorqueLaw
+from pyharness.truth.balls import Dual, ball, functions_at
+
+_LEAST_SCALE = 1e-4
+# The right-hand side f(t, y): the derivatives of all unknowns at a time (s) and a state.
+Rates = Callable[[Any, Sequence[Any]], list[Any]]
+
+
+class Equations:
+    """The equations of motion of a scene, with exact coefficients.
+
+    The unknowns are omega (rad/s); then, if the scene has one, the quaternion of its attitude; if
+    `velocity` is true, the translational velocity (m/s); and if `transition` is true, the
+    derivatives of omega, and of the attitude, by the three components of omega at time 0, row by
+    row. `blocks` are the slices of the four groups, without those that are absent.
+    """
+
+    def __init__(self, scene: Scene, velocity: bool, transition: bool) -> None:
+        torque = of_law(scene.torque) if isinstance(scene.torque, TorqueLaw) else scene.torque
+        if torque.tape is None:
+            raise InputError(
+                "an opaque torque can't be enclosed; allowed: a torque that can be recorded"
+            )
+        if torque.needs_attitude and scene.attitude is None:
+            raise InputError(
+                "a torque that depends on the attitude needs it; give the scene an attitude"
+            )
+        self._tape, self._scene = torque.tape, scene
+        self._velocity, self._transition = velocity, transition
+        self._turning = 3 if scene.attitude is None else 7
+        self.start = [Fraction(x) for x in (*scene.omega, *(scene.attitude or ()))]
+        sizes = [3, *([4] if self._turning == 7 else [])]
+        if velocity:
+            self.start += [Fraction(0)] * 3
+            sizes.append(3)
+        if transition:
+            self.start += [Fraction(i == j) for i in range(self._turning) for j in range(3)]
+            sizes.append(3 * self._turning)
+        ends = [sum(sizes[:k]) for k in range(len(sizes) + 1)]
+        self.blocks = [slice(*each) for each in pairwise(ends)]
+        self.breaks = self._tape.breaks
+        self._exact()
+
+    def _exact(self) -> None:
+        """Convert the numbers of the body to balls of the current precision."""
+        scene = self._scene
+        self._principal: list[Any] | None = None
+        self._moments = [arb(1)] * 3
+        if scene.coefficients is not None:
+            self._principal = list(map(arb, scene.coefficients))
+        elif scene.changing is None and scene.inertia is None:
+            exact = scene.exact_moments
+            assert exact is not None
+            self._moments = list(map(ball, exact))
+            self._principal = [ball((exact[i - 2] - exact[i - 1]) / exact[i]) for i in range(3)]
+        elif scene.inertia is not None:
+            self._inertia = [[arb(x) for x in row] for row in scene.inertia]
+        self._push = [arb(force) / arb(scene.masses[0]) for force in scene.forces]
+
+    @property
+    def scales(self) -> list[float]:
+        """The units of the unknowns in which errors are measured.
+
+        With the roots of abs(A), abs(B), abs(C) as units of omega, the linearised equations of
+        motion amplify errors as little as a norm can show.
+        """
+        found = [1.0] * len(self.start)
+        if self._principal is not None:
+            sizes = [abs(float(x.mid())) for x in self._principal]
+            largest = max(sizes) or 1.0
+            found[:3] = [max(x / largest, _LEAST_SCALE) ** 0.5 for x in sizes]
+        return found
+
+    def at(self, begin: Fraction, forward: bool) -> Rates:
+        """Return the right-hand side for a step from `begin` (s) on, or back if not `forward`."""
+        functions = functions_at(begin, forward)
+
+        def rates(time: Any, state: Sequence[Any]) -> list[Any]:
+            omega, rest = list(state[:3]), list(state[3:])
+            q, rest = (rest[:4], rest[4:]) if self._turning == 7 else ([], rest)
+            v, rest = (rest[:3], rest[3:]) if self._velocity else ([], rest)
+            slopes: list[Any] = []
+            if self._transition:
+                inner = [Dual(x, rest[3 * k : 3 * k + 3]) for k, x in enumerate((*omega, *q))]
+                moved = self._turned(time, inner[:3], inner[3:], functions)
+                found = [each.value for each in moved]
+                slopes = [slope for each in moved for slope in each.slopes]
+            else:
+                found = self._turned(time, omega, q, functions)
+            if v:
+                (x, y, z), (a, b, c) = omega, v
+                cross = (b * z - c * y, c * x - a * z, a * y - b * x)
+                found += [p + push for p, push in zip(cross, self._push, strict=True)]
+            return found + slopes
+
+        return rates
+
+    def _turned(self, time: Any, omega: list[Any], q: list[Any], functions: Any) -> list[Any]:
+        """Return the derivatives of omega and of the attitude."""
+        torque = evaluate(self._tape, [time, *omega, *(q or IDENTITY)], functions)
+        x, y, z = omega
+        if self._principal is not None:
+            products = (y * z, z * x, x * y)
+            terms = zip(self._principal, products, torque, self._moments, strict=True)
+            found = [a * product + n / moment for a, product, n, moment in terms]
+        elif self._scene.inertia is not None:
+            found = rates_of_inertia(self._inertia, omega, torque)
+        else:
+            found = self._changing_rates(time, omega, torque)
+        return found + (list(quaternion_rates((x, y, z), q)) if q else [])
+
+    def _changing_rates(self, time: Any, omega: list[Any], torque: list[Any]) -> list[Any]:
+        changing = self._scene.changing
+        assert changing is not None
+        matrix = changing.matrix(Dual(time, [arb(1)]))
+        values = [[x.value if isinstance(x, Dual) else x for x in row] for row in matrix]
+        pushed = [
+            n
+            - sum(
+                (x.slopes[0] * w for x, w in zip(row, omega, strict=True) if isinstance(x, Dual)),
+                arb(0),
+            )
+            for n, row in zip(torque, matrix, strict=True)
+        ]
+        return rates_of_inertia(values, omega, pushed)

@@ -1,0 +1,323 @@
+"""Proved enclosures of the solution of any scene with a recorded torque, by Taylor steps.
+
+In each step of the integration an approximate solution p is a polynomial of time. Its defect
+p' - f(t, p) in the equation y' = f(t, y) is bounded on the whole step. The norm of the error
+e = y - p then obeys |e|' <= mu |e| + |defect|, where mu bounds the logarithmic norm of the
+Jacobian of f near p (Dahlquist 1958; Hairer, Norsett and Wanner 1993, Solving Ordinary Differential
+Equations I, theorem I.10.6). The proof does not depend on how p was found. All arithmetic is that
+of balls.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from flint import acb, arb, arb_mat, arb_series, ctx
+
+from pyharness.model.effort import advice, checked_effort
+from pyharness.model.errors import InputError
+from pyharness.model.progress import Progress, no_progress
+from pyharness.model.scene import Scene
+from pyharness.truth.balls import Dual, ball, balls
+from pyharness.truth.enclosed import Balls, Enclosure, largest_radius
+from pyharness.truth.enclosure_equations import Equations, Rates
+
+# The circles, in steps, in which the rest of a power series is bounded by Cauchy's estimate.
+_CIRCLES = (8, 4, 2)
+_SHORTEST = Fraction(1, 2**400)
+# The tube around p, in which the Jacobian is bounded, is at least this part of the solution thick.
+_TUBE = 2.0**-30
+_LEAST_TUBE = 2.0**-200
+_LENGTH_BITS = 24
+_MOST_STEPS = 4_000  # some twenty seconds
+_MOST_ATTEMPTS = 6
+_GUARD_DIGITS = 12
+
+
+def enclose_steps(
+    scene: Scene,
+    times: Sequence[float],
+    digits: int,
+    velocity: bool = False,
+    transition: bool = False,
+    effort: float = 1.0,
+    progress: Progress = no_progress,
+) -> Enclosure:
+    """Return balls that contain the solution of a scene at `times` (s).
+
+    The times have one sign, and each is farther from 0 than the one before. The radius of a ball of
+    omega is at most 10**-digits, times the largest component of omega if it exceeds 1 rad/s. The
+    result has balls of the attitude if the scene has one, and of the quantities that `velocity` and
+    `transition` request. `effort` is a factor on the limit of the number of steps. Raise InputError
+    if the torque is opaque, if no enclosure is found at some time, or if too many steps are needed.
+    """
+    limit = _MOST_STEPS * checked_effort(effort)
+    wanted = float(digits + 2)
+    for _ in range(_MOST_ATTEMPTS):
+        with ctx.workprec(math.ceil((wanted + _GUARD_DIGITS) * math.log2(10.0))):
+            proof = _Proof(Equations(scene, velocity, transition), wanted, times[-1] >= 0.0)
+            found, steps = [], 0
+            for time in map(Fraction, times):
+                while proof.state.time != time:
+                    if steps >= limit:
+                        share = max(abs(float(proof.state.time)) / abs(times[-1]), 1e-3)
+                        instead = advice("use a shorter time", effort, effort / share)
+                        raise InputError(f"prove: more than {limit:.0f} steps; {instead}")
+                    proof.step(time)
+                    steps += 1
+                    at = float(proof.state.time)
+                    progress(int(abs(at / times[-1]) * 100), 100, f"t = {at:.4g} s")
+                found.append(proof.balls(scene.attitude is not None))
+        excess = largest_radius([each[0] for each in found], digits)
+        if excess <= 1:
+            groups = iter(zip(*found, strict=True))
+            return Enclosure(
+                tuple(times),
+                next(groups),
+                "Taylor steps in ball arithmetic",
+                steps,
+                attitude=next(groups) if scene.attitude is not None else None,
+                velocity=next(groups) if velocity else None,
+                transition=next(groups) if transition else None,
+            )
+        wanted += math.log10(float(min(excess, Fraction(10) ** 300))) + 1.0
+    raise InputError(f"prove: the motion amplifies errors too much for {digits} digits; use fewer")
+
+
+class _NoStepError(Exception):
+    """The step is too long for a proof."""
+
+
+@dataclass
+class _State:
+    """A middle and, for each block of unknowns, the radius of its ball in scaled units."""
+
+    time: Fraction
+    middle: list[Any]  # exact balls
+    radii: list[Any]  # exact, not negative
+
+
+def _upper(x: Any) -> Any:
+    """Return the upper end of a ball, exactly; raise _NoStepError if it is not finite."""
+    end = arb(x).upper()
+    if not end.is_finite():
+        raise _NoStepError
+    return end.mid() + end.rad()
+
+
+def _terms(x: Any, count: int) -> list[Any]:
+    """Return the first coefficients of a power series, or of a constant."""
+    found = x.coeffs() if isinstance(x, arb_series) else [arb(x)]
+    return [*found, *[arb(0)] * (count - len(found))][:count]
+
+
+def _expanded(rates: Rates, begin: Any, middle: Sequence[Any], order: int) -> list[list[Any]]:
+    """Return Taylor coefficients 0 to `order` of the solution, approximately, as exact balls.
+
+    Each of Picard's iterations adds one coefficient.
+    """
+    found = [[x] for x in middle]
+    for k in range(order):
+        ctx.cap = k + 1
+        slopes = rates(arb_series([begin, 1]), [arb_series(x) for x in found])
+        for terms, slope in zip(found, slopes, strict=True):
+            terms.append((_terms(slope, k + 1)[k] / (k + 1)).mid())
+    return found
+
+
+class _Proof:
+    """The enclosure of one scene with one precision, step by step."""
+
+    def __init__(self, equations: Equations, digits: float, forward: bool) -> None:
+        self.equations, self.forward = equations, forward
+        self.order = max(16, math.ceil(0.9 * digits))
+        self.digits = digits
+        self.blocks = equations.blocks
+        self.scales = [arb(x) for x in equations.scales]
+        self.breaks = [Fraction(x) for x in equations.breaks]
+        self.state = _State(
+            Fraction(0), [ball(x).mid() for x in equations.start], [arb(0) for _ in self.blocks]
+        )
+
+    def norm(self, errors: Sequence[Any], block: slice) -> Any:
+        """Return an upper bound of the norm of a block of errors, in scaled units."""
+        parts = zip(errors[block], self.scales[block], strict=True)
+        return _upper(sum((_upper(abs(x) / s) ** 2 for x, s in parts), arb(0)).sqrt())
+
+    def balls(self, attitude: bool) -> list[Balls]:
+        """Return the balls of each group of unknowns; that of the attitude is normalised."""
+        found = []
+        for n, (block, radius) in enumerate(zip(self.blocks, self.state.radii, strict=True)):
+            pairs = zip(self.state.middle[block], self.scales[block], strict=True)
+            row = [x + arb(0, _upper(radius * s)) for x, s in pairs]
+            if attitude and n == 1:
+                length = sum((x * x for x in row), arb(0)).sqrt()
+                row = [x / length for x in row]
+            found.append(balls(row))
+        return found
+
+    def step(self, last: Fraction) -> None:
+        """Take a step, which does not lead beyond `last` (s)."""
+        state, side = self.state, 1 if self.forward else -1
+        rates = self.equations.at(state.time, self.forward)
+        begin = ball(state.time)
+        terms = _expanded(rates, begin, state.middle, self.order)
+        length = self._length(terms)
+        ends = [last, *(t for t in self.breaks if (t - state.time) * side > 0)]
+        while length > _SHORTEST:
+            end = min((state.time + side * length, *ends), key=lambda t: (t - state.time) * side)
+            try:
+                radii = self._radii(rates, terms, end - state.time)
+            except (_NoStepError, ZeroDivisionError):
+                length /= 2
+                continue
+            found = [_value(each, ball(end - state.time)) for each in terms]
+            rounding = [x - x.mid() for x in found]
+            after = [
+                _upper(r + self.norm(rounding, block))
+                for r, block in zip(radii, self.blocks, strict=True)
+            ]
+            self.state = _State(end, [x.mid() for x in found], after)
+            return
+        raise InputError(f"prove: no enclosure is found beyond t = {float(state.time):.6g} s")
+
+    def _length(self, terms: list[list[Any]]) -> Fraction:
+        """Return a length of a step (s) with which the last terms are about the tolerance."""
+        least = 40.0  # binary logarithm of the longest step
+        for block in self.blocks:
+            size = max(0.0, *(_log2(each[0]) for each in terms[block]))
+            wanted = size - self.digits * math.log2(10.0)
+            for k in (self.order - 1, self.order):
+                last = max(_log2(each[k]) for each in terms[block])
+                least = min(least, (wanted - last) / k)
+        exponent = math.floor(least)
+        mantissa = round(2.0 ** (least - exponent + _LENGTH_BITS))
+        return Fraction(mantissa, 2**_LENGTH_BITS) * Fraction(2) ** exponent
+
+    def _radii(self, rates: Rates, terms: list[list[Any]], h: Fraction) -> list[Any]:
+        """Return bounds of the errors in each block during a step of the length `h` (s)."""
+        length, state = abs(ball(h)), self.state
+        begin = ball(state.time)
+        sizes = [[abs(x) * length**k for k, x in enumerate(each)] for each in terms]
+        half = [_upper(sum(each[1:], arb(0)) / 2) for each in sizes]
+        middles = [each[0] + _value([arb(0), *each[1:]], ball(h)) / 2 for each in terms]
+        defects = self._defects(rates, terms, h, sizes)
+        tubes = [
+            _upper(2 * r + self.norm([each[0] for each in terms], block) * _TUBE + _LEAST_TUBE)
+            for r, block in zip(state.radii, self.blocks, strict=True)
+        ]
+        inputs = []
+        for block, tube in zip(self.blocks, tubes, strict=True):
+            for x, r, s in zip(middles[block], half[block], self.scales[block], strict=True):
+                inputs.append(x + arb(0, _upper(r + tube * s)))
+        time = begin + ball(h) / 2 + arb(0, _upper(length / 2))
+        matrix = self._growth(rates, time, inputs) * length
+        count = len(self.blocks)
+        pushed = arb_mat(
+            count, 1, [r + d * length for r, d in zip(state.radii, defects, strict=True)]
+        )
+        found = (matrix.exp() * pushed).entries()
+        radii = [_upper(x) for x in found]
+        if not all(r < tube for r, tube in zip(radii, tubes, strict=True)):
+            raise _NoStepError
+        return radii
+
+    def _defects(
+        self, rates: Rates, terms: list[list[Any]], h: Fraction, sizes: list[list[Any]]
+    ) -> list[Any]:
+        """Return bounds of the defect of the polynomials in each block."""
+        count = 2 * self.order + 2
+        length, begin = abs(ball(h)), ball(self.state.time)
+        ctx.cap = count
+        found = rates(arb_series([begin, 1]), [arb_series(each) for each in terms])
+        rests = self._rests(rates, terms, h, count)
+        bounds = []
+        for slope, each, rest in zip(found, terms, rests, strict=True):
+            series = _terms(slope, count)
+            for k in range(1, len(each)):
+                series[k - 1] -= k * each[k]
+            total = _value([abs(x) for x in series], length)
+            bounds.append(_upper(total + rest))
+        return [self.norm(bounds, block) for block in self.blocks]
+
+    def _rests(self, rates: Rates, terms: list[list[Any]], h: Fraction, count: int) -> list[Any]:
+        """Return bounds of the terms from number `count` on of the rates along the polynomials.
+
+        By Cauchy's estimate they are at most a geometric series.
+        """
+        length = abs(ball(h))
+        best: list[Any] | None = None
+        for circle in _CIRCLES:
+            around = length * circle
+            inputs = []
+            for each in terms:
+                radius = _upper(_value([arb(0), *(abs(x) for x in each[1:])], around))
+                inputs.append(acb(arb(each[0], radius), arb(0, radius)))
+            # A square contains the circle.
+            radius = _upper(around)
+            centre = ball(self.state.time)
+            found = rates(acb(centre + arb(0, radius), arb(0, radius)), inputs)
+            sizes = [arb(acb(x).abs_upper()) for x in found]
+            if all(x.is_finite() for x in sizes):
+                ratio = arb(1) / circle
+                rests = [x * ratio**count / (1 - ratio) for x in sizes]
+                if best is None or sum(map(float, rests)) < sum(map(float, best)):
+                    best = rests
+        if best is None:
+            raise _NoStepError
+        return best
+
+    def _growth(self, rates: Rates, time: Any, inputs: list[Any]) -> Any:
+        """Return the matrix that bounds the growth of the radii (1/s).
+
+        On its diagonal are bounds of the logarithmic norms of the diagonal blocks of the Jacobian,
+        and 0 instead of negative ones; elsewhere are bounds of the norms of the other blocks.
+        """
+        count = len(inputs)
+        unit = [[arb(int(i == j)) for j in range(count)] for i in range(count)]
+        found = rates(time, [Dual(x, row) for x, row in zip(inputs, unit, strict=True)])
+        side = 1 if self.forward else -1
+        jacobian = [
+            [side * x * t / s for x, t in zip(each.slopes, self.scales, strict=True)]
+            if isinstance(each, Dual)
+            else [arb(0)] * count
+            for each, s in zip(found, self.scales, strict=True)
+        ]
+        rows = []
+        for block in self.blocks:
+            row = []
+            for other in self.blocks:
+                part = [line[other] for line in jacobian[block]]
+                row.append(_log_norm(part) if block == other else _norm(part))
+            rows.append(row)
+        return arb_mat(rows)
+
+
+def _log_norm(part: list[list[Any]]) -> Any:
+    """Return a bound, at least 0, of the logarithmic norm of a matrix (by Gershgorin's circles)."""
+    largest = arb(0)
+    for i, row in enumerate(part):
+        others = sum((_upper(abs(x + part[j][i]) / 2) for j, x in enumerate(row) if j != i), arb(0))
+        end = _upper(row[i] + others)
+        if end > largest:
+            largest = end
+    return largest
+
+
+def _norm(part: list[list[Any]]) -> Any:
+    return _upper(sum((_upper(abs(x)) ** 2 for row in part for x in row), arb(0)).sqrt())
+
+
+def _value(terms: Sequence[Any], offset: Any) -> Any:
+    total = arb(0)
+    for term in reversed(terms):
+        total = total * offset + term
+    return total
+
+
+def _log2(x: Any) -> float:
+    """Return the binary logarithm of the middle of a ball, roughly; -inf for 0."""
+    middle = abs(x.mid())
+    return float(middle.log()) / math.log(2.0) if middle > 0 else -math.inf

@@ -30,6 +30,7 @@ _GROUPS = {
     },
     "rigid bodies": {
         "rotations": "find steady rotations of a scene, their stability and the time between flips",
+        "prove": "enclose the true solution in proved intervals, and check certificates",
         "sweep": "solve a grid of scenes on this machine or a cluster and store the results",
     },
     "checks and publication": {

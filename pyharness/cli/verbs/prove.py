@@ -1,0 +1,83 @@
+"""The verb `prove`: enclose the true solution of a scene, and check certificates."""
+
+import argparse
+import json
+
+from pyharness.cli import options as shared
+from pyharness.model.errors import InputError
+from pyharness.truth.certificate import prove
+from pyharness.truth.certificate_checker import check_file
+from pyharness.truth.enclosed import with_energy
+from pyharness.truth.enclosure import MOST_DIGITS, enclose
+from pyharness.truth.enclosure_report import certificates_report, enclosure_report
+
+_DIGITS = 25
+OPTIONS = {
+    **shared.SCENE,
+    "--times T1,T2,...": "Times of the results, s, of either sign, in the order of their distance "
+    "from 0 (default: the end of the scene's last step).",
+    "--digits D": f"Largest radius, 10**-D rad/s, 1 to {MOST_DIGITS} (default {_DIGITS}); times "
+    "the angular velocity where that is above 1 rad/s.",
+    "--velocity": "Enclose the translational velocity too; needs python-flint.",
+    "--transition": "Enclose the derivatives of the solution by the initial angular velocity too; "
+    "needs python-flint.",
+    "--certificate FILE": "Write a certificate of the steps to this file (.json), which --check "
+    "verifies; for torques that depend on time alone.",
+    "--check FILE,...": "Verify certificates in these files, instead of a proof; needs no library.",
+    **shared.EFFORT,
+    **shared.outputs(plot=""),
+}
+EXAMPLE = "prove --case 3 --times 1,3"
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print intervals that are proved to contain the true solution of a scene, or check a proof.
+
+    Return exit status 1 if a certificate that is checked does not hold, otherwise 0.
+    """
+    if options.check is not None:
+        return _check(options)
+    scene = shared.chosen_scene(
+        options, any_axes=True, any_torque=True, any_state=True, changing=True
+    )
+    times = [scene.times()[-1]]
+    if options.times is not None:
+        times = shared.numbers(options.times, "--times")
+    digits = _DIGITS if options.digits is None else shared.whole(options.digits, "--digits")
+    if not 1 <= digits <= MOST_DIGITS:
+        raise InputError(f"--digits: {digits}; allowed: 1 to {MOST_DIGITS}")
+    effort = shared.chosen_effort(options)
+    shared.check_outputs(options)
+    if options.certificate is None:
+        found = enclose(
+            scene,
+            times,
+            digits,
+            velocity=options.velocity,
+            transition=options.transition,
+            effort=effort,
+            progress=shared.progress,
+        )
+    else:
+        from pyharness.model.output_files import check_writable, write_files
+
+        shared.refuse(options, "--certificate", ("velocity", "transition"))
+        check_writable(options.certificate, "--certificate")
+        proof = prove(scene, times, digits, effort, shared.progress)
+        text = json.dumps(proof.certificate, separators=(",", ":")) + "\n"
+        write_files({options.certificate: text.encode()}, "--certificate")
+        found = with_energy(scene, proof.enclosure)
+    shared.show(enclosure_report(scene, digits, found), options)
+    return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    others = ("case", "scene", "omega0", "step_size", "steps", "times", "digits", "velocity")
+    shared.refuse(options, "--check", (*others, "transition", "certificate", "effort"))
+    shared.check_outputs(options)
+    found = []
+    for name in shared.names(options.check):
+        found.append((name, *check_file(name)))
+        shared.progress(len(found), len(shared.names(options.check)), name)
+    shared.show(certificates_report(found), options)
+    return int(any(steps is None for _, steps, _ in found))

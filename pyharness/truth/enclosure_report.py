@@ -1,0 +1,110 @@
+"""The reports of the verb `prove`: enclosures of a solution, and checked certificates."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from pyharness.model.records import scene_record
+from pyharness.model.report import Column, Report, Section, Table, counted, short
+from pyharness.model.scene import Scene
+from pyharness.model.scene_report import heading
+from pyharness.truth.enclosed import Enclosure
+
+_NAMES = {
+    "omega": ("omega1", "omega2", "omega3"),
+    "attitude": ("q0", "q1", "q2", "q3"),
+    "velocity": ("V1", "V2", "V3"),
+    "energy": ("energy",),
+}
+_UNITS = {"omega": "rad/s", "attitude": "", "velocity": "m/s", "energy": "J", "transition": ""}
+_RADIUS = {"omega": "radius"}
+
+
+def enclosure_report(scene: Scene, digits: int, found: Enclosure) -> Report:
+    """Return the report of an enclosure: the proved digits of the solution, and radii.
+
+    `digits` is the number of digits that was requested.
+    """
+    rows = found.rows()
+    lines = [line for row in rows for line in _lines(row)]
+    steps = f", {counted(found.steps, 'step')}" if found.steps else ""
+    text: list[Section] = [
+        heading(scene),
+        [
+            f"proved by {found.how}{steps}. The true value differs from a value by at most its "
+            "radius:",
+            Table(
+                [
+                    Column("time", lambda x: f"{x:.6g}", unit="s"),
+                    Column("quantity", left=True),
+                    Column("value", left=True),
+                    Column("radius", short),
+                ],
+                [[time, name, value, radius] for time, name, value, radius, _ in lines],
+            ),
+        ],
+    ]
+    columns = [
+        Column("time", unit="s"),
+        Column("quantity"),
+        Column("value"),
+        Column("radius"),
+        Column("unit"),
+    ]
+    return Report(
+        "prove",
+        text,
+        record=lambda: {
+            "scene": scene_record(scene),
+            "digits": digits,
+            "how": found.how,
+            "steps": found.steps,
+            "rows": rows,
+        },
+        data=Table(columns, lines),
+    )
+
+
+def _lines(row: dict[str, Any]) -> list[list[Any]]:
+    """Return a line for each component: time, name, value, radius and unit."""
+    lines = []
+    for quantity, unit in _UNITS.items():
+        values = row.get(quantity, ())
+        names = _NAMES.get(quantity) or [
+            f"d{'omega' if n < 9 else 'q'}{n // 3 + 1 if n < 9 else n // 3 - 3}/domega{n % 3 + 1}"
+            for n in range(len(values))
+        ]
+        radius = row.get(_RADIUS.get(quantity, f"{quantity}_radius"))
+        lines += [
+            [row["time"], name, value, radius, unit]
+            for name, value in zip(names, values, strict=False)
+        ]
+    return lines
+
+
+def certificates_report(found: Sequence[tuple[str, int | None, str]]) -> Report:
+    """Return the report of checked certificates.
+
+    Each of `found` has the name of a file, the number of its steps or None if the certificate does
+    not hold, and the reason why not.
+    """
+    rows = [
+        [name, "proved", steps, "-"] if steps is not None else [name, "not proved", None, why]
+        for name, steps, why in found
+    ]
+    columns = [
+        Column("certificate", left=True),
+        Column("verdict", left=True),
+        Column("steps"),
+        Column("reason", left=True, fit="wrap"),
+    ]
+    return Report(
+        "prove",
+        [[Table(columns, rows)]],
+        record=lambda: {
+            "certificates": [
+                {"file": name, "proved": steps is not None, "steps": steps, "reason": why}
+                for name, steps, why in found
+            ]
+        },
+        data=Table(columns, rows),
+    )

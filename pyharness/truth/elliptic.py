@@ -10,48 +10,50 @@ import decimal
 import itertools
 from collections.abc import Sequence
 from decimal import Decimal
+from fractions import Fraction
 
+from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.decimal_series import Row
-from pyharness.truth.reference import exact_coefficients
 
 # Digits of the arithmetic, in addition to the digits that the squares of small components need.
 _DIGITS = 90
 
 
-def torque_free(scene: Scene, time: float, rounded: bool = False) -> Row:
+def torque_free(scene: Scene, time: float | Decimal, rounded: bool = False) -> Row:
     """Return omega (rad/s) of a scene without torque at `time` (s).
 
-    The motion must be bounded, as it is if the coefficients A, B and C belong to moments. If
-    `rounded` is true, A, B and C rounded to binary64 are used instead of the exact coefficients.
-    Raise InputError if the torque depends on the state.
+    The motion must be bounded. It is if the coefficients A, B and C belong to moments, if all are
+    0, or if one of them is above 0 and one below 0. A steady rotation is bounded for any
+    coefficients. If `rounded` is true, A, B and C rounded to binary64 are used instead of the exact
+    coefficients. Raise InputError if the torque depends on the state, or if the coefficients allow
+    unbounded motions and the rotation is not steady.
     """
-    checked_scene(scene)
+    i = checked_scene(scene).exact_moments
+    a, w = [Fraction(x) for x in scene.euler_coefficients], [Fraction(x) for x in scene.omega]
+    if i is not None and not rounded:
+        a = [(i[k - 2] - i[k - 1]) / i[k] for k in range(3)]
     with decimal.localcontext() as context:
         context.prec = _DIGITS
         context.Emax, context.Emin = decimal.MAX_EMAX, decimal.MIN_EMIN
-        omega = [Decimal(w) for w in scene.omega]
-        coefficients = exact_coefficients(scene)
-        context.prec += 2 * _decades(omega) + 2 * _decades(coefficients)
-        coefficients = exact_coefficients(scene)
-        if rounded:
-            coefficients = [Decimal(x) for x in scene.euler_coefficients]
-        return _solution(coefficients, omega, Decimal(time))
+        if not any(a[k] * w[k - 1] * w[k - 2] for k in range(3)):
+            return [Decimal(x) for x in scene.omega]
+        context.prec += 2 * _decades(w) + 2 * _decades(a)
+        return _solution(a, w, Decimal(time))
 
 
-def _decades(values: Row) -> int:
+def _decades(values: Sequence[Fraction]) -> int:
     """Return the difference of the decimal exponents of the largest and the smallest magnitude.
 
     Zeros among `values` are ignored.
     """
-    powers = [value.adjusted() for value in values if value]
+    powers = [_decimal(value).adjusted() for value in values if value]
     return max(powers) - min(powers) if powers else 0
 
 
-def _solution(coefficients: Sequence[Decimal], start: Sequence[Decimal], time: Decimal) -> Row:
-    if not any(coefficients):
-        return list(start)
+def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time: Decimal) -> Row:
+    """Return omega (rad/s) at `time` (s) of a motion that is not steady."""
     # Permute the axes so that the coefficient whose sign differs from the two others is the second.
     # Make it negative by changing the signs of all coefficients and of all components of omega.
     for first, sign in itertools.product(range(3), (1, -1)):
@@ -60,22 +62,46 @@ def _solution(coefficients: Sequence[Decimal], start: Sequence[Decimal], time: D
         if a[0] >= 0 > a[1] and a[2] >= 0:
             break
     else:
-        raise ValueError("the motion is not bounded")
+        raise InputError(
+            "the motion is not bounded; allowed: coefficients of which one is above 0 and one below "
+            "0, or all 0, or a steady rotation"
+        )
     omega = [sign * start[axis] for axis in axes]
-    if not (a[0] and a[2]):
-        found = _turned(a, omega, time)
+    if a[0] and a[2]:
+        found = _general(a, omega, time)
     else:
-        s1, s2, s3 = (abs(each) for each in a)
-        factors = [(s2 * s3).sqrt(), (s1 * s3).sqrt(), (s1 * s2).sqrt()]
-        scaled = [f * w for f, w in zip(factors, omega, strict=True)]
-        found = [x / f for f, x in zip(factors, _normal(scaled, time), strict=True)]
+        found = _turned([_decimal(x) for x in a], [_decimal(x) for x in omega], time)
     result = [Decimal(0)] * 3
     for axis, value in zip(axes, found, strict=True):
         result[axis] = sign * value
     return result
 
 
-def _turned(a: Sequence[Decimal], omega: Row, time: Decimal) -> Row:
+def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) -> Row:
+    """Return omega (rad/s) at `time` (s) if no coefficient is 0 and the second one is negative.
+
+    Multiplied by factors, the components satisfy x' = y z, y' = -z x, z' = x y. The invariants
+    p = x**2 + y**2 and q = z**2 + y**2 (1/s**2) are compared as fractions, because on the
+    separatrix, where p = q, a rounding error would cause flips.
+    """
+    s1, s2, s3 = (abs(each) for each in a)
+    squares = [s2 * s3, s1 * s3, s1 * s2]
+    x2, y2, z2 = (f * w * w for f, w in zip(squares, omega, strict=True))
+    p, q = x2 + y2, z2 + y2
+    with decimal.localcontext() as context:
+        if p != q:
+            # Near the separatrix the solution loses digits by cancellation.
+            context.prec += max(0, -_decimal(abs(q - p) / max(p, q)).adjusted())
+        factors = [_decimal(f).sqrt() for f in squares]
+        x, y, z = (f * _decimal(w) for f, w in zip(factors, omega, strict=True))
+        if q < p:
+            scaled = _normal([z, y, x], q, p, time)[::-1]
+        else:
+            scaled = _normal([x, y, z], p, q, time)
+        return [x / f for f, x in zip(factors, scaled, strict=True)]
+
+
+def _turned(a: Row, omega: Row, time: Decimal) -> Row:
     """Return omega (rad/s) at `time` (s) of a motion in which the first or third coefficient is 0.
 
     The component of omega about the axis with coefficient 0 is constant, and the two other
@@ -97,24 +123,19 @@ def _turned(a: Sequence[Decimal], omega: Row, time: Decimal) -> Row:
     return row
 
 
-def _normal(start: Row, time: Decimal) -> Row:
+def _normal(start: Row, p: Fraction, q: Fraction, time: Decimal) -> Row:
     """Return x, y, z at `time` (s), where x' = y z, y' = -z x, z' = x y.
 
-    `start` contains x, y, z at time 0 (1/s). The solution uses the addition theorems of the
-    elliptic functions sn, cn and dn.
+    `start` contains x, y, z at time 0 (1/s), and z is not 0. The invariants are p = x**2 + y**2
+    and q = z**2 + y**2 (1/s**2), where q is not less than p and p is not 0. The solution uses the
+    addition theorems of the elliptic functions sn, cn and dn.
     """
     x, y, z = start
-    p, q = x * x + y * y, z * z + y * y
-    if q < p:
-        return _normal([z, y, x], time)[::-1]
-    if not p:
-        return list(start)
     sign = -1 if z < 0 else 1
-    root_p, root_q = p.sqrt(), q.sqrt()
+    root_p, root_q, k2 = _decimal(p).sqrt(), _decimal(q).sqrt(), _decimal(p / q)
     # x = root_p cn, y = -sign root_p sn, z = sign root_q dn.
     s0, c0, d0 = -sign * y / root_p, x / root_p, abs(z) / root_q
-    k2 = p / q
-    s, c, d = jacobi(root_q * time, (q - p) / q)
+    s, c, d = jacobi(root_q * time, _decimal(1 - p / q))
     under = 1 - k2 * s0 * s0 * s * s
     sn = (s0 * c * d + s * c0 * d0) / under
     cn = (c0 * c - s0 * s * d0 * d) / under
@@ -152,3 +173,8 @@ def jacobi(u: Decimal, comodulus: Decimal) -> tuple[Decimal, Decimal, Decimal]:
         sn, cn = (1 + k1) * sn / (1 + square), cn * dn / (1 + square)
         dn = (1 - square) / (1 + square)
     return sn, cn, dn
+
+
+def _decimal(x: Fraction) -> Decimal:
+    """Return a fraction rounded to the current decimal arithmetic."""
+    return Decimal(x.numerator) / x.denominator

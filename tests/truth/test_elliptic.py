@@ -61,6 +61,39 @@ def test_digits_hold_over_many_flips() -> None:
         assert max(energies) - min(energies) < Decimal("1e-60")
 
 
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("moments", [(6.0, 5.0, 2.0), (5.0, 6.0, 2.0), (3.0, 0.7, 2.9)])
+def test_steady_rotation_is_constant(moments: tuple[float, float, float], axis: int) -> None:
+    """A steady rotation about the middle axis is unstable, but its exact solution is constant."""
+    for size in (1.0, -0.3):
+        omega = [0.0, 0.0, 0.0]
+        omega[axis] = size
+        scene = Scene("", (omega[0], omega[1], omega[2]), moments=moments)
+        for rounded in (False, True):
+            for time in (200.0, 250.0, -1e6):
+                assert torque_free(scene, time, rounded) == [Decimal(w) for w in omega]
+
+
+@pytest.mark.parametrize(
+    ("moments", "omega"),
+    [
+        ((6.0, 5.0, 2.0), (1e-3, 1.0, 1e-3)),
+        ((34.0, 26.0, 17.0), (-3.0, 1.0, 4.0)),
+        ((17.0, 26.0, 34.0), (4.0, -1.0, 3.0)),
+    ],
+)
+def test_motion_on_the_separatrix_never_flips_again(
+    moments: tuple[float, float, float], omega: tuple[float, float, float]
+) -> None:
+    """Omega approaches the middle axis, with a size that the energy determines."""
+    scene = Scene("", omega, moments=moments)
+    energy = sum(Decimal(i) * Decimal(w) ** 2 for i, w in zip(moments, omega, strict=True))
+    for time in (1e3, -1e4, 1e6):
+        first, second, third = torque_free(scene, time)
+        assert abs(Decimal(moments[1]) * second**2 - energy) < Decimal("1e-25")
+        assert max(abs(first), abs(third)) < Decimal("1e-90")
+
+
 def test_coefficients_as_binary64_holds_them() -> None:
     """The two solutions differ by the effect of one rounding of A, B and C; they are not equal."""
     scene = Scene("", _START, moments=(3.0, 0.7, 2.9))

@@ -147,6 +147,13 @@ def test_separatrix(omega: Triple) -> None:
     assert max(abs(first).upper(), abs(third).upper()) < flint.arb(10) ** -1000
 
 
+@pytest.mark.parametrize("end", [102.0, -347.0, 1e3, -1e4])
+def test_separatrix_with_coefficients_that_are_not_decimals(end: float) -> None:
+    """Coefficients rounded to decimals would leave the separatrix, and cause flips."""
+    scene = Scene("", (-3.0, 1.0, 4.0), moments=(34.0, 26.0, 17.0))
+    assert away(enclosed(scene, end, 60), torque_free(scene, end)) < 1e-60
+
+
 @pytest.mark.parametrize("small", [1e-15, 1e-150, 5e-324])
 def test_near_the_separatrix(small: float) -> None:
     """With 1 - m of 1e-30 and less, the working precision has more bits."""

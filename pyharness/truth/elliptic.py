@@ -59,12 +59,12 @@ def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time:
     for first, sign in itertools.product(range(3), (1, -1)):
         axes = [first, (first + 1) % 3, (first + 2) % 3]
         a = [sign * coefficients[axis] for axis in axes]
-        if a[0] >= 0 > a[1] and a[2] >= 0:
+        if a[0] >= 0 > a[1] and a[2] >= 0 and (a[0] or a[2]):
             break
     else:
         raise InputError(
-            "the motion is not bounded; allowed: coefficients of which one is above 0 and one below "
-            "0, or all 0, or a steady rotation"
+            "the motion is not bounded; allowed: a steady rotation, or coefficients of which one "
+            "is above 0 and one below 0, or all 0"
         )
     omega = [sign * start[axis] for axis in axes]
     if a[0] and a[2]:
@@ -94,11 +94,9 @@ def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) ->
             context.prec += max(0, -_decimal(abs(q - p) / max(p, q)).adjusted())
         factors = [_decimal(f).sqrt() for f in squares]
         x, y, z = (f * _decimal(w) for f, w in zip(factors, omega, strict=True))
-        if q < p:
-            scaled = _normal([z, y, x], q, p, time)[::-1]
-        else:
-            scaled = _normal([x, y, z], p, q, time)
-        return [x / f for f, x in zip(factors, scaled, strict=True)]
+        scaled = [x, y, z] if p <= q else [z, y, x]
+        found = _normal(scaled, min(p, q), max(p, q), time)
+        return [x / f for f, x in zip(factors, found if p <= q else found[::-1], strict=True)]
 
 
 def _turned(a: Row, omega: Row, time: Decimal) -> Row:

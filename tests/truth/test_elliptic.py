@@ -1,13 +1,13 @@
 """The truth of torque-free motion, compared with the series, and checked by the laws of a flow."""
 
 import itertools
-from dataclasses import replace
 from decimal import Decimal
 
 import mpmath
 import numpy as np
 import pytest
 
+from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.truth.elliptic import jacobi, torque_free
 from pyharness.truth.reference import reference
@@ -106,13 +106,26 @@ def test_coefficients_as_binary64_holds_them() -> None:
     )
 
 
-def test_unbounded_motion_is_refused() -> None:
-    scene = Scene("", _START, coefficients=(1.0, 1.0, 1.0))
-    with pytest.raises(ValueError, match="not bounded"):
+@pytest.mark.parametrize(
+    "coefficients",
+    [(1.0, 1.0, 1.0), (0.0, 1.0, 2.0), (0.0, -1.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 2.0)],
+)
+def test_unbounded_motion_is_refused(coefficients: tuple[float, float, float]) -> None:
+    """If only one coefficient is not 0, its component of omega is linear in time."""
+    scene = Scene("", _START, coefficients=coefficients)
+    with pytest.raises(InputError, match="not bounded; allowed"):
         torque_free(scene, 1.0)
-    assert torque_free(replace(scene, coefficients=(0.0, 0.0, 0.0)), 1.0) == [
-        Decimal(w) for w in _START
-    ]
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "omega"),
+    [((0.0, 0.0, 0.0), _START), ((1.0, 1.0, 1.0), (0.0, 2.0, 0.0)), ((0.0, -1.0, 0.0), (0, 1, 3))],
+)
+def test_steady_rotation_is_constant_for_any_coefficients(
+    coefficients: tuple[float, float, float], omega: tuple[float, float, float]
+) -> None:
+    scene = Scene("", omega, coefficients=coefficients)
+    assert torque_free(scene, 1e3) == [Decimal(w) for w in omega]
 
 
 @pytest.mark.parametrize("comodulus", ["0.5", "1e-9", "1e-30", "1", "0"])

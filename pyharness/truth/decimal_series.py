@@ -40,6 +40,7 @@ def taylor_series(
     order: int,
     tolerance: Decimal,
     effort: float | None,
+    start: Row | None = None,
 ) -> list[Row]:
     """Return a row of omega, velocity and attitude at each of `times` (s).
 
@@ -62,6 +63,7 @@ def taylor_series(
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
     moving = len(state)
     state += [Decimal(x) for x in scene.attitude or ()]
+    state = start or state
     begin = Decimal(0)
     rows: list[Row] = []
     forward = times[-1] >= 0

@@ -2,8 +2,10 @@
 
 In each period of omega the body rotates about the angular momentum by the same angle. Therefore an
 integration of omega and attitude over one period, by Taylor series, determines the attitude at any
-time. This module shares no code with the closed form that it checks. It uses no theta function, and
-it uses an elliptic integral only for the length of the period.
+time. Near the separatrix the motion amplifies the errors of omega exponentially. The integration
+therefore consists of segments, and each segment starts from omega of `elliptic.py`, which has no
+such errors. This module shares no code with the closed form that it checks. It uses no theta
+function.
 """
 
 import decimal
@@ -11,14 +13,22 @@ from decimal import Decimal
 from fractions import Fraction
 
 from pyharness.model.attitude import product
+from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.truth.decimal_functions import pi, sine_cosine
 from pyharness.truth.decimal_series import Row, taylor_series
+from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import exact_coefficients
 
 # Digits of the arithmetic; thirty of them are correct after 1e6 periods.
 _DIGITS = 50
 _ORDER, _TOLERANCE = 44, Decimal("1e-44")
+# Length of a segment in units of 1/rate, in which errors grow by a factor of some e**10 = 2e4.
+_SEGMENT = 10
+# On the separatrix omega counts as steady where sech(rate * time - u) is below some e**-_SETTLED.
+_SETTLED = 120
+# Work limit of the integration in radians; some three minutes.
+_MOST_RADIANS = 1e5
 
 
 def free_attitude(scene: Scene, time: float) -> Row:
@@ -26,9 +36,9 @@ def free_attitude(scene: Scene, time: float) -> Row:
 
     The quaternion is a continuous function of time, which determines its sign. The scene must have
     moments and an attitude. The motion is integrated over at most one period of omega, which is
-    long near the separatrix. On the separatrix omega has no period. There the motion is integrated
-    from 0 to `time`. Raise InputError if the integration takes too many steps, or if the torque
-    depends on the state.
+    long near the separatrix. On the separatrix omega has no period, but approaches a steady
+    rotation. There the motion is integrated until the rotation is steady to all digits. Raise
+    InputError if the integration takes too many steps, or if the torque depends on the state.
     """
     checked_scene(scene)
     assert scene.attitude is not None
@@ -38,17 +48,17 @@ def free_attitude(scene: Scene, time: float) -> Row:
         begin = _unit([Decimal(x) for x in scene.attitude])
         end = Decimal(time)
         if is_steady(scene):
-            omega = [Decimal(w) for w in scene.omega]
-            speed = sum((w * w for w in omega), Decimal(0)).sqrt()
-            sine, cosine = sine_cosine(speed * end / 2)
-            across = [w * sine / speed for w in omega] if speed else omega
-            return list(product(begin, [cosine, *across]))
-        period = period_of(scene)
-        if period is None or abs(end) <= period:
-            return _followed(scene, [end])[0]
+            return _rotated(begin, [Decimal(w) for w in scene.omega], end)
+        rate, period = _rate_and_period(scene)
+        if period is None:
+            settled = min(abs(end), _settling_time(scene, rate)).copy_sign(end)
+            after = _followed(scene, [settled], rate)[0]
+            return _rotated(after, torque_free(scene, settled), end - settled)
+        if abs(end) <= period:
+            return _followed(scene, [end], rate)[0]
         whole, rest = divmod(abs(end), period)
         period, rest = period.copy_sign(end), rest.copy_sign(end)
-        after_rest, after_period = _followed(scene, [rest, period])
+        after_rest, after_period = _followed(scene, [rest, period], rate)
         # The rotation in space by which one period changes the attitude, whenever it begins.
         turn = list(product(after_period, conjugate(begin)))
         return _unit(list(product(_power(turn, int(whole)), after_rest)))
@@ -59,23 +69,57 @@ def period_of(scene: Scene) -> Decimal | None:
 
     The period is accurate to nearly all digits of the current decimal arithmetic.
     """
+    return _rate_and_period(scene)[1]
+
+
+def _rate_and_period(scene: Scene) -> tuple[Decimal, Decimal | None]:
+    """Return the rate (1/s) of the elliptic functions in omega, and the period of omega (s).
+
+    The period is None on the separatrix. There, and near the separatrix, perturbations grow by at
+    most some exp(rate * time).
+    """
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     low, middle, high = sorted(range(3), key=lambda axis: i[axis])
     energies = [moment * rate * rate for moment, rate in zip(i, w, strict=True)]
     lower, upper, both = i[middle] - i[low], i[high] - i[middle], i[high] - i[low]
     gap = energies[low] * lower - energies[high] * upper
-    if not gap:
-        return None
     # With T the kinetic energy and L the angular momentum these are 2 T I_high - L**2 and
     # L**2 - 2 T I_low; `gap` is 2 T I_middle - L**2.
     stays = energies[low] * both + energies[middle] * upper
     turns = energies[high] * both + energies[middle] * lower
     larger = lower * stays if gap > 0 else upper * turns
+    if not larger:
+        return Decimal(0), None
     mean, other = (_root(larger / (i[0] * i[1] * i[2])), _root(both * abs(gap) / larger))
+    if not gap:
+        return mean, None
     least, most = other, Decimal(1)
     while most - least > most.scaleb(3 - decimal.getcontext().prec):
         most, least = (most + least) / 2, (most * least).sqrt()
-    return 2 * pi(decimal.getcontext().prec) / (mean * most)
+    return mean, 2 * pi(decimal.getcontext().prec) / (mean * most)
+
+
+def _settling_time(scene: Scene, rate: Decimal) -> Decimal:
+    """Return a time (s) from which on a motion on the separatrix is steady to all digits.
+
+    The time is valid in both directions. The components about the outer axes are proportional to
+    sech(rate * time - u), where exp(abs(u)) is at most 2/sech(u).
+    """
+    i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
+    low, middle, high = sorted(range(3), key=lambda axis: i[axis])
+    energies = [moment * rate * rate for moment, rate in zip(i, w, strict=True)]
+    # At u = 0, where omega has no component about the middle axis, the energy about the low axis is
+    # this part of the whole.
+    part = (i[high] - i[middle]) / (i[high] - i[low])
+    return ((2 * _root(sum(energies) * part / energies[low])).ln() + _SETTLED) / rate
+
+
+def _rotated(q: Row, omega: Row, time: Decimal) -> Row:
+    """Return the attitude `q` after a rotation with constant `omega` (rad/s) for `time` (s)."""
+    speed = sum((w * w for w in omega), Decimal(0)).sqrt()
+    sine, cosine = sine_cosine(speed * time / 2)
+    across = [w * sine / speed for w in omega] if speed else omega
+    return list(product(q, [cosine, *across]))
 
 
 def is_steady(scene: Scene) -> bool:
@@ -92,9 +136,31 @@ def conjugate(q: Row) -> Row:
     return [q[0], -q[1], -q[2], -q[3]]
 
 
-def _followed(scene: Scene, times: Row) -> list[Row]:
-    rows = taylor_series(scene, exact_coefficients(scene), times, False, _ORDER, _TOLERANCE, None)
-    return [_unit(row[3:]) for row in rows]
+def _followed(scene: Scene, times: Row, rate: Decimal) -> list[Row]:
+    """Return the attitude at each of `times` (s), which lead away from 0 on one side.
+
+    In a segment of length 1/`rate` errors grow by a factor of some e. Raise InputError if the body
+    rotates by more than the work limit.
+    """
+    angle = max(map(abs, scene.omega)) * float(abs(times[-1]))
+    if angle > _MOST_RADIANS:
+        raise InputError(
+            f"the attitude needs an integration over {angle:.2g} rad, above the limit of "
+            f"{_MOST_RADIANS:.0e} rad; give a time closer to 0, or moments farther from symmetry"
+        )
+    coefficients = exact_coefficients(scene)
+    q, begin, rows = _unit([Decimal(x) for x in scene.attitude or ()]), Decimal(0), []
+    for time in times:
+        count = int(abs(time - begin) * rate / _SEGMENT) + 1
+        ends = [begin + (time - begin) * k / count for k in range(1, count)]
+        for end in [*ends, time]:
+            state = [+w for w in torque_free(scene, begin)] + q
+            series = taylor_series(
+                scene, coefficients, [end - begin], False, _ORDER, _TOLERANCE, None, state
+            )
+            q, begin = _unit(series[0][3:]), end
+        rows.append(q)
+    return rows
 
 
 def _power(turn: Row, count: int) -> Row:

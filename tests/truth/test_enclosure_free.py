@@ -147,6 +147,25 @@ def test_separatrix(omega: Triple) -> None:
     assert max(abs(first).upper(), abs(third).upper()) < flint.arb(10) ** -1000
 
 
+@pytest.mark.parametrize(
+    ("omega", "end"),
+    [
+        ((1e-3, 1.0, 1e-3), 250.0),
+        ((1e-3, -1.0, 1e-3), 300.0),
+        ((1e-150, 1.0, -1e-150), -1e3),
+        ((-1e-3, 1.0, 1e-3), 1e4),
+        ((1e-15, 1.0, 0.0), 250.0),
+        ((1e-30, 1.0, 0.0), -1e4),
+        ((0.0, 1.0, 1e-60), 1e3),
+    ],
+)
+def test_attitude_on_and_near_the_separatrix(omega: Triple, end: float) -> None:
+    """The motion amplifies errors of omega by exp(0.63 t), or up to each flip."""
+    scene = Scene("", omega, moments=(6.0, 5.0, 2.0), attitude=ATTITUDE)
+    row = enclosed(scene, end, attitude=True)
+    assert away(row[3:], free_attitude(scene, end)) <= ATTITUDE_ERROR
+
+
 @pytest.mark.parametrize("end", [102.0, -347.0, 1e3, -1e4])
 def test_separatrix_with_coefficients_that_are_not_decimals(end: float) -> None:
     """Coefficients rounded to decimals would leave the separatrix, and cause flips."""

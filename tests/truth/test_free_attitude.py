@@ -1,15 +1,16 @@
 """The truth of the attitude without torque, compared with independent series of 200 bits."""
 
 import random
-from decimal import Decimal
+from decimal import Decimal, localcontext
 
 import mpmath
 import pytest
 
-from pyharness import Scene
+from pyharness import InputError, Scene
+from pyharness.model.attitude import product
 from pyharness.model.scene import Triple
 from pyharness.scenes.free_motions import KINDS, draw
-from pyharness.truth.free_attitude import free_attitude, is_steady, period_of
+from pyharness.truth.free_attitude import conjugate, free_attitude, is_steady, period_of
 from tests.exact_attitude import DIGITS, exact
 
 
@@ -48,3 +49,24 @@ def test_separatrix_and_rest_are_told(omega: Triple, steady: bool, endless: bool
         period = period_of(scene) or Decimal(0)
         near, far = (free_attitude(scene, float(period) * part) for part in (0.999999, 1.000001))
         assert sum(abs(x - y) for x, y in zip(near, far, strict=True)) < Decimal("1e-3")
+
+
+@pytest.mark.parametrize("end", [-400.0, 1e6])
+def test_a_settled_motion_on_the_separatrix_is_a_steady_rotation(end: float) -> None:
+    """The limit of omega2 is above 0 before the flip, and below 0 after it."""
+    scene = Scene("", (1e-3, 1.0, 1e-3), moments=(6.0, 5.0, 2.0), attitude=(0.5, -0.1, 0.7, 0.5))
+    early, late = free_attitude(scene, end / 2), free_attitude(scene, end)
+    with localcontext(prec=50):
+        turn = product(conjugate(early), late)
+    with mpmath.workdps(DIGITS):
+        angle = -mpmath.sqrt(1 + 8 * mpmath.mpf(1e-3) ** 2 / 5) * abs(end) / 4
+        wanted = [mpmath.cos(angle), 0, mpmath.sin(angle), 0]
+        pairs = zip(turn, wanted, strict=True)
+        assert max(abs(mpmath.mpf(str(x)) - y) for x, y in pairs) < mpmath.mpf("1e-30")
+
+
+def test_too_long_an_integration_is_refused() -> None:
+    moments, attitude = (3.0, 3.0 * (1.0 - 1e-12), 2.0), (1.0, 0.0, 0.0, 0.0)
+    scene = Scene("", (1e-3, 1.0, 1e-6), moments=moments, attitude=attitude)
+    with pytest.raises(InputError, match=r"over 1e\+06 rad, above the limit of 1e\+05 rad; give"):
+        free_attitude(scene, 1e6)

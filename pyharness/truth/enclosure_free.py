@@ -1,24 +1,32 @@
 """Proved enclosures of torque-free motion at any time, in ball arithmetic (python-flint).
 
 A ball is a midpoint with a radius, and it contains the true value, because python-flint rounds
-rigorously. Omega is expressed by Jacobi's elliptic functions, and the attitude by a theta function
-(Jacobi 1850; Whittaker, Analytical Dynamics, section 69). Each decision between formulas compares
-fractions, never balls: the binary64 numbers of a scene are exact. Import this module only where
-python-flint is installed.
+rigorously. Omega is expressed by Jacobi's elliptic functions (`enclosure_omega.py`), and the
+attitude by a theta function (Jacobi 1850; Whittaker, Analytical Dynamics, section 69). Each
+decision between formulas compares fractions, never balls: the binary64 numbers of a scene are
+exact. Import this module only where python-flint is installed.
 """
 
 import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 
-from flint import acb, arb, ctx, fmpq
+from flint import acb, arb, ctx
 
 from pyharness.model.attitude import product
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.values import integer
+from pyharness.truth.enclosure_omega import (
+    Balls,
+    Orbit,
+    ball,
+    carlson,
+    euler_coefficients,
+    integer_near,
+    omega_on_ellipse,
+)
 
-Balls = list[arb]
 # The working precision is doubled up to this number of bits.
 _MOST_BITS = 20_000
 
@@ -42,7 +50,7 @@ def enclose_free(
     while True:
         with ctx.workprec(bits):
             least = arb(10) ** -digits
-            limits = [_ball(scale) * least] * 3 + [least] * 4 * attitude
+            limits = [ball(scale) * least] * 3 + [least] * 4 * attitude
             solution = _solution(scene, attitude)
             rows = [solution(Fraction(time)) for time in times]
             if all(x.rad() <= y for row in rows for x, y in zip(row, limits, strict=True)):
@@ -65,7 +73,7 @@ def _check(scene: Scene, times: Sequence[float], digits: int, attitude: bool) ->
         raise InputError(f"digits is {digits}; allowed: 0 or more")
     if attitude and (scene.attitude is None or scene.moments is None):
         raise InputError("the attitude needs moments and an initial attitude; give both")
-    signs = {(a > 0) - (a < 0) for a in _coefficients(scene)}
+    signs = {(a > 0) - (a < 0) for a in euler_coefficients(scene)}
     if signs != {0} and not signs >= {1, -1}:
         raise InputError(
             "the coefficients allow unbounded motions; allowed: one of them above 0 and one below "
@@ -73,28 +81,20 @@ def _check(scene: Scene, times: Sequence[float], digits: int, attitude: bool) ->
         )
 
 
-def _coefficients(scene: Scene) -> list[Fraction]:
-    """Return the exact coefficients A, B, C of Euler's equations."""
-    i = scene.exact_moments
-    if i is None:
-        return [Fraction(a) for a in scene.euler_coefficients]
-    return [(i[k - 2] - i[k - 1]) / i[k] for k in range(3)]
-
-
 def _solution(scene: Scene, attitude: bool) -> Callable[[Fraction], Balls]:
     """Return the function of time (s) that encloses omega, and the attitude if it is requested."""
-    a, w = _coefficients(scene), [Fraction(x) for x in scene.omega]
+    a, w = euler_coefficients(scene), [Fraction(x) for x in scene.omega]
     moments = scene.exact_moments if attitude else None
     begin = _unit([Fraction(x) for x in scene.attitude or ()]) if attitude else []
     if not any(a[k] * w[k - 1] * w[k - 2] for k in range(3)):
-        return lambda t: [*map(_ball, w), *_rotated(begin, [x * t / 2 for x in w])]
+        return lambda t: [*map(ball, w), *_rotated(begin, [x * t / 2 for x in w])]
     if all(a):
-        orbit = _Orbit(a, w)
+        orbit = Orbit(a, w)
         return orbit.omega if moments is None else _Attitude(orbit, moments, w, begin).row
     axis = a.index(Fraction(0))
 
     def symmetric(t: Fraction) -> Balls:
-        omega = _on_ellipse(axis, a, w, t)
+        omega = omega_on_ellipse(axis, a, w, t)
         if moments is None:
             return omega
         # The body rotates about the angular momentum, fixed in space, and about its own axis.
@@ -104,80 +104,6 @@ def _solution(scene: Scene, attitude: bool) -> Callable[[Fraction], Balls]:
         return omega + _rotated(turned, [(x - y) * t / 2 for x, y in zip(w, about, strict=True)])
 
     return symmetric
-
-
-def _on_ellipse(axis: int, a: list[Fraction], w: list[Fraction], t: Fraction) -> Balls:
-    """Return omega (rad/s) at time `t` (s) if the coefficient of `axis` is 0.
-
-    The component about this axis is constant, and the two others move on an ellipse.
-    """
-    j, k = axis - 2, axis - 1
-    angle = _ball(-a[j] * a[k] * (w[axis] * t) ** 2).sqrt()
-    cosine, sine = angle.cos(), angle.sinc() * _ball(w[axis] * t)
-    row = [_ball(x) for x in w]
-    row[j] = _ball(w[j]) * cosine + _ball(a[j] * w[k]) * sine
-    row[k] = _ball(w[k]) * cosine + _ball(a[k] * w[j]) * sine
-    return row
-
-
-class _Orbit:
-    """A motion that is not steady, with coefficients that are not 0.
-
-    The components of omega about three `axes` are `sizes` (rad/s) times cn(u), sn(u) and dn(u),
-    where u = `start` + `rate` t, with `rate` in 1/s. By DLMF Table 22.13.1 they satisfy Euler's
-    equations. The parameter is `m` = k**2, and `square` is the square of the size of dn. On the
-    separatrix m = 1; cn and dn are then sech, and sn is tanh.
-    """
-
-    def __init__(self, a: list[Fraction], w: list[Fraction]) -> None:
-        """Compute the constants for coefficients `a` and the initial omega `w` (rad/s)."""
-        s = [abs(x) for x in a]
-        # The sign of the coefficient of the axis of sn differs from the two others.
-        y = next(k for k in range(3) if a[k] * a[k - 1] < 0 and a[k] * a[k - 2] < 0)
-        x, z = (y + 1) % 3, (y + 2) % 3
-        if s[x] * w[z] ** 2 < s[z] * w[x] ** 2:
-            x, z = z, x
-        self.axes = x, y, z
-        first = w[x] ** 2 + s[x] / s[y] * w[y] ** 2
-        self.square = w[z] ** 2 + s[z] / s[y] * w[y] ** 2
-        squares = first, first * s[y] / s[x], self.square
-        self.m = s[z] * first / (s[x] * self.square)
-        self.rate = _ball(s[x] * s[y] * self.square).sqrt()
-        signs = [-1 if w[k] < 0 else 1 for k in self.axes]
-        self.sign = signs[2]
-        # sn increases where cn and dn are positive, as they are at u = `start`.
-        increasing = signs[0] * signs[2] * (1 if a[y] > 0 else -1)
-        self.sizes = [
-            sign * _ball(square).sqrt()
-            for sign, square in zip((signs[0], increasing, signs[2]), squares, strict=True)
-        ]
-        c2, s2, d2 = (w[k] ** 2 / square for k, square in zip(self.axes, squares, strict=True))
-        # Carlson's integral of the first kind, from -K to K (DLMF 19.25.5).
-        self.start = increasing * signs[1] * _ball(s2).sqrt() * _carlson(c2, d2, Fraction(1))
-        if self.m != 1:
-            mean, other = (arb(1).agm(_ball(x).sqrt()) for x in (1 - self.m, self.m))
-            # 2K, half the period of sn and cn, and tau = i K'/K (DLMF 19.8.5).
-            self.period, self.tau = arb.pi() / mean, acb(0, mean / other)
-            self.constants = [x.real for x in acb.modular_theta(acb(0), self.tau)]
-
-    def omega(self, t: Fraction) -> Balls:
-        """Return omega (rad/s) at time `t` (s)."""
-        row = [arb(0)] * 3
-        values = self._functions(self.start + self.rate * _ball(t))
-        for axis, size, value in zip(self.axes, self.sizes, values, strict=True):
-            row[axis] = size * value
-        return row
-
-    def _functions(self, u: arb) -> tuple[arb, arb, arb]:
-        """Return cn, sn and dn of the argument `u` (DLMF 22.2.4 to 22.2.6)."""
-        if self.m == 1:
-            return u.sech(), u.tanh(), u.sech()
-        whole = _near(u / self.period)
-        z = acb(u / self.period - whole)
-        one, two, three, four = (x.real for x in acb.modular_theta(z, self.tau))
-        _, b, c, d = self.constants
-        sign = -1 if whole % 2 else 1
-        return sign * d * two / (b * four), sign * c * one / (b * four), d * three / (c * four)
 
 
 class _Attitude:
@@ -195,7 +121,7 @@ class _Attitude:
     """
 
     def __init__(
-        self, orbit: _Orbit, moments: Sequence[Fraction], w: list[Fraction], begin: Balls
+        self, orbit: Orbit, moments: Sequence[Fraction], w: list[Fraction], begin: Balls
     ) -> None:
         """Compute the constants for the initial omega `w` (rad/s) and the quaternion `begin`."""
         self.orbit = orbit
@@ -203,31 +129,31 @@ class _Attitude:
         square = sum(((i * x) ** 2 for i, x in zip(moments, w, strict=True)), Fraction(0))
         along = moments[orbit.axes[2]]
         c2 = along**2 * orbit.square / square
-        momentum, c, s = (_ball(x).sqrt() for x in (square, c2, 1 - c2))
-        self.weights = [_ball(i) / momentum for i in moments]
-        w0, x0, y0, z0 = self._tilt([_ball(x) for x in w])
+        momentum, c, s = (ball(x).sqrt() for x in (square, c2, 1 - c2))
+        self.weights = [ball(i) / momentum for i in moments]
+        w0, x0, y0, z0 = self._tilt([ball(x) for x in w])
         self.begin = product(begin, (w0, -x0, -y0, -z0))
         # psi/2 is `pace` t/2 plus the change of the phase of `_turn`.
-        self.pace = _ball(energy) / momentum
+        self.pace = ball(energy) / momentum
         if orbit.m == 1:
             # The integral of 1/(1 + c sech u) is u - 2 c/s arctan(s/(1 + c) tanh(u/2)).
-            self.factor = (momentum / _ball(along) - self.pace) * c / (s * orbit.rate)
+            self.factor = (momentum / ball(along) - self.pace) * c / (s * orbit.rate)
             self.slope = s / (1 + c)
         else:
             # sn(y | 1 - m)**2 = (1 - c2)/(1 - (1 - m) c2), by DLMF 22.6.1 and Table 22.6.1.
-            y = s * _carlson(c2 * orbit.m, orbit.m, 1 - c2 * (1 - orbit.m)) / orbit.period
+            y = s * carlson(c2 * orbit.m, orbit.m, 1 - c2 * (1 - orbit.m)) / orbit.period
             self.shift = acb(0, -y if energy * along > square else y)
             # At u = 0, where dn = 1, the derivative of the phase determines the constant.
             theta = [acb.modular_theta(self.shift, 2 * orbit.tau, r)[3] for r in (0, 1)]
-            highest = (self.pace + _ball(orbit.square).sqrt()) / (1 + c)
+            highest = (self.pace + ball(orbit.square).sqrt()) / (1 + c)
             self.pace = highest - 2 * orbit.rate * (theta[1] / theta[0]).imag / orbit.period
         self.first = self._turn(orbit.start).conjugate()
 
     def row(self, t: Fraction) -> Balls:
         """Return omega (rad/s) and the attitude at time `t` (s)."""
         orbit, omega = self.orbit, self.orbit.omega(t)
-        turn = _direction(self.pace * _ball(t / 2)) * self.first
-        turn *= self._turn(orbit.start + orbit.rate * _ball(t))
+        turn = _direction(self.pace * ball(t / 2)) * self.first
+        turn *= self._turn(orbit.start + orbit.rate * ball(t))
         about = [turn.real, arb(0), arb(0), arb(0)]
         about[1 + orbit.axes[2]] = orbit.sign * turn.imag
         return [*omega, *product(product(self.begin, about), self._tilt(omega))]
@@ -237,7 +163,7 @@ class _Attitude:
         if self.orbit.m == 1:
             return _direction(self.factor * (self.slope * (u / 2).tanh()).atan())
         z = u / self.orbit.period
-        value = acb.modular_theta(z - _near(z) + self.shift, 2 * self.orbit.tau)[3]
+        value = acb.modular_theta(z - integer_near(z) + self.shift, 2 * self.orbit.tau)[3]
         return value / abs(value)
 
     def _tilt(self, omega: Balls) -> Balls:
@@ -259,30 +185,15 @@ def _rotated(q: Balls, half: list[Fraction]) -> Balls:
 
     If `q` is empty, because no attitude is requested, the result is empty.
     """
-    angle = _ball(sum((x**2 for x in half), Fraction(0))).sqrt()
-    vector = [_ball(x) * angle.sinc() for x in half]
+    angle = ball(sum((x**2 for x in half), Fraction(0))).sqrt()
+    vector = [ball(x) * angle.sinc() for x in half]
     return list(product(q, [angle.cos(), *vector])) if q else []
 
 
 def _unit(q: list[Fraction]) -> Balls:
-    length = _ball(sum((x**2 for x in q), Fraction(0))).sqrt()
-    return [_ball(x) / length for x in q]
-
-
-def _near(x: arb) -> int:
-    """Return an integer near the midpoint of `x`; any integer would be right for a reduction."""
-    mantissa, exponent = map(int, x.mid().man_exp())
-    return round(mantissa * Fraction(2) ** exponent)
-
-
-def _carlson(x: Fraction, y: Fraction, z: Fraction) -> arb:
-    """Return Carlson's integral R_F of three nonnegative numbers; at most one of them is 0."""
-    return acb.elliptic_rf(_ball(x), _ball(y), _ball(z)).real
+    length = ball(sum((x**2 for x in q), Fraction(0))).sqrt()
+    return [ball(x) / length for x in q]
 
 
 def _direction(angle: arb) -> acb:
     return acb(angle.cos(), angle.sin())
-
-
-def _ball(x: Fraction) -> arb:
-    return arb(fmpq(x.numerator, x.denominator))

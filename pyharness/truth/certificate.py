@@ -16,7 +16,7 @@ from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.truth.certificate_checker import FORMAT, SCALE_BITS, NotProvedError, System
-from pyharness.truth.enclosed import Balls, Enclosure, largest_radius, row_of
+from pyharness.truth.enclosed import Balls, Enclosure, check_order, largest_radius, row_of
 
 _LEAST_SCALE = 1e-4  # of the square of the largest one
 _TUBE_BITS = 30  # a tube is at least 2**-30 of the solution thick
@@ -79,6 +79,7 @@ def prove(
             "a certificate is for constant moments or coefficients and a torque law about the axes "
             "of the body; allowed for other scenes: prove without --certificate"
         )
+    check_order(times)
     record = _scene_record(scene)
     limit = _MOST_STEPS * checked_effort(effort)
     wanted = float(digits)
@@ -111,7 +112,11 @@ def _scene_record(scene: Scene) -> dict[str, Any]:
 
     return {
         "name": scene.name,
-        body: list(scene.moments or scene.coefficients or ()),
+        # The moments of a principal scene have more digits than a binary64 number.
+        body: [
+            float(x) if Fraction(float(x)) == x else str(x)
+            for x in scene.exact_moments or scene.coefficients or ()
+        ],
         "omega": list(scene.omega),
         "torque": {
             "constant": list(law.constant),

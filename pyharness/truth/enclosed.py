@@ -1,10 +1,13 @@
 """The results of an enclosure: balls that contain the solution of a scene at requested times."""
 
+import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
+from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 
 
@@ -54,13 +57,27 @@ class Enclosure:
         return rows
 
 
+def check_order(times: Sequence[float]) -> None:
+    """Raise InputError unless times are finite, of one sign, and each farther from 0 than before.
+
+    The first time may be 0.
+    """
+    if not all(map(math.isfinite, times)):
+        raise InputError("prove: a time is not finite; allowed: finite numbers, in seconds")
+    away = [abs(t) for t in times]
+    one_side = bool(times) and (min(times) >= 0.0 or max(times) <= 0.0)
+    if not (one_side and all(t1 < t2 for t1, t2 in itertools.pairwise(away))):
+        raise InputError("prove: times do not lead away from 0 on one side; give times that do")
+
+
 def with_energy(scene: Scene, found: Enclosure) -> Enclosure:
     """Return an enclosure with the balls of the rotational energy, if the scene has moments."""
     if scene.moments is None:
         return found
+    moments = scene.exact_moments or ()
     energies = []
     for middle, radius in found.omega:
-        pairs = list(zip(map(Fraction, scene.moments), middle, strict=True))
+        pairs = list(zip(moments, middle, strict=True))
         energy = sum((i * w * w / 2 for i, w in pairs), Fraction(0))
         error = sum((i * (abs(w) * radius + radius * radius / 2) for i, w in pairs), Fraction(0))
         energies.append(Balls((energy,), error))
@@ -84,7 +101,9 @@ def rounded_up(x: Fraction) -> float:
     """Return a binary64 number of four digits that is at least x, which is not negative."""
     # One of the factors exceeds the rounding errors of the conversion to a decimal string.
     candidates = (float(f"{float(x) * factor:.3e}") for factor in (1.0, 1.001, 1.01))
-    return next((each for each in candidates if Fraction(each) >= x), 5e-324)
+    # Near the least binary64 number, the factors may change nothing.
+    above = math.nextafter(float(x), math.inf)
+    return next((each for each in candidates if Fraction(each) >= x), above)
 
 
 def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:

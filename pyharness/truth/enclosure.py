@@ -6,8 +6,6 @@ Taylor steps in ball arithmetic (`enclosure_steps`) are for everything else. The
 need python-flint.
 """
 
-import itertools
-import math
 from collections.abc import Sequence
 from importlib.util import find_spec
 
@@ -16,7 +14,7 @@ from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.values import integer
 from pyharness.truth.certificate import has_certificate, prove
-from pyharness.truth.enclosed import Enclosure, with_energy
+from pyharness.truth.enclosed import Enclosure, check_order, with_energy
 
 MOST_DIGITS = 1000
 
@@ -73,7 +71,7 @@ def enclose(
     if not 1 <= integer("digits", digits) <= MOST_DIGITS:
         raise InputError(f"digits: {digits}; allowed: 1 to {MOST_DIGITS}")
     times = [float(t) for t in times]
-    _check_order(times)
+    check_order(times)
     if scene.changing is not None:
         scene.changing.check(times)
     free = scene.torque.is_zero and _is_bounded(scene) and not (velocity or transition)
@@ -120,12 +118,3 @@ def _is_bounded(scene: Scene) -> bool:
 
 def _has_flint() -> bool:
     return find_spec("flint") is not None
-
-
-def _check_order(times: Sequence[float]) -> None:
-    away = [abs(t) for t in times]
-    one_side = bool(times) and (min(times) >= 0.0 or max(times) <= 0.0)
-    if not (one_side and all(t1 < t2 for t1, t2 in itertools.pairwise(away))):
-        raise InputError("prove: times do not lead away from 0 on one side; give times that do")
-    if not all(map(math.isfinite, times)):
-        raise InputError("prove: a time is not finite; allowed: finite numbers, in seconds")

@@ -12,7 +12,7 @@ from pyharness.model.attitude import IDENTITY, quaternion_rates
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import of_law
-from pyharness.model.tape import evaluate
+from pyharness.model.tape import Tape, evaluate
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.truth.balls import Dual, ball, functions_at
 
@@ -31,16 +31,12 @@ class Equations:
     """
 
     def __init__(self, scene: Scene, velocity: bool, transition: bool) -> None:
-        torque = of_law(scene.torque) if isinstance(scene.torque, TorqueLaw) else scene.torque
-        if torque.tape is None:
-            raise InputError(
-                "an opaque torque can't be enclosed; allowed: a torque that can be recorded"
-            )
-        if torque.needs_attitude and scene.attitude is None:
+        tapes = _tapes(scene)
+        if any(each.needs_attitude for each in tapes) and scene.attitude is None:
             raise InputError(
                 "a torque that depends on the attitude needs it; give the scene an attitude"
             )
-        self._tape, self._scene = torque.tape, scene
+        self._tapes, self._scene = tapes, scene
         self._velocity, self._transition = velocity, transition
         self._turning = 3 if scene.attitude is None else 7
         self.start = [Fraction(x) for x in (*scene.omega, *(scene.attitude or ()))]
@@ -53,7 +49,7 @@ class Equations:
             sizes.append(3 * self._turning)
         ends = [sum(sizes[:k]) for k in range(len(sizes) + 1)]
         self.blocks = [slice(*each) for each in pairwise(ends)]
-        self.breaks = self._tape.breaks
+        self.breaks = [t for each in tapes for t in each.breaks]
         self._exact()
 
     def _exact(self) -> None:
@@ -112,7 +108,9 @@ class Equations:
 
     def _turned(self, time: Any, omega: list[Any], q: list[Any], functions: Any) -> list[Any]:
         """Return the derivatives of omega and of the attitude."""
-        torque = evaluate(self._tape, [time, *omega, *(q or IDENTITY)], functions)
+        inputs = [time, *omega, *(q or IDENTITY)]
+        parts = [evaluate(each, inputs, functions) for each in self._tapes]
+        torque = [sum(each[1:], each[0]) for each in zip(*parts, strict=True)]
         x, y, z = omega
         if self._principal is not None:
             products = (y * z, z * x, x * y)
@@ -128,7 +126,8 @@ class Equations:
         changing = self._scene.changing
         assert changing is not None
         matrix = changing.matrix(Dual(time, [arb(1)]))
-        values = [[x.value if isinstance(x, Dual) else x for x in row] for row in matrix]
+        # An element that is constant is a float, whose quotients Python would round.
+        values = [[x.value if isinstance(x, Dual) else arb(x) for x in row] for row in matrix]
         pushed = [
             n
             - sum(
@@ -138,3 +137,25 @@ class Equations:
             for n, row in zip(torque, matrix, strict=True)
         ]
         return rates_of_inertia(values, omega, pushed)
+
+
+def _tapes(scene: Scene) -> list[Tape]:
+    """Return the tapes whose sum is the torque of a scene.
+
+    A torque law has a tape for each wave. One tape for all waves would have rounded sums of the
+    amplitudes of equal frequencies.
+    """
+    law = scene.torque
+    if isinstance(law, TorqueLaw):
+        laws = [TorqueLaw(law.constant, law.rate, frame=law.frame)]
+        laws += [TorqueLaw(sines=[wave], frame=law.frame) for wave in law.sines]
+        laws += [TorqueLaw(cosines=[wave], frame=law.frame) for wave in law.cosines]
+        tapes = [of_law(each).tape for each in laws]
+    else:
+        tapes = [law.tape]
+    found = [each for each in tapes if each is not None]
+    if not found:
+        raise InputError(
+            "an opaque torque can't be enclosed; allowed: a torque that can be recorded"
+        )
+    return found

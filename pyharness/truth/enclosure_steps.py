@@ -137,9 +137,11 @@ class _Proof:
         self.blocks = equations.blocks
         self.scales = [arb(x) for x in equations.scales]
         self.breaks = [Fraction(x) for x in equations.breaks]
-        self.state = _State(
-            Fraction(0), [ball(x).mid() for x in equations.start], [arb(0) for _ in self.blocks]
-        )
+        # With few digits the precision is less than that of binary64, and the balls are not exact.
+        start = [ball(x) for x in equations.start]
+        rounding = [x - x.mid() for x in start]
+        radii = [self.norm(rounding, block) for block in self.blocks]
+        self.state = _State(Fraction(0), [x.mid() for x in start], radii)
 
     def norm(self, errors: Sequence[Any], block: slice) -> Any:
         """Return an upper bound of the norm of a block of errors, in scaled units."""

@@ -1,0 +1,533 @@
+"""Certificates: genuine ones are accepted, and each kind of falsified certificate is refused."""
+
+import ast
+import copy
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from fractions import Fraction
+from functools import cache
+from math import nextafter
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+
+from pyharness import InputError, Scene, TorqueLaw, case_scene, principal
+from pyharness.scenes.random_scenes import random_scene
+from pyharness.truth import certificate_checker
+from pyharness.truth.certificate import prove
+from pyharness.truth.certificate_checker import NotProvedError, System, check, check_file
+from pyharness.truth.enclosed import Balls, rounded_up
+from pyharness.truth.reference import Reference, reference
+from tests import intervals, lohner
+
+Record = dict[str, Any]
+WAVES = Scene(
+    "waves",
+    (0.3, -1.0, 2.0),
+    moments=(40.0, 30.0, 20.0),
+    torque=TorqueLaw(
+        (1.0, -2.0, 0.3),
+        (0.1, 0.0, -7.0),
+        sines=[((3.0, 0.0, 1.0), 5.0), ((0.0, 1e-3, 0.0), 100.0), ((1.0, 1.0, 1.0), 0.0)],
+        cosines=[((0.0, 2.0, -1.0), -0.7), ((0.1, 0.2, -1.0), 5.0)],
+    ),
+)
+TOP = Scene("top", (0.1, 0.7, 1.3), coefficients=(0.5, -0.25, 0.125))
+SCENES = {
+    "case 3": (case_scene(3), 0.7),
+    "case 5": (case_scene(5), 0.2),
+    "case 7": (case_scene(7), 0.1),
+    "waves": (WAVES, 1.0),
+    "before": (WAVES, -0.7),
+    "coefficients": (TOP, 3.0),
+}
+# The kinds of random scenes whose numbers are neither huge nor tiny.
+KINDS = (
+    "plain",
+    "near-symmetric",
+    "near-separatrix",
+    "violent torque",
+    "from rest",
+    "slow waves",
+    "many speeds",
+    "coefficients",
+)
+
+
+@cache
+def genuine(name: str) -> Record:
+    scene, end = SCENES[name]
+    return prove(scene, [end / 2, end], 20).certificate
+
+
+def refused(certificate: Any) -> bool:
+    """Return whether the checker refuses a certificate that is read from JSON text."""
+    try:
+        check(json.loads(json.dumps(certificate)))
+    except Exception:
+        return True
+    return False
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_genuine_certificate_passes(name: str) -> None:
+    certificate = genuine(name)
+    assert check(json.loads(json.dumps(certificate))) == len(certificate["steps"]) > 1
+    assert [row["time"] for row in certificate["rows"]] == [SCENES[name][1] / 2, SCENES[name][1]]
+    assert all(0.0 < row["radius"] <= 2e-20 * 2 for row in certificate["rows"])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_certificate_of_a_random_scene_passes(kind: str) -> None:
+    for seed in range(3):
+        scene = random_scene(kind, seed)
+        end = (1.0, -1.0)[seed % 2] * 0.3 * scene.step_size * scene.steps
+        proof = prove(scene, [end], 12)
+        assert check(json.loads(json.dumps(proof.certificate))) == proof.enclosure.steps
+        assert away(proof.enclosure.omega, reference(scene, [end], precise=True)) <= 0.0
+
+
+def away(omega: tuple[Balls, ...], found: Reference) -> float:
+    """Return how far the reference is outside the balls enlarged by its error (rad/s)."""
+    assert found.remainder is not None
+    largest = -float("inf")
+    for balls, high, low in zip(omega, found.omega, found.remainder, strict=True):
+        for x, *parts in zip(balls.middle, high, low, strict=True):
+            value = sum(map(Fraction, map(float, parts)), Fraction(0))
+            # The sum of two binary64 numbers has some 106 bits.
+            error = Fraction(found.estimate) + abs(value) / 2**104 + Fraction(1, 10**300)
+            largest = max(largest, float(abs(x - value) - balls.radius - error))
+    return largest
+
+
+@pytest.mark.parametrize("name", ["case 3", "case 5"])
+def test_rows_contain_the_solution_of_another_prover(name: str) -> None:
+    """Its intervals are much smaller than the balls."""
+    scene, end = SCENES[name]
+    row = genuine(name)["rows"][1]
+    for text, interval in zip(row["omega"], lohner.enclosure(scene, [end], 32)[0], strict=True):
+        low, high = (Fraction(each) for each in intervals.decimals(interval, 40))
+        assert low <= Fraction(text) + Fraction(row["radius"])
+        assert high >= Fraction(text) - Fraction(row["radius"])
+        assert high - low < Fraction(row["radius"])
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_balls_contain_the_reference(name: str) -> None:
+    scene, end = SCENES[name]
+    proof = prove(scene, [end / 2, end], 28)
+    assert away(proof.enclosure.omega, reference(scene, [end / 2, end], precise=True)) <= 0.0
+
+
+def test_moments_of_a_principal_scene_are_exact() -> None:
+    inertia = [[3.0, 0.1, 0.2], [0.1, 4.0, 0.3], [0.2, 0.3, 5.0]]
+    scene = principal(Scene("full", (0.1, 1.0, 1.0), inertia=inertia))[0]
+    certificate = prove(scene, [1.0], 30).certificate
+    assert tuple(map(Fraction, certificate["scene"]["moments"])) == scene.exact_moments
+    assert any(isinstance(x, str) for x in certificate["scene"]["moments"])
+    assert check(certificate) > 0
+
+
+def _digit(source: Random, text: str, first: int, last: int) -> str:
+    """Return a decimal string with another digit in a place of a range."""
+    places = [n for n, each in enumerate(text) if each.isdigit() and first <= n < last]
+    place = source.choice(places)
+    other = source.choice([each for each in "0123456789" if each != text[place]])
+    return text[:place] + other + text[place + 1 :]
+
+
+def _step(source: Random, record: Record) -> list[Any]:
+    step: list[Any] = source.choice(record["steps"])
+    return step
+
+
+def _middle(source: Random, record: Record) -> None:
+    middle = _step(source, record)[3]
+    axis = source.randrange(3)
+    text = str(middle[axis])
+    middle[axis] = int(_digit(source, text, 0, len(text)))
+
+
+def _least_digit(source: Random, record: Record) -> None:
+    _step(source, record)[3][source.randrange(3)] += source.choice((-1, 1))
+
+
+def _stated(source: Random, record: Record) -> None:
+    step = _step(source, record)
+    step[2] = source.choice((step[2] - 1, step[2] // 2, 0, -step[2]))
+
+
+def _tube(source: Random, record: Record) -> None:
+    place = source.randrange(1, len(record["steps"]))
+    # The error at the begin of the step is outside the tube.
+    record["steps"][place][1] = source.randint(-5, record["steps"][place - 1][2])
+
+
+def _length(source: Random, record: Record) -> None:
+    step = _step(source, record)
+    step[0] = source.choice((step[0] + 1, step[0] * 2, step[0] * 1000, step[0] * 3 // 2 + 1))
+
+
+def _sign(source: Random, record: Record) -> None:
+    step = _step(source, record)
+    if source.random() < 0.4:
+        step[0] = -step[0]
+    else:
+        axis = source.randrange(3)
+        step[3][axis] = -step[3][axis]
+
+
+def _shortened(source: Random, record: Record) -> None:
+    del record["steps"][source.randrange(len(record["steps"]))]
+
+
+def _swapped(source: Random, record: Record) -> None:
+    place = source.randrange(1, len(record["steps"]))
+    record["steps"][place - 1 : place + 1] = record["steps"][place - 1 : place + 1][::-1]
+
+
+def _doubled(source: Random, record: Record) -> None:
+    place = source.randrange(len(record["steps"]))
+    record["steps"].insert(place, record["steps"][place])
+
+
+def _omega(source: Random, record: Record) -> None:
+    axis = source.randrange(3)
+    omega = record["scene"]["omega"]
+    omega[axis] = source.choice((-omega[axis], nextafter(omega[axis], 9.0), omega[axis] + 1e-9))
+
+
+def _body(source: Random, record: Record) -> None:
+    scene, axis = record["scene"], source.randrange(3)
+    body = scene["moments" if "moments" in scene else "coefficients"]
+    body[axis] = source.choice((1.5 * body[axis], nextafter(body[axis], 100.0)))
+
+
+def _amplitude(source: Random, record: Record) -> None:
+    torque = record["scene"]["torque"]
+    places = [each[0] for each in torque["sines"] + torque["cosines"]]
+    place = source.choice([*places, torque["constant"], torque["rate"]])
+    axis = source.randrange(3)
+    place[axis] = source.choice((place[axis] + 1.0, place[axis] + 1e-9))
+
+
+def _frequency(source: Random, record: Record) -> None:
+    torque = record["scene"]["torque"]
+    torque["cosines"].append([[0.1, 0.2, 0.3], 2.0])
+    wave = source.choice(torque["sines"] + torque["cosines"])
+    wave[1] += source.choice((0.5, 1e-6))
+
+
+def _torque_sign(source: Random, record: Record) -> None:
+    torque = record["scene"]["torque"]
+    torque["constant"] = [-x - 1.0 for x in torque["constant"]]
+
+
+def _row_digit(source: Random, record: Record) -> None:
+    row, axis = source.choice(record["rows"]), source.randrange(3)
+    # The last digits are within the radius, which is at least 1e-24.
+    first = row["omega"][axis].index(".")
+    row["omega"][axis] = _digit(source, row["omega"][axis], 0, first + 18)
+
+
+def _row_radius(source: Random, record: Record) -> None:
+    row = source.choice(record["rows"])
+    row["radius"] *= source.choice((0.9, 0.5, 0.0, -1.0))
+
+
+def _row_time(source: Random, record: Record) -> None:
+    row = source.choice(record["rows"])
+    row["time"] = source.choice((nextafter(row["time"], 9.0), 2 * row["time"], 0.0))
+
+
+def _row_order(source: Random, record: Record) -> None:
+    record["rows"].reverse()
+
+
+def _order(source: Random, record: Record) -> None:
+    record["order"] = source.choice((record["order"] // 2, record["order"] - 3, 1, 0, -1))
+
+
+def _scales(source: Random, record: Record) -> None:
+    factor = source.choice((2, 4))
+    double = source.random() < 0.5
+    record["scales"] = [x * factor if double else x // factor for x in record["scales"]]
+
+
+def _scale_sign(source: Random, record: Record) -> None:
+    record["scales"][source.randrange(3)] *= source.choice((0, -1))
+
+
+def _bits(source: Random, record: Record) -> None:
+    record["bits"] += source.choice((-3, -1, 1, 8))
+
+
+def _clock(source: Random, record: Record) -> None:
+    record["clock"] += source.choice((-3, -1, 1, 8, record["bits"]))
+
+
+def _no_integer(source: Random, record: Record) -> None:
+    kind = source.choice((float, bool, str))
+    place: Any = source.choice(("bits", "clock", "order", "scales", "step", "middle"))
+    holder: Any = record
+    if place in {"scales", "step", "middle"}:
+        step = _step(source, record)
+        holder = {"scales": record["scales"], "step": step, "middle": step[3]}[place]
+        place = source.randrange(3)
+    holder[place] = kind(holder[place])
+
+
+def _missing(source: Random, record: Record) -> None:
+    holder = source.choice((record, record["scene"], record["scene"]["torque"], record["rows"][0]))
+    del holder[source.choice([each for each in holder if each != "name"])]
+
+
+def _unknown(source: Random, record: Record) -> None:
+    scene = record["scene"]
+    choices: list[tuple[Record, str, Any]] = [
+        (scene["torque"], "frame", "space"),
+        (scene, "inertia", [[1.0]]),
+        (scene, "coefficients" if "moments" in scene else "moments", [1.0, 2.0, 1.5]),
+    ]
+    holder, key, value = source.choice(choices)
+    holder[key] = value
+
+
+def _format(source: Random, record: Record) -> None:
+    record["format"] = source.choice(("pyharness-certificate-2", None, 1))
+
+
+def _other_list(source: Random, record: Record) -> None:
+    place = source.choice(("steps", "scales", "rows", "scene"))
+    record[place] = source.choice((None, 3, "steps", [[1]]))
+
+
+def _long_list(source: Random, record: Record) -> None:
+    choices = (record["scene"]["omega"], record["scales"], _step(source, record)[3])
+    place = source.choice((*choices, _step(source, record)))
+    if source.random() < 0.5:
+        place.append(place[0])
+    else:
+        place.pop()
+
+
+FALSIFIED: dict[str, Callable[[Random, Record], None]] = {
+    name[1:]: function
+    for name, function in list(globals().items())
+    if name.startswith("_")
+    and callable(function)
+    and getattr(function, "__module__", "") == __name__
+    and name not in {"_digit", "_step"}
+}
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", FALSIFIED)
+def test_falsified_certificate_is_refused(kind: str, seed: int) -> None:
+    source = Random(f"falsified {kind} {seed}")
+    record = copy.deepcopy(genuine(source.choice(list(SCENES))))
+    before = json.dumps(record)
+    FALSIFIED[kind](source, record)
+    assert json.dumps(record) != before
+    assert refused(record)
+
+
+def test_every_digit_of_a_row_counts() -> None:
+    """A change by somewhat more than the radius is refused at each place of a row."""
+    record = genuine("case 5")
+    for number, row in enumerate(record["rows"]):
+        for axis in range(3):
+            for sign in (-1, 1):
+                changed = copy.deepcopy(record)
+                moved = Fraction(row["omega"][axis]) + sign * 2 * Fraction(row["radius"])
+                changed["rows"][number]["omega"][axis] = str(moved)
+                assert refused(changed)
+
+
+def test_error_of_the_waves_counts() -> None:
+    """An error of a sine changes omega by at most its amplitude over the moment, times the time."""
+    record = genuine("waves")
+    system = System(record["scene"], record["bits"], record["clock"], record["scales"])
+    state = [int(Fraction(x) * 2 ** record["bits"]) for x in record["scene"]["omega"]]
+    waves = [0, 1 << record["bits"]] * len(system.frequencies)
+    h = record["steps"][0][0]
+    expansion = system.expand([*state, *waves], 0, h, record["order"])
+    tube = 1 << record["bits"] - 10
+    wide = 1 << record["bits"] - 20
+    narrow, _ = system.radii(3, 0, expansion, tube, h)
+    wider, kept = system.radii(3, wide, expansion, tube, h)
+    seconds = Fraction(h, 1 << record["clock"])
+    # The amplitudes of 5 rad/s on the first axis, 3.0 and 0.1 N m, for a moment of 40 kg m2.
+    assert wider - narrow >= wide * seconds * Fraction(3) / 40
+    assert kept >= wide
+
+
+def test_bounds_of_a_step_are_upper_bounds() -> None:
+    """The defect, at many points of a step, is at most its bound; so is an omitted term."""
+    for name in ("waves", "before", "coefficients"):
+        record = genuine(name)
+        system = System(record["scene"], record["bits"], record["clock"], record["scales"])
+        unit = 1 << record["bits"]
+        state = [int(Fraction(x) * unit) for x in record["scene"]["omega"]]
+        waves = [0, unit] * len(system.frequencies)
+        h = record["steps"][0][0]
+        series, defects, wave_defect = system.expand([*state, *waves], 0, h, 6)
+        length = Fraction(h, 1 << record["clock"])
+        for s in (Fraction(n, 7) for n in range(8)):
+            values = [sum(x * s**k for k, x in enumerate(each)) / unit for each in series]
+            omega = values[:3]
+            slopes = [sum(k * x * s ** (k - 1) for k, x in enumerate(each) if k) for each in series]
+            for i, (common, (product, constant, rate, *amplitudes)) in enumerate(system.rows):
+                push = constant + rate * length * s
+                push += sum(a * x for a, x in zip(amplitudes, values[3:], strict=True))
+                exact = (product * omega[i - 2] * omega[i - 1] + push) / common
+                assert abs(slopes[i] - length * exact * unit) <= defects[i]
+            wrong = Fraction(0)
+            for n, frequency in enumerate(system.frequencies):
+                sine, cosine = values[3 + 2 * n : 5 + 2 * n]
+                wrong += abs(slopes[3 + 2 * n] - length * frequency * cosine * unit)
+                wrong += abs(slopes[4 + 2 * n] + length * frequency * sine * unit)
+            assert wrong <= wave_defect
+
+
+def test_logarithmic_norm_is_an_upper_bound() -> None:
+    """The growth of a step is at least that of the symmetric part of the Jacobian, with its tube.
+
+    A vector x gives a lower bound x A x of the largest eigenvalue of a symmetric matrix A.
+    """
+    for name in ("case 3", "case 5", "coefficients"):
+        record = genuine(name)
+        system = System(record["scene"], record["bits"], record["clock"], record["scales"])
+        unit, h = 1 << record["bits"], record["steps"][0][0]
+        tube = unit // 4
+        # A constant polynomial, whose mean absolute value is exact.
+        omega = [Fraction(x) for x in record["scene"]["omega"]]
+        series = [[int(x * unit)] for x in omega]
+        bound = Fraction(system.growth(series, tube, h), certificate_checker.UNIT)
+        scales = [x / 2**certificate_checker.SCALE_BITS for x in system.scales]
+        a = [float(Fraction(terms[0], common)) for common, terms in system.rows]
+        source = Random(name)
+        for _ in range(200):
+            x = [source.gauss(0.0, 1.0) for _ in range(3)]
+            y = [
+                float(w) + source.uniform(-0.25, 0.25) * s
+                for w, s in zip(omega, scales, strict=False)
+            ]
+            moved = [
+                a[i] * (y[i - 2] * x[i - 1] * scales[i - 1] + y[i - 1] * x[i - 2] * scales[i - 2])
+                for i in range(3)
+            ]
+            lower = sum(u * v / s for u, v, s in zip(x, moved, scales, strict=False)) / sum(
+                u * u for u in x
+            )
+            assert lower * abs(h) / 2 ** record["clock"] <= float(bound) * (1 + 1e-9)
+
+
+def test_exponential_and_mean_are_upper_bounds() -> None:
+    unit = certificate_checker.UNIT
+    exact = sum(Fraction(1, 2**k) / _factorial(k) for k in range(40))
+    assert exact * unit <= certificate_checker.exponential(unit // 2) <= exact * unit + 99
+    whole = sum(Fraction(1) / _factorial(k) for k in range(40))
+    assert whole * unit <= certificate_checker.exponential(unit) <= whole * unit + 999
+    # The root mean square of 6 - 12 s from 0 to 1 is the root of 12.
+    assert 12 * 10**12 <= certificate_checker.mean([6 * 10**6, -12 * 10**6]) ** 2 < 12.001 * 10**12
+    assert certificate_checker.over(-7, 2) == -3
+    assert certificate_checker.over(7, 2) == 4
+
+
+def _factorial(k: int) -> int:
+    return 1 if k < 2 else k * _factorial(k - 1)
+
+
+@pytest.mark.parametrize("x", [Fraction(12, 10**324), Fraction(1, 10**400), Fraction(1, 3), 0])
+def test_radius_is_rounded_up(x: Fraction) -> None:
+    """Near the least binary64 number, a factor of 1.01 changes nothing."""
+    assert Fraction(rounded_up(Fraction(x))) >= x
+    assert rounded_up(Fraction(x)) <= float(x) * 1.01 + 1e-323
+
+
+@pytest.mark.parametrize("text", ["", "{", "[" * 100_000, "[]", "1", "{}", "\u00e9", "[NaN]"])
+def test_text_that_is_no_certificate_is_refused(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "text.json"
+    file.write_text(text, encoding="utf-8")
+    steps, why = check_file(str(file))
+    assert steps is None
+    assert why
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-1", "0", '"x"', "null"])
+def test_number_that_is_not_allowed_is_refused(number: str, tmp_path: Path) -> None:
+    record = copy.deepcopy(genuine("case 5"))
+    record["scene"]["moments"][1] = json.loads(number)
+    file = tmp_path / "number.json"
+    file.write_text(json.dumps(record))
+    assert check_file(str(file))[0] is None
+
+
+def test_checker_uses_the_standard_library_only() -> None:
+    path = Path(certificate_checker.__file__)
+    imported: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            imported |= {each.name for each in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0
+            imported.add(node.module or "")
+    assert {each.partition(".")[0] for each in imported} <= set(sys.stdlib_module_names)
+    assert "__import__" not in path.read_text()
+    assert "import_module" not in path.read_text()
+    assert len(path.read_text().splitlines()) <= 250
+
+
+def test_checker_runs_as_a_script(tmp_path: Path) -> None:
+    good, bad, missing = (tmp_path / name for name in ("good.json", "bad.json", "missing.json"))
+    record = copy.deepcopy(genuine("waves"))
+    good.write_text(json.dumps(record))
+    record["steps"][1][2] -= 1
+    bad.write_text(json.dumps(record))
+    script = str(certificate_checker.__file__)
+    for names, status in (([good], 0), ([bad], 1), ([good, missing], 1)):
+        run = subprocess.run(
+            [sys.executable, "-I", script, *map(str, names)],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert (run.returncode, run.stderr) == (status, "")
+        assert len(run.stdout.splitlines()) == len(names)
+        assert ("not proved" in run.stdout) == bool(status)
+
+
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        ([1.0, 0.5], "lead away"),
+        ([-1.0, 1.0], "lead away"),
+        ([], "lead away"),
+        ([float("nan")], "finite"),
+    ],
+)
+def test_times_of_a_proof_are_in_order(times: list[float], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        prove(TOP, times, 10)
+
+
+def test_scene_without_certificate_is_refused() -> None:
+    with pytest.raises(InputError, match="a certificate is for"):
+        prove(
+            Scene("full", (1.0, 1.0, 1.0), inertia=[[3.0, 0, 0], [0, 4.0, 0], [0, 0, 5.0]]), [1.0]
+        )
+
+
+def test_step_outside_its_limits_is_not_proved() -> None:
+    record = genuine("case 3")
+    system = System(record["scene"], record["bits"], record["clock"], record["scales"])
+    series = [[1 << record["bits"] + 4]] * 3
+    with pytest.raises(NotProvedError, match="grow too much"):
+        system.radii(1, 0, (series, [0, 0, 0], 0), 10, 1 << record["clock"] + 2)
+    with pytest.raises(NotProvedError, match="tube"):
+        system.radii(10, 0, (series, [0, 0, 0], 0), 10, 1)

@@ -1,0 +1,177 @@
+"""The verb prove: its tables, its JSON and CSV, certificates, and what it refuses."""
+
+import csv
+import io
+import json
+import os
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from pyharness.cli.main import main
+from tests.conftest import Printed
+from tests.json_reference import schema_of
+from tests.truth.test_certificate import SCENES, genuine
+
+DIGITS = "prove --case 3 --times 0.1,0.2 --digits 12"
+DAMPED = """\
+[body]
+moments = [40.0, 30.0, 20.0]
+[initial]
+omega = [0.1, 1.0, 1.0]
+[torque]
+expression = ["-0.1*w1", "-0.1*w2 + 0.1*w1*w3", "-0.1*w3"]
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("damped.toml").write_text(DAMPED)
+
+
+def valid(text: str) -> dict[str, Any]:
+    record: dict[str, Any] = json.loads(text)
+    Draft202012Validator(schema_of("prove")).validate(record)
+    return record
+
+
+def message(capsys: pytest.CaptureFixture[str], command: str, status: int) -> str:
+    """Run a command that fails with an exit status, and return its message of one line."""
+    assert main(command.split()) == status
+    text = capsys.readouterr().err
+    assert "Traceback" not in text
+    return text
+
+
+def test_table_has_the_proved_values(printed: Printed) -> None:
+    text = printed(DIGITS)
+    assert "differs from a value by at most its radius" in " ".join(text.split())
+    assert all(text.count(word) >= 2 for word in ("omega1", "omega2", "omega3", "energy"))
+    row = json.loads(printed(f"{DIGITS} --format json"))["rows"][1]
+    assert all(value in text for value in row["omega"])
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        DIGITS,
+        f"{DIGITS} --certificate new.json",
+        "prove --case 7 --times=-0.05 --digits 5",
+        "prove --case 3 --times 0.01 --digits 5 --velocity",
+        "prove --scene damped.toml --times 0,0.1 --digits 5 --transition",
+    ],
+)
+def test_json_has_the_documented_fields(printed: Printed, command: str) -> None:
+    if "new.json" not in command and "case" not in command:
+        pytest.importorskip("flint")
+    record = valid(printed(f"{command} --format json"))
+    for row in record["rows"]:
+        assert len(row["omega"]) == 3
+        assert row["radius"] <= 1.2e-4
+
+
+def test_csv_has_a_line_for_each_component(printed: Printed) -> None:
+    lines = list(csv.reader(io.StringIO(printed(f"{DIGITS} --format csv"))))
+    head = next(n for n, line in enumerate(lines) if line[:2] == ["time", "quantity"])
+    names = [line[1] for line in lines[head + 1 :]]
+    assert names == ["omega1", "omega2", "omega3", "energy"] * 2
+    record = json.loads(printed(f"{DIGITS} --format json"))
+    assert [line[2] for line in lines[head + 1 : head + 4]] == record["rows"][0]["omega"]
+
+
+def test_certificate_is_written_and_verified(printed: Printed) -> None:
+    found = json.loads(printed(f"{DIGITS} --certificate new.json --format json"))
+    record = json.loads(Path("new.json").read_text())
+    assert [each["omega"] for each in record["rows"]] == [each["omega"] for each in found["rows"]]
+    assert "proved" in printed("prove --check new.json")
+    verdict = valid(printed("prove --check new.json --format json"))["certificates"]
+    assert verdict == [
+        {"file": "new.json", "proved": True, "steps": len(record["steps"]), "reason": ""}
+    ]
+    lines = printed("prove --check new.json --format csv").splitlines()
+    assert lines[-1].startswith("new.json,proved")
+
+
+def test_certificate_and_closed_form_agree(printed: Printed) -> None:
+    first = json.loads(printed(f"{DIGITS} --certificate new.json --format json"))["rows"]
+    second = json.loads(printed(f"{DIGITS} --format json"))["rows"]
+    for one, other in zip(first, second, strict=True):
+        for x, y in zip(one["omega"], other["omega"], strict=True):
+            away = abs(Fraction(x) - Fraction(y))
+            assert away <= Fraction(one["radius"]) + Fraction(other["radius"])
+
+
+def test_falsified_certificate_has_exit_status_1(capsys: pytest.CaptureFixture[str]) -> None:
+    record = json.loads(json.dumps(genuine(next(iter(SCENES)))))
+    Path("good.json").write_text(json.dumps(record))
+    record["steps"][1][3][0] += 1
+    Path("bad.json").write_text(json.dumps(record))
+    Path("text.json").write_text("no JSON")
+    for names, status in (
+        ("good.json", 0),
+        ("bad.json", 1),
+        ("good.json,bad.json", 1),
+        ("missing.json", 1),
+        ("text.json,good.json", 1),
+    ):
+        assert main(["prove", "--check", names, "--format", "json"]) == status
+        found = valid(capsys.readouterr().out)["certificates"]
+        for each in found:
+            assert each["proved"] == (each["file"] == "good.json")
+            assert bool(each["reason"]) != each["proved"]
+    assert main(["prove", "--check", "bad.json"]) == 1
+    shown = capsys.readouterr().out
+    assert "not proved" in shown
+    assert "step 2" in shown
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("prove --case 3 --digits 0", "--digits: 0; allowed: 1 to 1000"),
+        ("prove --case 3 --digits 1001", "--digits: 1001; allowed: 1 to 1000"),
+        ("prove --case 3 --digits x", "--digits"),
+        ("prove --case 3 --times 1,0.5", "lead away"),
+        ("prove --case 3 --times 1,0.5 --certificate new.json", "lead away"),
+        ("prove --case 3 --times=-1,1 --certificate new.json", "lead away"),
+        ("prove --case 3 --certificate new.json --velocity", "--velocity"),
+        ("prove --case 3 --certificate new.json --transition", "--transition"),
+        ("prove --scene damped.toml --certificate new.json", "prove without --certificate"),
+        ("prove --case 3 --certificate none/new.json", "--certificate"),
+        ("prove --case 3 --check good.json", "--check"),
+        ("prove --check good.json --times 1", "--check"),
+        ("prove --check good.json --digits 5", "--check"),
+        ("prove --check good.json --certificate new.json", "--check"),
+        ("prove --check good.json --effort 2", "--check"),
+        ("prove --case 7 --times 9 --effort 1e-3", "--effort"),
+    ],
+)
+def test_what_is_refused(capsys: pytest.CaptureFixture[str], command: str, words: str) -> None:
+    assert words in message(capsys, command, 2).replace("\n", " ")
+    assert not Path("new.json").exists()
+
+
+def test_nothing_is_written_where_the_folder_is_not_writable(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    Path("locked").mkdir()
+    os.chmod("locked", 0o500)
+    try:
+        if os.access("locked", os.W_OK):
+            pytest.skip("this user may write to any folder")
+        text = message(capsys, "prove --case 3 --times 0.1 --certificate locked/new.json", 2)
+        assert "--certificate" in text
+        assert not list(Path("locked").iterdir())
+    finally:
+        os.chmod("locked", 0o700)
+
+
+def test_a_file_is_not_changed_if_the_proof_fails(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("old.json").write_text("old")
+    message(capsys, "prove --case 7 --times 9 --effort 1e-3 --certificate old.json", 2)
+    assert Path("old.json").read_text() == "old"
+    assert {each.name for each in Path().iterdir()} == {"old.json", "damped.toml"}

@@ -1,0 +1,314 @@
+"""Enclosures: three provers agree, balls contain the reference, and errors have one line."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import (
+    ChangingInertia,
+    ChangingMoments,
+    InputError,
+    Scene,
+    TorqueLaw,
+    case_scene,
+    opaque,
+    principal,
+)
+from pyharness.model.scene import Triple
+from pyharness.model.state_torque import of_law
+from pyharness.scenes import state_scenes
+from pyharness.scenes.random_scenes import random_scene
+from pyharness.torques import table
+from pyharness.truth import enclosure
+from pyharness.truth.certificate import prove
+from pyharness.truth.enclosed import Balls
+from pyharness.truth.enclosure import can_enclose, enclose
+from pyharness.truth.reference import Reference, reference
+
+pytest.importorskip("flint")
+enclosure_steps: Any = pytest.importorskip("pyharness.truth.enclosure_steps")
+enclose_steps = enclosure_steps.enclose_steps
+
+OMEGA = (0.3, -1.0, 0.7)
+MOMENTS = (4.0, 3.0, 2.0)
+TURN = (0.5, -0.1, 0.7, 0.3)
+INERTIA = [[3.0, 0.1, 0.2], [0.1, 4.0, 0.3], [0.2, 0.3, 5.0]]
+LAW = TorqueLaw((0.1, 0.0, 0.3), (0.0, 0.2, 0.0), sines=[((1.0, 0.5, 0.0), 3.0)])
+SCENES = {
+    "law and attitude": Scene("", OMEGA, moments=MOMENTS, torque=LAW, attitude=TURN),
+    "in space": Scene(
+        "", OMEGA, moments=MOMENTS, torque=replace(LAW, frame="space"), attitude=TURN
+    ),
+    "full inertia": Scene("", OMEGA, inertia=INERTIA, torque=LAW),
+    # The quotients of its constant elements are no binary64 numbers.
+    "changing inertia": Scene(
+        "", OMEGA, inertia=ChangingInertia([INERTIA, np.diag([0.0, 0.0, 0.5]).tolist()])
+    ),
+    "changing moments": Scene(
+        "", OMEGA, changing=ChangingMoments([[4.0, 0.3, 0.1], [3.0], [2.0, -0.1]]), torque=LAW
+    ),
+    "functions": Scene(
+        "",
+        OMEGA,
+        moments=MOMENTS,
+        torque=lambda t, w: (
+            np.sqrt(1.0 + w @ w) * np.exp(-t) * np.array([1.0, 0.0, 0.5])
+            - np.tanh(w) / (2.0 + np.cos(w[0] + t))
+        ),
+    ),
+    "coefficients": Scene("", OMEGA, coefficients=(0.5, -0.25, 0.125), torque=LAW),
+}
+
+
+def separation(first: Balls, second: Balls) -> Fraction:
+    """Return the largest distance of the middles over the sum of radii; balls overlap up to 1."""
+    pairs = zip(first.middle, second.middle, strict=True)
+    return max(abs(x - y) for x, y in pairs) / (first.radius + second.radius)
+
+
+def exact_solution(scene: Scene, times: Sequence[float], velocity: bool = False) -> Reference:
+    """Return the precise reference of a scene, also for a full inertia and a torque in space.
+
+    A change of the inertia by 1e-40 kg m2/s is far below the error of the reference.
+    """
+    if isinstance(scene.torque, TorqueLaw) and scene.torque.in_space:
+        scene = replace(scene, torque=of_law(scene.torque))
+    if scene.inertia is not None:
+        matrices = [[list(row) for row in scene.inertia], np.diag([1e-40] * 3).tolist()]
+        scene = replace(scene, inertia=None, changing=ChangingInertia(matrices))
+    return reference(scene, times, velocity=velocity, precise=True)
+
+
+def outside(found: Sequence[Balls], scene: Scene, times: Sequence[float]) -> float:
+    """Return how far the precise reference is outside the balls, enlarged by its estimate."""
+    exact = exact_solution(scene, times)
+    assert exact.remainder is not None
+    largest = -math.inf
+    for balls, high, low in zip(found, exact.omega, exact.remainder, strict=True):
+        for x, *parts in zip(balls.middle, high, low, strict=True):
+            value = sum(map(Fraction, map(float, parts)), Fraction(0))
+            error = Fraction(exact.estimate) + abs(value) / 2**100
+            largest = max(largest, float(abs(x - value) - balls.radius - error))
+    return largest
+
+
+@pytest.mark.parametrize("end", [1.0, -0.7])
+@pytest.mark.parametrize("case", [2, 3, 4])
+def test_three_provers_agree_without_torque(case: int, end: float) -> None:
+    scene = replace(case_scene(case), omega=(0.1, 1.0, 3.0))
+    times = [end / 3, end]
+    closed = enclose(scene, times, 30)
+    integers = prove(scene, times, 30).enclosure
+    steps = enclose_steps(scene, times, 30)
+    assert len({closed.how, integers.how, steps.how}) == 3
+    for first, second in ((closed, integers), (integers, steps), (steps, closed)):
+        for balls, other in zip(first.omega, second.omega, strict=True):
+            assert separation(balls, other) <= 1
+
+
+@pytest.mark.parametrize("kind", ["near-symmetric", "violent torque", "many speeds", "driven"])
+def test_two_provers_agree_on_random_laws(kind: str) -> None:
+    for seed in range(2):
+        scene = random_scene(kind, seed)
+        end = (1.0, -1.0)[seed] * 0.1 * scene.step_size * scene.steps
+        integers = prove(scene, [end], 20).enclosure
+        assert separation(integers.omega[0], enclose_steps(scene, [end], 25).omega[0]) <= 1
+
+
+@pytest.mark.parametrize("end", [0.8, -0.8])
+def test_waves_of_one_frequency_have_an_exact_sum(end: float) -> None:
+    """One tape of the law would have the rounded sum of 0.1 and 0.2 as an amplitude."""
+    waves = [((0.1, 0.2, 0.3), 1.0), ((0.2, 0.1, 0.7), 1.0), ((0.2, 0.1, 0.7), -1.0)]
+    scene = Scene("", OMEGA, moments=MOMENTS, torque=TorqueLaw(sines=waves, cosines=waves))
+    found = enclose_steps(scene, [end], 40).omega[0]
+    assert separation(prove(scene, [end], 40).enclosure.omega[0], found) <= 1
+
+
+def test_full_inertia_agrees_with_principal_moments() -> None:
+    scene = principal(Scene("", OMEGA, inertia=INERTIA))[0]
+    integers = prove(scene, [1.0], 40).enclosure
+    for other in (enclose_steps(scene, [1.0], 40), enclose(scene, [1.0], 40)):
+        assert separation(integers.omega[0], other.omega[0]) <= 1
+    moments = scene.exact_moments or ()
+    energy = enclose(scene, [1.0], 40).energy
+    assert energy is not None
+    begin = sum(i * Fraction(x) ** 2 / 2 for i, x in zip(moments, scene.omega, strict=True))
+    assert abs(energy[0].middle[0] - begin) <= energy[0].radius
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_balls_contain_the_reference(name: str) -> None:
+    end = 0.6 if len(name) % 2 else -0.6
+    times = [end / 2, end]
+    found = enclose(SCENES[name], times, 28)
+    assert max(each.radius for each in found.omega) <= Fraction(1, 10**28)
+    assert outside(found.omega, SCENES[name], times) <= 0.0
+
+
+@pytest.mark.parametrize("name", [*state_scenes.STEADY, *state_scenes.TURNING, "flash"])
+def test_balls_contain_the_reference_of_a_state_torque(name: str) -> None:
+    scene, end = state_scenes.draw(Random(f"enclosure {name}"), (name,))
+    speed = max(map(abs, scene.omega))
+    times = [math.copysign(min(abs(end), 0.3 / speed), end)]
+    found = enclose(scene, times, 24)
+    assert outside(found.omega, scene, times) <= 0.0
+
+
+@pytest.mark.parametrize("name", state_scenes.READY)
+def test_balls_contain_the_reference_of_a_ready_torque(name: str) -> None:
+    scene, end = state_scenes.draw_ready(Random(f"enclosure {name}"), (name, "damping"))
+    speed = max(map(abs, scene.omega))
+    times = [math.copysign(min(abs(end), 0.3 / speed), end)]
+    found = enclose(scene, times, 24)
+    assert outside(found.omega, scene, times) <= 0.0
+
+
+@pytest.mark.parametrize(("kind", "side"), [("held", 1.0), ("linear", -1.0), ("cubic", 1.0)])
+def test_breakpoints_of_a_table(kind: str, side: float) -> None:
+    """Steps end at breakpoints, some of which are requested times."""
+    torque = table([-0.9, -0.5, -0.1, 0.0, 0.2, 0.5, 0.9], np.eye(7)[:, :3] * 3.0 + 0.1, kind)
+    scene = Scene("", OMEGA, moments=MOMENTS, torque=torque)
+    times = [side * 0.1, side * 0.5, side * 0.6]
+    found = enclose(scene, times, 15)
+    assert outside(found.omega, scene, times) <= 0.0
+    assert found.steps >= len(times)
+
+
+def test_attitude_agrees_with_the_closed_form() -> None:
+    for end in (1.1, -2.0):
+        scene = Scene("", OMEGA, moments=MOMENTS, attitude=TURN)
+        closed, steps = enclose(scene, [end], 30), enclose_steps(scene, [end], 30)
+        assert closed.steps == 0 < steps.steps
+        assert closed.attitude is not None
+        assert separation(closed.attitude[0], steps.attitude[0]) <= 1
+        assert sum(x * x for x in steps.attitude[0].middle) == pytest.approx(1.0, rel=1e-15)
+
+
+@pytest.mark.parametrize("name", ["in space", "law and attitude", "functions", "full inertia"])
+def test_attitude_and_velocity_agree_with_the_reference(name: str) -> None:
+    scene = replace(SCENES[name], attitude=TURN, masses=(2.0, 1.0, 1.0), forces=(1.0, -2.0, 0.5))
+    found = enclose(scene, [0.3], 15, velocity=True)
+    numbers = exact_solution(scene, [0.3], velocity=True)
+    assert numbers.attitude is not None
+    assert numbers.velocity is not None
+    assert found.attitude is not None
+    assert found.velocity is not None
+    for balls, values in ((found.attitude, numbers.attitude), (found.velocity, numbers.velocity)):
+        assert np.allclose([float(x) for x in balls[0].middle], values[-1], atol=1e-14, rtol=0.0)
+
+
+@pytest.mark.parametrize("name", [*SCENES, "table"])
+def test_transition_matrix_is_a_limit_of_difference_quotients(name: str) -> None:
+    """Its balls contain central difference quotients up to their error of order two."""
+    torque = table([0.0, 0.2, 0.9], [[0.1, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.3]])
+    damped = torque + (lambda t, w: -0.3 * w)
+    scene = Scene("", OMEGA, moments=MOMENTS, torque=damped) if name == "table" else SCENES[name]
+    found = enclose(scene, [0.25], 12, transition=True)
+    assert found.transition is not None
+    step = 2.0**-20
+    for axis in range(3):
+        ends = []
+        for side in (step, -step):
+            omega = list(scene.omega)
+            omega[axis] += side
+            moved: Triple = (omega[0], omega[1], omega[2])
+            ends.append(enclose_steps(replace(scene, omega=moved), [0.25], 18).omega[0].middle)
+        width = Fraction(scene.omega[axis] + step) - Fraction(scene.omega[axis] - step)
+        for row, (x, y) in enumerate(zip(*ends, strict=True)):
+            exact = found.transition[0].middle[3 * row + axis]
+            assert abs((x - y) / width - exact) <= 1e-10
+    assert found.transition[0].radius < 1e-9
+    assert len(found.transition[0].middle) == (9 if scene.attitude is None else 21)
+
+
+def test_energy_of_a_torque_free_body_is_constant() -> None:
+    scene = Scene("", OMEGA, moments=MOMENTS)
+    begin = sum(Fraction(i) * Fraction(x) ** 2 / 2 for i, x in zip(MOMENTS, OMEGA, strict=True))
+    for found in (enclose(scene, [0.0, 3.0], 30), enclose(scene, [0.0, 3.0], 3)):
+        assert found.energy is not None
+        for balls in found.energy:
+            assert abs(balls.middle[0] - begin) <= balls.radius
+    assert enclose(SCENES["coefficients"], [1.0], 5).energy is None
+
+
+@pytest.mark.parametrize("digits", [1, 2, 3, 17, 40])
+def test_requested_digits_are_reached(digits: int) -> None:
+    for scene in (case_scene(3), case_scene(5), SCENES["functions"]):
+        end = 0.2
+        found = enclose(scene, [end], digits)
+        largest = max(Fraction(1), *map(abs, found.omega[0].middle))
+        assert found.omega[0].radius <= largest / 10**digits
+        finer = enclose(scene, [end], digits + 5)
+        assert separation(found.omega[0], finer.omega[0]) <= 1
+
+
+@pytest.mark.parametrize("digits", [1, 2, 5])
+def test_first_balls_contain_omega(digits: int) -> None:
+    """With one digit, the precision is less than that of a binary64 number."""
+    scene = Scene("", (1.0 / 3.0, 0.7, 1e-9), inertia=INERTIA)
+    found = enclose(scene, [0.0], digits).omega[0]
+    for x, exact in zip(found.middle, scene.omega, strict=True):
+        assert abs(x - Fraction(exact)) <= found.radius
+
+
+BLOWN = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("scene", "times", "options", "words"),
+    [
+        (Scene("", OMEGA, moments=MOMENTS, torque=opaque(lambda t, w: -w)), [1.0], {}, "opaque"),
+        (BLOWN, [0.5, 2.0], {"digits": 5, "effort": 0.01}, "more than 200 steps|beyond t = 1"),
+        (SCENES["functions"], [1.0, 0.5], {}, "lead away"),
+        (SCENES["functions"], [1.0, -2.0], {}, "lead away"),
+        (SCENES["functions"], [], {}, "lead away"),
+        (SCENES["functions"], [math.inf], {}, "not finite"),
+        (SCENES["functions"], [1.0], {"digits": 0}, "digits: 0; allowed: 1 to 1000"),
+        (SCENES["functions"], [1.0], {"digits": 1001}, "digits: 1001; allowed: 1 to 1000"),
+        (SCENES["functions"], [9.0], {"effort": 1e-3}, "more than 4 steps; .*effort"),
+        (SCENES["coefficients"], [90.0], {"effort": 1e-3}, "more than 20 steps; .*effort"),
+        (SCENES["coefficients"], [1.0], {"effort": 0.0}, "effort"),
+        (SCENES["changing moments"], [30.0], {}, "reaches 0"),
+    ],
+)  # fmt: skip
+def test_errors_of_the_input(
+    scene: Scene, times: list[float], options: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(InputError, match=words) as error:
+        enclose(scene, times, **options)
+    assert "\n" not in str(error.value)
+
+
+def test_solution_is_enclosed_until_shortly_before_it_is_infinite() -> None:
+    """With coefficients and components of 1, each component is 1/(1 - t)."""
+    balls = enclose(BLOWN, [0.96875], 10).omega[0]
+    assert all(abs(x - 32) <= balls.radius for x in balls.middle)
+
+
+def test_certificates_need_no_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(enclosure, "find_spec", lambda name: None)
+    assert can_enclose(case_scene(5))
+    assert "integer" in enclose(case_scene(5), [0.1], 10).how
+    assert "integer" in enclose(case_scene(3), [0.1], 10).how
+    for name in ("functions", "in space", "full inertia"):
+        assert not can_enclose(SCENES[name])
+        with pytest.raises(InputError, match=r"needs python-flint.*pip install") as error:
+            enclose(SCENES[name], [0.1], 10)
+        assert "\n" not in str(error.value)
+    with pytest.raises(InputError, match="needs python-flint"):
+        enclose(case_scene(5), [0.1], 10, transition=True)
+
+
+def test_progress_is_reported() -> None:
+    seen: list[int] = []
+    for scene in (SCENES["functions"], SCENES["coefficients"]):
+        seen.clear()
+        enclose(scene, [2.0], 10, progress=lambda done, total, text: seen.append(done))
+        assert set(seen) <= set(range(101))
+        assert seen[-1] == 100

@@ -135,7 +135,8 @@ class _Run:
     ) -> None:
         self._record, self._times = record, [Fraction(t) for t in times]
         self._digits, self._goal = digits, goal
-        self._order = max(16, round(digits))
+        # More terms make fewer steps and a smaller certificate; too many cost time.
+        self._order = max(16, round(min(1.6 * digits, digits + 40.0)))
         self._clock = max(_LENGTH_BITS + 12, *(t.denominator.bit_length() for t in self._times))
         needed = math.ceil(digits / math.log10(2.0)) + _GUARD_BITS
         self._fine = needed + _GUARD_BITS + self._order.bit_length()

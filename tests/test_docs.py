@@ -11,6 +11,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from docs.article import build as article
+from docs.certificates import page as proofs
 from pyharness import read_scene
 from pyharness.cli import options
 from pyharness.cli.main import VERBS, main
@@ -33,6 +34,7 @@ BUILT = (
     (origins.PAGE, origins.origins_page()),
     (principles.PAGE, principles.principles_page()),
     (timeline_page.PAGE, timeline_page.timeline_page()),
+    (proofs.PAGE, proofs.proofs_page()),
 )
 
 

@@ -86,7 +86,7 @@ def enclose(
     else:
         raise InputError(
             "prove: this scene needs python-flint, which is not installed; install it with "
-            "'pip install python-flint', or pyharness[proofs]"
+            "'pip install python-flint'"
         )
     return with_energy(scene, found)
 

@@ -364,6 +364,9 @@ def test_error_of_the_waves_counts() -> None:
     # The amplitudes of 5 rad/s on the first axis, 3.0 and 0.1 N m, for a moment of 40 kg m2.
     assert wider - narrow >= wide * seconds * Fraction(3) / 40
     assert kept >= wide
+    # A defect of the waves has the same effect as an error at the begin of the step.
+    series, defects, own = expansion
+    assert system.radii(3, 0, (series, defects, own + wide), tube, h) == (wider, kept)
 
 
 def test_bounds_of_a_step_are_upper_bounds() -> None:

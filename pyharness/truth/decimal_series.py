@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 from decimal import Decimal
 from fractions import Fraction
 
-from pyharness.model.effort import advice, checked_effort, waves
+from pyharness.model.effort import advice, checked_effort
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.truth.decimal_functions import Row as Row
 from pyharness.truth.decimal_functions import product, sine_cosine
 from pyharness.truth.tape_series import TapeSeries, series_products
@@ -58,7 +59,7 @@ def taylor_series(
     if equations.least_order > order:
         # Two integrations with different orders still have different orders.
         order = equations.least_order + order // 4
-    is_recorded = isinstance(scene.torque, StateTorque)
+    is_recorded = isinstance(scene.torque, StateTorque) or scene.changing is not None
     at_end = _Equations(scene, coefficients, velocity) if is_recorded else equations
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
     moving = len(state)
@@ -181,7 +182,15 @@ def _torque_work(scene: Scene) -> int:
     """
     if isinstance(scene.torque, StateTorque) and scene.torque.tape is not None:
         return series_products(scene.torque.tape)
-    return waves(scene)
+    law = _law_of(scene)
+    return len(law.sines) + len(law.cosines)
+
+
+def _law_of(scene: Scene) -> TorqueLaw:
+    """Return the torque law about the body axes of a scene, whose inertia may change with time."""
+    if scene.changing is not None and isinstance(scene.torque, TorqueLaw):
+        return scene.torque
+    return scene.body_torque
 
 
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
@@ -292,7 +301,7 @@ class _Equations:
         if isinstance(scene.torque, StateTorque) and scene.torque.tape is not None:
             self._tape = TapeSeries(scene.torque.tape)
         else:
-            self._law = scene.body_torque
+            self._law = _law_of(scene)
         self._changing = scene.changing
         # The equations of an inertia that changes take the torque itself.
         exact = divisors(scene) if scene.changing is None else (Fraction(1),) * 3

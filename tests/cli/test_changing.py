@@ -80,9 +80,9 @@ def test_verb_refuses_moments_that_change(command: str, capsys: pytest.CaptureFi
 
 
 def test_every_verb_with_a_scene_is_tried() -> None:
-    """The verb `plan`, and `run` with a method, take such a scene."""
+    """The verbs `plan` and `prove`, and `run` with a method, take such a scene."""
     with_scene = {verb for verb in VERBS if "--scene FILE" in Parser(verb).module.OPTIONS}
-    assert with_scene == {command.split()[0] for command in REFUSED} | {"plan"}
+    assert with_scene == {command.split()[0] for command in REFUSED} | {"plan", "prove"}
 
 
 @pytest.mark.usefixtures("booms")

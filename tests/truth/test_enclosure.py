@@ -312,3 +312,41 @@ def test_progress_is_reported() -> None:
         enclose(scene, [2.0], 10, progress=lambda done, total, text: seen.append(done))
         assert set(seen) <= set(range(101))
         assert seen[-1] == 100
+
+
+def _proof(scene: Scene, digits: int = 20) -> Any:
+    equations = enclosure_steps.Equations(scene, False, False)
+    return enclosure_steps._Proof(equations, digits, True)
+
+
+def test_rest_of_a_series_is_bounded() -> None:
+    """The torque 1/(2 - t) has the Taylor coefficients 2**-(k+1)."""
+    scene = Scene(
+        "pole", omega=(0, 0, 0), moments=(1, 1, 1), torque=lambda t, w: (1 / (2 - t), 0, 0)
+    )
+    count, h = 10, Fraction(1, 4)
+    proof = _proof(scene)
+    rates = proof.equations.at(Fraction(0), True)
+    ball = enclosure_steps.ball
+    bounds = proof._rests(rates, [[ball(Fraction(0))]] * 3, h, count)
+    true = float(sum(h**k * Fraction(1, 2 ** (k + 1)) for k in range(count, 60)))
+    assert true < float(bounds[0]) < 1e6 * true
+
+
+def test_errors_of_the_attitude_reach_omega() -> None:
+    """The matrix of the growth has bounds of the derivatives of one block by another."""
+    scene = Scene(
+        "pointing",
+        omega=(1, 2, 3),
+        moments=(2, 2, 2),
+        torque=lambda t, w, q: (10 * q[1], 0, 0),
+        attitude=(1, 0, 0, 0),
+    )
+    proof = _proof(scene)
+    rates = proof.equations.at(Fraction(0), True)
+    ball = enclosure_steps.ball
+    inputs = [ball(x) for x in proof.equations.start]
+    matrix = proof._growth(rates, ball(Fraction(0)), inputs).tolist()
+    assert float(matrix[0][1]) >= 5.0 / proof.equations.scales[0] * (1 - 1e-9)
+    assert 0.5 <= float(matrix[1][0]) / proof.equations.scales[0] < 1.0
+    assert 0.0 <= float(matrix[1][1]) < 1e-9  # a rotation

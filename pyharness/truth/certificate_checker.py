@@ -202,8 +202,8 @@ def check(certificate: dict[str, Any]) -> int:
     for h, tube, stated, after in certificate["steps"]:
         whole += [h, tube, stated, *after]
     positive = min(*scales, *map(Fraction, scene.get("moments", [1]))) > 0
-    if len({*scene} - {"name"}) != 3 or len(scene["torque"]) != 4:
-        raise NotProvedError("its scene has keys that are not checked")
+    if not rows or len({*scene} - {"name"}) != 3 or len(scene["torque"]) != 4:
+        raise NotProvedError("it has no rows, or its scene has keys that are not checked")
     if any(type(x) is not int for x in whole) or not (positive and 0 < clock <= bits and order > 1):
         raise NotProvedError("a number is not an integer, or not in its range")
     system = System(scene, bits, clock, scales)

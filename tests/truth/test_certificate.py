@@ -301,6 +301,11 @@ def _format(source: Random, record: Record) -> None:
     record["format"] = source.choice(("pyharness-certificate-2", None, 1))
 
 
+def _nothing(source: Random, record: Record) -> None:
+    record["rows"] = []
+    record["steps"] = record["steps"][: source.randrange(3)]
+
+
 def _other_list(source: Random, record: Record) -> None:
     place = source.choice(("steps", "scales", "rows", "scene"))
     record[place] = source.choice((None, 3, "steps", [[1]]))

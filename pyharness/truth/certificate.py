@@ -70,9 +70,10 @@ def prove(
     """Return balls that contain omega at `times` (s), and a certificate of them.
 
     The times have one sign, and each is farther from 0 than the one before. The radius of a ball is
-    at most 10**-digits rad/s. `effort` is a factor on the limit of the number of steps, and
-    `progress` is called after each hundredth of the last time. Raise InputError if the scene has no
-    certificate, if omega grows without bound, or if the work limit is exceeded.
+    at most 10**-digits rad/s, times the largest component of omega if it exceeds 1 rad/s. `effort`
+    is a factor on the limit of the number of steps, and `progress` is called after each step. Raise
+    InputError if the scene has no certificate, if omega grows without bound, or if the work limit
+    is exceeded.
     """
     if not has_certificate(scene):
         raise InputError(
@@ -205,10 +206,10 @@ class _Run:
 
     def _tube(self, radius: int, expansion: Any, h: int) -> int:
         """Return the radius of a tube that is larger than the error of an ordinary step."""
-        series, defects, wave_defect = expansion
+        series, residuals, wave_residual = expansion
         system = self._system
         thick: int = max(max(map(abs, each)) for each in series[:3]) >> _TUBE_BITS
-        source: int = radius + system.norm(defects) + (system.forced(h) * wave_defect >> 64)
+        source: int = radius + system.norm(residuals) + (system.forced(h) * wave_residual >> 64)
         return 8 * source + thick + 8
 
     def balls(self, steps: Sequence[_Step]) -> list[Balls]:

@@ -6,10 +6,11 @@ files of certificates; its exit status is 1 unless all of them hold.
 
 The equations are y' = f(t, y) for the angular velocity omega, and for the sines and cosines of the
 torque. In a step of the length h, the solution is approximated by a polynomial p(s), s from 0 to 1,
-whose coefficients are those of Taylor's recurrences. The proof does not depend on their accuracy,
-because it bounds the defect d = p' - h f(p) of the polynomial itself. The error e = y - p obeys
+whose coefficients are those of the Taylor series, rounded down. The proof does not depend on them,
+because it bounds the residual d = p' - h f(p) of the polynomial itself. The error e = y - p obeys
 |e|' <= h mu |e| + |d|, where mu bounds the logarithmic norm of the Jacobian of f in a tube around p
-(Dahlquist 1958). If the error stays less than the radius of the tube, the bound is proved.
+(Dahlquist 1958). The bound of |e| that follows holds while |e| is less than the radius of the tube.
+If the bound itself is less, it holds on the whole step, because |e| is continuous.
 
 A number y is stored as an integer, y times 2**bits. A time is stored as an integer over 2**clock.
 The norm of an error of omega is sqrt(sum (e_i / scale_i)**2), with scales in units of 2**-20.
@@ -69,11 +70,8 @@ class System:
             self.rows.append((common, [int(each * common) for each in terms]))
 
     def expand(self, state: Sequence[int], time: int, h: int, order: int) -> Expansion:
-        """Return the polynomials of a step, and bounds of their defects in units of 2**-bits.
-
-        The defects are those of the three components of omega, and a sum of those of the waves.
-        """
-        series, bits, clock, wave_defect = [[x] for x in state], self.bits, self.clock, 0
+        """Return polynomials, and bounds of the residuals of omega and all waves, over 2**bits."""
+        series, bits, clock, wave_residual = [[x] for x in state], self.bits, self.clock, 0
         for n, frequency in enumerate(self.frequencies):
             sine, cosine = series[3 + 2 * n], series[4 + 2 * n]
             turn, scale = h * frequency.numerator, frequency.denominator << clock
@@ -83,7 +81,7 @@ class System:
                 cosine.append(new[1])
             for each, other, factor in ((sine, cosine, turn), (cosine, sine, -turn)):
                 rests = [scale * k * each[k] - factor * other[k - 1] for k in range(1, order + 1)]
-                wave_defect += over(sum(map(abs, rests)) + abs(factor * other[order]), scale)
+                wave_residual += over(sum(map(abs, rests)) + abs(factor * other[order]), scale)
         pushes = []
         for _, (_, constant, rate, *amplitudes) in self.rows:
             # The shifts are exact, because there are at least as many bits as those of the clock.
@@ -105,8 +103,9 @@ class System:
                     series[i].append(rest // scale)
                     rest %= scale
                 rests[i] += abs(rest)
-        defects = [over(x, row[0] << bits + clock) for x, row in zip(rests, self.rows, strict=True)]
-        return series, defects, wave_defect
+        scales = [row[0] << bits + clock for row in self.rows]
+        residuals = [over(x, scale) for x, scale in zip(rests, scales, strict=True)]
+        return series, residuals, wave_residual
 
     def norm(self, errors: Sequence[int]) -> int:
         """Return a bound of the norm of three errors of omega."""
@@ -148,13 +147,13 @@ class System:
 
         Raise NotProvedError if the step is too long, or if the solution may leave the tube.
         """
-        series, defects, wave_defect = expansion
+        series, residuals, wave_residual = expansion
         growth = self.growth(series, tube, h)
         if growth > UNIT:
             raise NotProvedError("errors grow too much in it")
         # The linearised equations of the waves rotate their errors.
-        wave_radius += wave_defect
-        source = radius + self.norm(defects) + over(self.forced(h) * wave_radius, UNIT)
+        wave_radius += wave_residual
+        source = radius + self.norm(residuals) + over(self.forced(h) * wave_radius, UNIT)
         radius = over(source * exponential(growth), UNIT)
         if radius >= tube:
             raise NotProvedError("the solution may leave the tube")

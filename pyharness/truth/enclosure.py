@@ -44,8 +44,8 @@ def enclose(
     times : sequence of numbers
         Times (s) of one sign, each farther from 0 than the one before; the first may be 0.
     digits : int
-        A ball of omega has at most the radius 10**-digits, times the largest component of omega if
-        it exceeds 1 rad/s.
+        A ball of omega has at most the radius 10**-digits rad/s, times the largest component of
+        omega if it exceeds 1 rad/s; of the initial omega for a solution in closed form.
     velocity, transition : bool
         Whether to enclose the translational velocity (m/s), and the derivatives of omega and of the
         attitude by omega at time 0.

@@ -72,8 +72,9 @@ class Equations:
     def scales(self) -> list[float]:
         """The units of the unknowns in which errors are measured.
 
-        With the roots of abs(A), abs(B), abs(C) as units of omega, the linearised equations of
-        motion amplify errors as little as a norm can show.
+        With the roots of abs(A), abs(B), abs(C) as units of omega, the logarithmic norm of Euler's
+        equations is 0 for rotations about the axes of the largest and the smallest moment, unless
+        the lower limit of the units applies.
         """
         found = [1.0] * len(self.start)
         if self._principal is not None:

@@ -1,11 +1,14 @@
 """Proved enclosures of the solution of any scene with a recorded torque, by Taylor steps.
 
-In each step of the integration an approximate solution p is a polynomial of time. Its defect
-p' - f(t, p) in the equation y' = f(t, y) is bounded on the whole step. The norm of the error
-e = y - p then obeys |e|' <= mu |e| + |defect|, where mu bounds the logarithmic norm of the
-Jacobian of f near p (Dahlquist 1958; Hairer, Norsett and Wanner 1993, Solving Ordinary Differential
-Equations I, theorem I.10.6). The proof does not depend on how p was found. All arithmetic is that
-of balls.
+In each step of the integration an approximate solution p is a polynomial of time. Its residual
+p' - f(t, p) in the equation y' = f(t, y) is bounded on the whole step. The unknowns are divided
+into blocks, such as omega and the attitude. The vector r of the norms of the blocks of the error
+y - p obeys r' <= M r + d, with the bounds d of the residual. On the diagonal of M are bounds of the
+logarithmic norms of the diagonal blocks of the Jacobian of f near p, or 0 instead of negative ones;
+elsewhere are bounds of the norms of the other blocks. Since no element of M is negative, r(h) is at
+most exp(h M) (r(0) + h d). For one block this is theorem I.10.6 of Hairer, Norsett and Wanner 1993,
+Solving Ordinary Differential Equations I. The proof does not depend on how p was found. All bounds
+are computed in ball arithmetic.
 """
 
 import math
@@ -149,7 +152,7 @@ class _Proof:
         return _upper(sum((_upper(abs(x) / s) ** 2 for x, s in parts), arb(0)).sqrt())
 
     def balls(self, attitude: bool) -> list[Balls]:
-        """Return the balls of each group of unknowns; that of the attitude is normalised."""
+        """Return the balls of each group of unknowns; those of the attitude are normalised."""
         found = []
         for n, (block, radius) in enumerate(zip(self.blocks, self.state.radii, strict=True)):
             pairs = zip(self.state.middle[block], self.scales[block], strict=True)
@@ -205,7 +208,7 @@ class _Proof:
         sizes = [[abs(x) * length**k for k, x in enumerate(each)] for each in terms]
         half = [_upper(sum(each[1:], arb(0)) / 2) for each in sizes]
         middles = [each[0] + _value([arb(0), *each[1:]], ball(h)) / 2 for each in terms]
-        defects = self._defects(rates, terms, h, sizes)
+        residuals = self._residuals(rates, terms, h, sizes)
         tubes = [
             _upper(2 * r + self.norm([each[0] for each in terms], block) * _TUBE + _LEAST_TUBE)
             for r, block in zip(state.radii, self.blocks, strict=True)
@@ -218,7 +221,7 @@ class _Proof:
         matrix = self._growth(rates, time, inputs) * length
         count = len(self.blocks)
         pushed = arb_mat(
-            count, 1, [r + d * length for r, d in zip(state.radii, defects, strict=True)]
+            count, 1, [r + d * length for r, d in zip(state.radii, residuals, strict=True)]
         )
         found = (matrix.exp() * pushed).entries()
         radii = [_upper(x) for x in found]
@@ -226,10 +229,10 @@ class _Proof:
             raise _NoStepError
         return radii
 
-    def _defects(
+    def _residuals(
         self, rates: Rates, terms: list[list[Any]], h: Fraction, sizes: list[list[Any]]
     ) -> list[Any]:
-        """Return bounds of the defect of the polynomials in each block."""
+        """Return bounds of the residual of the polynomials in each block."""
         count = 2 * self.order + 2
         length, begin = abs(ball(h)), ball(self.state.time)
         ctx.cap = count
@@ -247,7 +250,8 @@ class _Proof:
     def _rests(self, rates: Rates, terms: list[list[Any]], h: Fraction, count: int) -> list[Any]:
         """Return bounds of the terms from number `count` on of the rates along the polynomials.
 
-        By Cauchy's estimate they are at most a geometric series.
+        If the rates are at most M on a disc whose radius is c steps, term number k is at most
+        M c**-k at the end of the step, by Cauchy's estimate. The bounds are geometric series.
         """
         length = abs(ball(h))
         best: list[Any] | None = None

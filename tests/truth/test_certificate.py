@@ -369,13 +369,13 @@ def test_error_of_the_waves_counts() -> None:
     # The amplitudes of 5 rad/s on the first axis, 3.0 and 0.1 N m, for a moment of 40 kg m2.
     assert wider - narrow >= wide * seconds * Fraction(3) / 40
     assert kept >= wide
-    # A defect of the waves has the same effect as an error at the begin of the step.
-    series, defects, own = expansion
-    assert system.radii(3, 0, (series, defects, own + wide), tube, h) == (wider, kept)
+    # A residual of the waves has the same effect as an error at the begin of the step.
+    series, residuals, own = expansion
+    assert system.radii(3, 0, (series, residuals, own + wide), tube, h) == (wider, kept)
 
 
 def test_bounds_of_a_step_are_upper_bounds() -> None:
-    """The defect, at many points of a step, is at most its bound; so is an omitted term."""
+    """The residual, at many points of a step, is at most its bound; so is an omitted term."""
     for name in ("waves", "before", "coefficients"):
         record = genuine(name)
         system = System(record["scene"], record["bits"], record["clock"], record["scales"])
@@ -383,7 +383,7 @@ def test_bounds_of_a_step_are_upper_bounds() -> None:
         state = [int(Fraction(x) * unit) for x in record["scene"]["omega"]]
         waves = [0, unit] * len(system.frequencies)
         h = record["steps"][0][0]
-        series, defects, wave_defect = system.expand([*state, *waves], 0, h, 6)
+        series, residuals, wave_residual = system.expand([*state, *waves], 0, h, 6)
         length = Fraction(h, 1 << record["clock"])
         for s in (Fraction(n, 7) for n in range(8)):
             values = [sum(x * s**k for k, x in enumerate(each)) / unit for each in series]
@@ -393,13 +393,13 @@ def test_bounds_of_a_step_are_upper_bounds() -> None:
                 push = constant + rate * length * s
                 push += sum(a * x for a, x in zip(amplitudes, values[3:], strict=True))
                 exact = (product * omega[i - 2] * omega[i - 1] + push) / common
-                assert abs(slopes[i] - length * exact * unit) <= defects[i]
+                assert abs(slopes[i] - length * exact * unit) <= residuals[i]
             wrong = Fraction(0)
             for n, frequency in enumerate(system.frequencies):
                 sine, cosine = values[3 + 2 * n : 5 + 2 * n]
                 wrong += abs(slopes[3 + 2 * n] - length * frequency * cosine * unit)
                 wrong += abs(slopes[4 + 2 * n] + length * frequency * sine * unit)
-            assert wrong <= wave_defect
+            assert wrong <= wave_residual
 
 
 def test_logarithmic_norm_is_an_upper_bound() -> None:

@@ -16,8 +16,8 @@ OPTIONS = {
     **shared.SCENE,
     "--times T1,T2,...": "Times of the results, s, of either sign, in the order of their distance "
     "from 0 (default: the end of the scene's last step).",
-    "--digits D": f"Largest radius, 10**-D rad/s, 1 to {MOST_DIGITS} (default {_DIGITS}); times "
-    "the angular velocity where that is above 1 rad/s.",
+    "--digits D": f"Number of digits, 1 to {MOST_DIGITS} (default {_DIGITS}): a radius is at most "
+    "10**-D rad/s, times the largest component of omega if that exceeds 1 rad/s.",
     "--velocity": "Enclose the translational velocity too; needs python-flint.",
     "--transition": "Enclose the derivatives of the solution by the initial angular velocity too; "
     "needs python-flint.",

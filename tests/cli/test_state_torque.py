@@ -119,7 +119,7 @@ def test_problem_with_published_numbers_refuses_a_torque_that_depends_on_the_sta
 
 
 def test_every_verb_with_a_scene_is_tried() -> None:
-    """The verbs `plan` and `stress`, and `run` with other methods, take such a torque."""
+    """The verbs `plan`, `prove` and `stress`, and `run` with a method, take such a torque."""
     with_scene = {verb for verb in VERBS if "--scene FILE" in Parser(verb).module.OPTIONS}
     assert with_scene == {command.split()[0] for command in REFUSED} | {"plan", "prove", "stress"}
 

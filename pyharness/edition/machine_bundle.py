@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pyharness.edition.crate import Part
+from pyharness.edition.made_pages import table
 from pyharness.history import printed_page
 from pyharness.history.listing_output import listings_of, our_page
 from pyharness.model.facts import facts
@@ -60,11 +61,11 @@ def machine_parts() -> Iterator[Part]:
         "text/x-python", Path(printed_page.__file__).read_bytes(),
     )  # fmt: skip
     readme = facts("machine")["readme"].format(
-        jobs=_markdown(
-            ["job", "content"],
+        jobs=table(
+            "job | content",
             [[f"`{each.path.removeprefix('machine/')}`", each.title] for each in jobs],
-        ),
-        pages=_markdown(["page", "rows", "printed by"], _shared(texts, rows)),
+        ).rstrip(),
+        pages=table("page | rows | printed by", [*_shared(texts, rows)]).rstrip(),
         outcomes=outcomes_table(),
     )
     yield Part(
@@ -77,7 +78,7 @@ def machine_parts() -> Iterator[Part]:
 def outcomes_table() -> str:
     """Return a table in Markdown of what would be learned from each outcome of a job."""
     rows = [[each["seen"], each["learned"], each["open"]] for each in facts("machine")["outcome"]]
-    return _markdown(["outcome", "what would be learned", "what remains open"], rows)
+    return table("outcome | what would be learned | what remains open", rows).rstrip()
 
 
 def _pages(program: str, case: int) -> dict[tuple[str, str], str]:
@@ -134,8 +135,3 @@ def _shared(texts: dict[str, str], rows: list[list[Any]]) -> Iterator[list[str]]
                 words.setdefault(listing, []).append(f"`{word}`")
         by = "; ".join(f"{listing} in {', '.join(found)}" for listing, found in words.items())
         yield [f"`{name}`", str(len(printed)), by]
-
-
-def _markdown(heads: list[str], rows: Any) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

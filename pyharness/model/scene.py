@@ -44,11 +44,11 @@ FULL_INERTIA = (
 STATE_TORQUE = (
     "the scene's torque is a function, and this needs a TorqueLaw: constant, linear and sinusoidal "
     "terms of time; allowed for functions: solve, prepare, solve_many, compare_methods, and the "
-    "verbs run and compare with --method, plan, stress, and sweep with a method"
+    "verbs run and compare with --method, plan, prove, stress, and sweep with a method"
 )
 CHANGING = (
     "the scene's inertia changes with time, and this takes a constant one; allowed for a changing "
-    "inertia: solve, prepare, solve_many, and the verb run --method"
+    "inertia: solve, prepare, solve_many, and the verbs prove and run --method"
 )
 SPACE_TORQUE = (
     "the torque is about the axes of space, and this takes one about those of the body; allowed: "

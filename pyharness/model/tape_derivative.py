@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.model.dual import Dual, dual
 from pyharness.model.symbols import MOST_OPERATIONS, Recorder
 from pyharness.model.tape import Functions, Table, Tape, evaluate
 
@@ -24,10 +25,10 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
     """
     recorder = Recorder(_MORE * MOST_OPERATIONS)
     inputs = [
-        _Dual(symbol, [float(slot == each) for each in slots])
+        Dual(symbol, [float(slot == each) for each in slots])
         for slot, symbol in enumerate(recorder.inputs())
     ]
-    found = [_dual(each, len(slots)) for each in evaluate(tape, inputs, _DUALS)]
+    found = [dual(each, len(slots)) for each in evaluate(tape, inputs, _DUALS)]
     values, slopes = [each.value for each in found], [each.slopes for each in found]
     return recorder.tape([*values, *(slope for row in slopes for slope in row)])
 
@@ -42,90 +43,46 @@ def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
     count = len(values)
     instead = "fewer parameters"
     recorder = Recorder(_FEWER * MOST_OPERATIONS, tape.n_inputs - count, "sensitivities", instead)
-    inputs = [_Dual(symbol, [0.0] * count) for symbol in recorder.inputs()]
+    inputs = [Dual(symbol, [0.0] * count) for symbol in recorder.inputs()]
     inputs += [
-        _Dual(value, [float(k == each) for k in range(count)]) for each, value in enumerate(values)
+        Dual(value, [float(k == each) for k in range(count)]) for each, value in enumerate(values)
     ]
-    found = [_dual(each, count) for each in evaluate(tape, inputs, _DUALS)]
+    found = [dual(each, count) for each in evaluate(tape, inputs, _DUALS)]
     return recorder.tape([*(slope for x in found for slope in x.slopes), *(x.value for x in found)])
 
 
-class _Dual:
-    """A value, and its derivatives with respect to some inputs; all are symbols or floats."""
-
-    def __init__(self, value: Any, slopes: list[Any]) -> None:
-        self.value, self.slopes = value, slopes
-
-    def chained(self, value: Any, slope: Any) -> "_Dual":
-        """Return a function of this number, from its value and its derivative."""
-        return _Dual(value, [slope * each for each in self.slopes])
-
-    def __add__(self, other: Any) -> "_Dual":
-        second = _dual(other, len(self.slopes))
-        slopes = [x + y for x, y in zip(self.slopes, second.slopes, strict=True)]
-        return _Dual(self.value + second.value, slopes)
-
-    __radd__ = __add__
-
-    def __mul__(self, other: Any) -> "_Dual":
-        second = _dual(other, len(self.slopes))
-        slopes = [
-            x * second.value + self.value * y
-            for x, y in zip(self.slopes, second.slopes, strict=True)
-        ]
-        return _Dual(self.value * second.value, slopes)
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Any) -> "_Dual":
-        second = _dual(other, len(self.slopes))
-        quotient = self.value / second.value
-        slopes = [
-            (x + -1.0 * quotient * y) / second.value
-            for x, y in zip(self.slopes, second.slopes, strict=True)
-        ]
-        return _Dual(quotient, slopes)
-
-    def __rtruediv__(self, other: float) -> "_Dual":
-        return _dual(other, len(self.slopes)) / self
-
-
-def _dual(value: Any, count: int) -> _Dual:
-    return value if isinstance(value, _Dual) else _Dual(value, [0.0] * count)
-
-
 def _sqrt(x: Any) -> Any:
-    if not isinstance(x, _Dual):
+    if not isinstance(x, Dual):
         return math.sqrt(x)
     root = np.sqrt(x.value)
     return x.chained(root, 0.5 / root)
 
 
 def _exp(x: Any) -> Any:
-    if not isinstance(x, _Dual):
+    if not isinstance(x, Dual):
         return math.exp(x)
     value = np.exp(x.value)
     return x.chained(value, value)
 
 
 def _tanh(x: Any) -> Any:
-    if not isinstance(x, _Dual):
+    if not isinstance(x, Dual):
         return math.tanh(x)
     value = np.tanh(x.value)
     return x.chained(value, 1.0 + -1.0 * (value * value))
 
 
 def _sine(x: Any) -> Any:
-    return x.chained(np.sin(x.value), np.cos(x.value)) if isinstance(x, _Dual) else math.sin(x)
+    return x.chained(np.sin(x.value), np.cos(x.value)) if isinstance(x, Dual) else math.sin(x)
 
 
 def _cosine(x: Any) -> Any:
-    if not isinstance(x, _Dual):
+    if not isinstance(x, Dual):
         return math.cos(x)
     return x.chained(np.cos(x.value), -1.0 * np.sin(x.value))
 
 
-def _of_table(table: Table, time: _Dual) -> _Dual:
+def _of_table(table: Table, time: Dual) -> Dual:
     slopes = tuple((c1, 2.0 * c2, 3.0 * c3, 0.0) for _, c1, c2, c3 in table.pieces)
     return time.chained(
         time.value.of_table(table), time.value.of_table(Table(table.breaks, slopes))

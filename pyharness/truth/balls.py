@@ -1,4 +1,4 @@
-"""Numbers of the enclosures: balls, power series of balls, complex balls, and derivatives of these.
+"""Numbers of the enclosures: balls, power series of balls, complex balls, and functions of them.
 
 A ball is an interval given by its middle and its radius. Every operation of python-flint returns a
 ball that contains the exact result for all numbers in its operands.
@@ -9,15 +9,16 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
-from flint import acb, arb
+from flint import acb, arb, fmpq
 
+from pyharness.model.dual import Dual
 from pyharness.model.tape import Functions, Table
 from pyharness.truth.enclosed import Balls
 
 
 def ball(x: Fraction) -> Any:
     """Return a ball that contains a fraction, and that is exact if the precision suffices."""
-    return arb(x.numerator) / arb(x.denominator)
+    return arb(fmpq(x.numerator, x.denominator))
 
 
 def fraction(x: Any) -> Fraction:
@@ -29,64 +30,6 @@ def fraction(x: Any) -> Fraction:
 def balls(row: Sequence[Any]) -> Balls:
     """Return the balls of a row with their exact middles, and with the largest of their radii."""
     return Balls(tuple(map(fraction, row)), max(fraction(x.rad()) for x in row))
-
-
-class Dual:
-    """A number, and its derivatives with respect to some unknowns; numbers of any kind."""
-
-    def __init__(self, value: Any, slopes: Sequence[Any]) -> None:
-        self.value, self.slopes = value, slopes
-
-    def chained(self, value: Any, slope: Any) -> "Dual":
-        """Return a function of this number, from its value and its derivative."""
-        return Dual(value, [slope * each for each in self.slopes])
-
-    def __add__(self, other: Any) -> "Dual":
-        """Return the sum with a number or a dual."""
-        if not isinstance(other, Dual):
-            return Dual(self.value + other, self.slopes)
-        slopes = [x + y for x, y in zip(self.slopes, other.slopes, strict=True)]
-        return Dual(self.value + other.value, slopes)
-
-    __radd__ = __add__
-
-    def __neg__(self) -> "Dual":
-        """Return the opposite."""
-        return Dual(-self.value, [-x for x in self.slopes])
-
-    def __sub__(self, other: Any) -> "Dual":
-        """Return the difference from a number or a dual."""
-        return self.__add__(-other)
-
-    def __rsub__(self, other: Any) -> "Dual":
-        """Return the difference of a number and this one."""
-        return self.__neg__().__add__(other)
-
-    def __mul__(self, other: Any) -> "Dual":
-        """Return the product with a number or a dual."""
-        if not isinstance(other, Dual):
-            return Dual(self.value * other, [x * other for x in self.slopes])
-        slopes = [
-            x * other.value + self.value * y for x, y in zip(self.slopes, other.slopes, strict=True)
-        ]
-        return Dual(self.value * other.value, slopes)
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Any) -> "Dual":
-        """Return the quotient by a number or a dual."""
-        if not isinstance(other, Dual):
-            return Dual(self.value / other, [x / other for x in self.slopes])
-        quotient = self.value / other.value
-        slopes = [
-            (x - quotient * y) / other.value for x, y in zip(self.slopes, other.slopes, strict=True)
-        ]
-        return Dual(quotient, slopes)
-
-    def __rtruediv__(self, other: Any) -> "Dual":
-        """Return the quotient of a number and this one."""
-        quotient = other / self.value
-        return self.chained(quotient, -quotient / self.value)
 
 
 def _sqrt(x: Any) -> Any:
@@ -114,7 +57,7 @@ def _sine(x: Any) -> Any:
 
 
 def _cosine(x: Any) -> Any:
-    return x.chained(_cosine(x.value), -_sine(x.value)) if isinstance(x, Dual) else x.cos()
+    return x.chained(_cosine(x.value), -1.0 * _sine(x.value)) if isinstance(x, Dual) else x.cos()
 
 
 def functions_at(time: Fraction, forward: bool) -> Functions[Any]:

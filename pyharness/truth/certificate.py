@@ -16,9 +16,10 @@ from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.truth.certificate_checker import FORMAT, SCALE_BITS, NotProvedError, System
-from pyharness.truth.enclosed import Balls, Enclosure, check_order, largest_radius, row_of
+from pyharness.truth.enclosed import Balls, Enclosure, largest_radius, row_of
+from pyharness.truth.scales import scales_of
+from pyharness.truth.times import check_order
 
-_LEAST_SCALE = 1e-4  # of the square of the largest one
 _TUBE_BITS = 30  # a tube is at least 2**-30 of the solution thick
 _GUARD_BITS = 16
 _LENGTH_BITS = 20
@@ -80,7 +81,7 @@ def prove(
             "a certificate is for constant moments or coefficients and a torque law about the axes "
             "of the body; allowed for other scenes: prove without --certificate"
         )
-    check_order(times)
+    check_order(times, "prove")
     record = _scene_record(scene)
     limit = _MOST_STEPS * checked_effort(effort)
     wanted = float(digits)
@@ -144,13 +145,8 @@ class _Run:
         self._bits = max(self._clock, self._fine)
         self._most = self._bits - needed  # bits of the last terms
         self._system = System(record, self._bits, self._clock, [1, 1, 1])
-        factors = [abs(Fraction(terms[0], common)) for common, terms in self._system.rows]
-        most = max(factors) or Fraction(1)
-        scales = [
-            round(math.sqrt(max(float(x / most), _LEAST_SCALE)) * (1 << SCALE_BITS))
-            for x in factors
-        ]
-        self._system = System(record, self._bits, self._clock, scales)
+        coefficients = [Fraction(terms[0], common) for common, terms in self._system.rows]
+        self._system.scales = [round(x * (1 << SCALE_BITS)) for x in scales_of(coefficients)]
 
     @property
     def _start(self) -> list[int]:

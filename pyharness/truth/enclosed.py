@@ -1,13 +1,11 @@
 """The results of an enclosure: balls that contain the solution of a scene at requested times."""
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 
 
@@ -55,19 +53,6 @@ class Enclosure:
                     row[name], row[f"{name}_radius"] = decimals(found[n])
             rows.append(row)
         return rows
-
-
-def check_order(times: Sequence[float]) -> None:
-    """Raise InputError unless times are finite, of one sign, and each farther from 0 than before.
-
-    The first time may be 0.
-    """
-    if not all(map(math.isfinite, times)):
-        raise InputError("prove: a time is not finite; allowed: finite numbers, in seconds")
-    away = [abs(t) for t in times]
-    one_side = bool(times) and (min(times) >= 0.0 or max(times) <= 0.0)
-    if not (one_side and all(t1 < t2 for t1, t2 in itertools.pairwise(away))):
-        raise InputError("prove: times do not lead away from 0 on one side; give times that do")
 
 
 def with_energy(scene: Scene, found: Enclosure) -> Enclosure:

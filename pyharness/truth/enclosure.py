@@ -14,7 +14,8 @@ from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.values import integer
 from pyharness.truth.certificate import has_certificate, prove
-from pyharness.truth.enclosed import Enclosure, check_order, with_energy
+from pyharness.truth.enclosed import Enclosure, with_energy
+from pyharness.truth.times import check_order
 
 MOST_DIGITS = 1000
 
@@ -71,7 +72,7 @@ def enclose(
     if not 1 <= integer("digits", digits) <= MOST_DIGITS:
         raise InputError(f"digits: {digits}; allowed: 1 to {MOST_DIGITS}")
     times = [float(t) for t in times]
-    check_order(times)
+    check_order(times, "prove")
     if scene.changing is not None:
         scene.changing.check(times)
     free = scene.torque.is_zero and _is_bounded(scene) and not (velocity or transition)

@@ -9,14 +9,16 @@ from flint import arb
 
 from pyharness.dynamics.system import rates_of_inertia
 from pyharness.model.attitude import IDENTITY, quaternion_rates
+from pyharness.model.dual import Dual
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import of_law
 from pyharness.model.tape import Tape, evaluate
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.truth.balls import Dual, ball, functions_at
+from pyharness.truth.balls import ball, functions_at
+from pyharness.truth.integer_series import exact_body
+from pyharness.truth.scales import scales_of
 
-_LEAST_SCALE = 1e-4
 # The right-hand side f(t, y): the derivatives of all unknowns at a time (s) and a state.
 Rates = Callable[[Any, Sequence[Any]], list[Any]]
 
@@ -27,7 +29,8 @@ class Equations:
     The unknowns are omega (rad/s); then, if the scene has one, the quaternion of its attitude; if
     `velocity` is true, the translational velocity (m/s); and if `transition` is true, the
     derivatives of omega, and of the attitude, by the three components of omega at time 0, row by
-    row. `blocks` are the slices of the four groups, without those that are absent.
+    row. `blocks` are the slices of the four groups, without those that are absent. `scales` are the
+    units of the unknowns in which errors are measured.
     """
 
     def __init__(self, scene: Scene, velocity: bool, transition: bool) -> None:
@@ -57,31 +60,15 @@ class Equations:
         scene = self._scene
         self._principal: list[Any] | None = None
         self._moments = [arb(1)] * 3
-        if scene.coefficients is not None:
-            self._principal = list(map(arb, scene.coefficients))
-        elif scene.changing is None and scene.inertia is None:
-            exact = scene.exact_moments
-            assert exact is not None
-            self._moments = list(map(ball, exact))
-            self._principal = [ball((exact[i - 2] - exact[i - 1]) / exact[i]) for i in range(3)]
+        self.scales = [1.0] * len(self.start)
+        if scene.changing is None and scene.inertia is None:
+            moments, coefficients = exact_body(scene)
+            self._moments = list(map(ball, moments))
+            self._principal = list(map(ball, coefficients))
+            self.scales[:3] = scales_of(coefficients)
         elif scene.inertia is not None:
             self._inertia = [[arb(x) for x in row] for row in scene.inertia]
         self._push = [arb(force) / arb(scene.masses[0]) for force in scene.forces]
-
-    @property
-    def scales(self) -> list[float]:
-        """The units of the unknowns in which errors are measured.
-
-        With the roots of abs(A), abs(B), abs(C) as units of omega, the logarithmic norm of Euler's
-        equations is 0 for rotations about the axes of the largest and the smallest moment, unless
-        the lower limit of the units applies.
-        """
-        found = [1.0] * len(self.start)
-        if self._principal is not None:
-            sizes = [abs(float(x.mid())) for x in self._principal]
-            largest = max(sizes) or 1.0
-            found[:3] = [max(x / largest, _LEAST_SCALE) ** 0.5 for x in sizes]
-        return found
 
     def at(self, begin: Fraction, forward: bool) -> Rates:
         """Return the right-hand side for a step from `begin` (s) on, or back if not `forward`."""

@@ -1,10 +1,10 @@
 """Proved enclosures of torque-free motion at any time, in ball arithmetic (python-flint).
 
-A ball is a midpoint with a radius, and it contains the true value, because python-flint rounds
-rigorously. Omega is expressed by Jacobi's elliptic functions (`enclosure_omega.py`), and the
-attitude by a theta function (Jacobi 1850; Whittaker, Analytical Dynamics, section 69). Each
-decision between formulas compares fractions, never balls: the binary64 numbers of a scene are
-exact. Import this module only where python-flint is installed.
+A ball is an interval, given by its middle and its radius. It contains the true value, because
+python-flint rounds outward. Omega is expressed by Jacobi's elliptic functions
+(`enclosure_omega.py`), and the attitude by a theta function (Jacobi 1850; Whittaker, Analytical
+Dynamics, section 69). Each decision between formulas compares fractions, never balls: the binary64
+numbers of a scene are exact. Import this module only where python-flint is installed.
 """
 
 import math
@@ -17,15 +17,15 @@ from pyharness.model.attitude import product
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.values import integer
+from pyharness.truth.balls import ball
 from pyharness.truth.enclosure_omega import (
     Balls,
     Orbit,
-    ball,
     carlson,
-    euler_coefficients,
     integer_near,
     omega_on_ellipse,
 )
+from pyharness.truth.integer_series import exact_body
 
 # The working precision is doubled up to this number of bits.
 _MOST_BITS = 20_000
@@ -73,7 +73,7 @@ def _check(scene: Scene, times: Sequence[float], digits: int, attitude: bool) ->
         raise InputError(f"digits is {digits}; allowed: 0 or more")
     if attitude and (scene.attitude is None or scene.moments is None):
         raise InputError("the attitude needs moments and an initial attitude; give both")
-    signs = {(a > 0) - (a < 0) for a in euler_coefficients(scene)}
+    signs = {(a > 0) - (a < 0) for a in exact_body(scene)[1]}
     if signs != {0} and not signs >= {1, -1}:
         raise InputError(
             "the coefficients allow unbounded motions; allowed: one of them above 0 and one below "
@@ -83,7 +83,7 @@ def _check(scene: Scene, times: Sequence[float], digits: int, attitude: bool) ->
 
 def _solution(scene: Scene, attitude: bool) -> Callable[[Fraction], Balls]:
     """Return the function of time (s) that encloses omega, and the attitude if it is requested."""
-    a, w = euler_coefficients(scene), [Fraction(x) for x in scene.omega]
+    a, w = exact_body(scene)[1], [Fraction(x) for x in scene.omega]
     moments = scene.exact_moments if attitude else None
     begin = _unit([Fraction(x) for x in scene.attitude or ()]) if attitude else []
     if not any(a[k] * w[k - 1] * w[k - 2] for k in range(3)):

@@ -6,19 +6,11 @@ contain. Import this module only where python-flint is installed.
 
 from fractions import Fraction
 
-from flint import acb, arb, fmpq
+from flint import acb, arb
 
-from pyharness.model.scene import Scene
+from pyharness.truth.balls import ball
 
 Balls = list[arb]
-
-
-def euler_coefficients(scene: Scene) -> list[Fraction]:
-    """Return the exact coefficients A, B, C of Euler's equations."""
-    i = scene.exact_moments
-    if i is None:
-        return [Fraction(a) for a in scene.euler_coefficients]
-    return [(i[k - 2] - i[k - 1]) / i[k] for k in range(3)]
 
 
 def omega_on_ellipse(axis: int, a: list[Fraction], w: list[Fraction], t: Fraction) -> Balls:
@@ -104,8 +96,3 @@ def integer_near(x: arb) -> int:
 def carlson(x: Fraction, y: Fraction, z: Fraction) -> arb:
     """Return Carlson's integral R_F of three nonnegative numbers; at most one of them is 0."""
     return acb.elliptic_rf(ball(x), ball(y), ball(z)).real
-
-
-def ball(x: Fraction) -> arb:
-    """Return a ball that contains a fraction."""
-    return arb(fmpq(x.numerator, x.denominator))

@@ -12,18 +12,20 @@ are computed in ball arithmetic.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from flint import acb, arb, arb_mat, arb_series, ctx
 
+from pyharness.model.dual import Dual
 from pyharness.model.effort import advice, checked_effort
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
-from pyharness.truth.balls import Dual, ball, balls
+from pyharness.truth.balls import ball, balls
 from pyharness.truth.enclosed import Balls, Enclosure, largest_radius
 from pyharness.truth.enclosure_equations import Equations, Rates
 
@@ -59,7 +61,8 @@ def enclose_steps(
     limit = _MOST_STEPS * checked_effort(effort)
     wanted = float(digits + 2)
     for _ in range(_MOST_ATTEMPTS):
-        with ctx.workprec(math.ceil((wanted + _GUARD_DIGITS) * math.log2(10.0))):
+        bits = math.ceil((wanted + _GUARD_DIGITS) * math.log2(10.0))
+        with ctx.workprec(bits), _kept_length():
             proof = _Proof(Equations(scene, velocity, transition), wanted, times[-1] >= 0.0)
             found, steps = [], 0
             for time in map(Fraction, times):
@@ -87,6 +90,16 @@ def enclose_steps(
             )
         wanted += math.log10(float(min(excess, Fraction(10) ** 300))) + 1.0
     raise InputError(f"prove: the motion amplifies errors too much for {digits} digits; use fewer")
+
+
+@contextmanager
+def _kept_length() -> Iterator[None]:
+    """Restore python-flint's global length of power series, which the steps change."""
+    length = ctx.cap
+    try:
+        yield
+    finally:
+        ctx.cap = length
 
 
 class _NoStepError(Exception):
@@ -208,7 +221,7 @@ class _Proof:
         sizes = [[abs(x) * length**k for k, x in enumerate(each)] for each in terms]
         half = [_upper(sum(each[1:], arb(0)) / 2) for each in sizes]
         middles = [each[0] + _value([arb(0), *each[1:]], ball(h)) / 2 for each in terms]
-        residuals = self._residuals(rates, terms, h, sizes)
+        residuals = self._residuals(rates, terms, h)
         tubes = [
             _upper(2 * r + self.norm([each[0] for each in terms], block) * _TUBE + _LEAST_TUBE)
             for r, block in zip(state.radii, self.blocks, strict=True)
@@ -229,9 +242,7 @@ class _Proof:
             raise _NoStepError
         return radii
 
-    def _residuals(
-        self, rates: Rates, terms: list[list[Any]], h: Fraction, sizes: list[list[Any]]
-    ) -> list[Any]:
+    def _residuals(self, rates: Rates, terms: list[list[Any]], h: Fraction) -> list[Any]:
         """Return bounds of the residual of the polynomials in each block."""
         count = 2 * self.order + 2
         length, begin = abs(ball(h)), ball(self.state.time)

@@ -22,6 +22,7 @@ from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.decimal_series import Row, divisors, taylor_series
+from pyharness.truth.times import check_order
 
 DIGITS = 40
 # Order and local tolerance (relative to the solution) of the two Taylor series that are compared.
@@ -94,10 +95,7 @@ def reference(
         if isinstance(scene.torque, TorqueLaw) and scene.torque.in_space:
             scene = replace(scene, torque=of_law(scene.torque))
     _check_torque(scene)
-    away = [abs(t) for t in times]
-    one_side = min(times) >= 0.0 or max(times) <= 0.0
-    if not (one_side and all(t1 < t2 for t1, t2 in itertools.pairwise(away))):
-        raise InputError("reference: times do not lead away from 0 on one side; give times that do")
+    check_order(times, "reference")
     with decimal.localcontext() as context:
         context.prec = DIGITS
         context.Emax, context.Emin = decimal.MAX_EMAX, decimal.MIN_EMIN

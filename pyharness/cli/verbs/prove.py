@@ -75,9 +75,9 @@ def _check(options: argparse.Namespace) -> int:
     others = ("case", "scene", "omega0", "step_size", "steps", "times", "digits", "velocity")
     shared.refuse(options, "--check", (*others, "transition", "certificate", "effort"))
     shared.check_outputs(options)
-    found = []
-    for name in shared.names(options.check):
+    found, names = [], shared.names(options.check)
+    for number, name in enumerate(names):
+        shared.progress(number, len(names), name)
         found.append((name, *check_file(name)))
-        shared.progress(len(found), len(shared.names(options.check)), name)
     shared.show(certificates_report(found), options)
     return int(any(steps is None for _, steps, _ in found))

@@ -1,0 +1,64 @@
+"""Dual numbers: values with their derivatives, by forward differentiation."""
+
+from collections.abc import Sequence
+from typing import Any
+
+
+class Dual:
+    """A value, and its derivatives with respect to some unknowns.
+
+    They are floats, symbols of a recorded function, or numbers of another arithmetic.
+    """
+
+    def __init__(self, value: Any, slopes: Sequence[Any]) -> None:
+        self.value, self.slopes = value, slopes
+
+    def chained(self, value: Any, slope: Any) -> "Dual":
+        """Return a function of this number, from its value and its derivative."""
+        return Dual(value, [slope * each for each in self.slopes])
+
+    def __add__(self, other: Any) -> "Dual":
+        """Return the sum with a number or a dual number."""
+        second = dual(other, len(self.slopes))
+        slopes = [x + y for x, y in zip(self.slopes, second.slopes, strict=True)]
+        return Dual(self.value + second.value, slopes)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> "Dual":
+        """Return the difference from a number or a dual number."""
+        return self.__add__(-1.0 * other)
+
+    def __rsub__(self, other: Any) -> "Dual":
+        """Return the difference of a number and this one."""
+        return self.__mul__(-1.0).__add__(other)
+
+    def __mul__(self, other: Any) -> "Dual":
+        """Return the product with a number or a dual number."""
+        second = dual(other, len(self.slopes))
+        slopes = [
+            x * second.value + self.value * y
+            for x, y in zip(self.slopes, second.slopes, strict=True)
+        ]
+        return Dual(self.value * second.value, slopes)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> "Dual":
+        """Return the quotient by a number or a dual number."""
+        second = dual(other, len(self.slopes))
+        quotient = self.value / second.value
+        slopes = [
+            (x + -1.0 * quotient * y) / second.value
+            for x, y in zip(self.slopes, second.slopes, strict=True)
+        ]
+        return Dual(quotient, slopes)
+
+    def __rtruediv__(self, other: Any) -> "Dual":
+        """Return the quotient of a number and this one."""
+        return dual(other, len(self.slopes)) / self
+
+
+def dual(value: Any, count: int) -> Dual:
+    """Return a number that is not a dual number as one, with `count` derivatives of 0."""
+    return value if isinstance(value, Dual) else Dual(value, [0.0] * count)

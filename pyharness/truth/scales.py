@@ -1,0 +1,20 @@
+"""The units in which proofs measure errors of omega."""
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+_LEAST = 1e-4  # of the square of the largest unit
+
+
+def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
+    """Return the units of the three components of omega, the largest of them 1.
+
+    They are the roots of abs(A), abs(B) and abs(C), the coefficients of Euler's equations, divided
+    by the largest root, and at least 0.01. The logarithmic norm of the equations is then 0 for
+    rotations about the axes of the largest and the smallest moment, unless a unit is 0.01. If all
+    coefficients are 0, all units are 0.01.
+    """
+    sizes = [abs(x) for x in coefficients]
+    largest = max(sizes) or Fraction(1)
+    return [math.sqrt(max(float(x / largest), _LEAST)) for x in sizes]

@@ -190,7 +190,7 @@ class Parallelepiped:
 def enclosure(scene: Scene, times: Sequence[float], digits: int) -> list[list[Any]]:
     """Return intervals `mpmath.iv.mpf` of the three components of omega (rad/s) at times (s).
 
-    All times have the same sign, and none is nearer to 0 than the one before. The sum of the
+    All times have the same sign, and their distance from 0 never decreases. The sum of the
     remainders of all steps then has a radius of at most 10**-digits (rad/s). The motion amplifies
     the remainders. Raise InputError unless the torque of the scene is a `TorqueLaw` about the body
     axes and its inertia is constant, and NotEnclosedError if a step cannot be verified.

@@ -2,8 +2,8 @@
 
 This module needs nothing but Python's standard library, and is also a script: the data package of
 the edition has it as `machine/judge.py`, beside the pages that our programs print. There,
-``python judge.py FILE`` compares the page in FILE with these pages. Its exit status is 0 if a page
-is equal, 1 if none is, and 2 if FILE has no page of this form.
+``python judge.py FILE`` compares the page in FILE with these pages. Its exit status is 0 if a
+page is equal, 1 if all pages differ, and 2 if FILE has no page of this form.
 """
 
 import csv
@@ -177,8 +177,8 @@ def verdict(path: str, found: Sequence[Fit]) -> list[str]:
 def main(arguments: Sequence[str], folder: Path) -> int:
     """Compare the page in a file with the pages in `folder`, print the result, and return a status.
 
-    `arguments` has the path of the file. The status is 0 if one of the pages is equal, 1 if none
-    is, and 2 if the file can't be compared.
+    `arguments` has the path of the file. The status is 0 if one of the pages is equal, 1 if all
+    of them differ, and 2 if the file can't be compared.
     """
     if len(arguments) != 1:
         print("usage: python judge.py FILE, a page as a program printed it", file=sys.stderr)

@@ -350,3 +350,13 @@ def test_errors_of_the_attitude_reach_omega() -> None:
     assert float(matrix[0][1]) >= 5.0 / proof.equations.scales[0] * (1 - 1e-9)
     assert 0.5 <= float(matrix[1][0]) / proof.equations.scales[0] < 1.0
     assert 0.0 <= float(matrix[1][1]) < 1e-9  # a rotation
+
+
+def test_the_settings_of_the_library_are_kept() -> None:
+    """A proof changes the precision and the length of series, which are global in python-flint."""
+    flint: Any = pytest.importorskip("flint")
+    before = flint.ctx.prec, flint.ctx.cap
+    enclosure_steps.enclose_steps(random_scene("plain", 1), [0.01], 10)
+    with pytest.raises(InputError):
+        enclosure_steps.enclose_steps(random_scene("plain", 1), [1.0], 10, effort=1e-6)
+    assert (flint.ctx.prec, flint.ctx.cap) == before

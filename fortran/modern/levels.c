@@ -18,13 +18,15 @@ typedef void runner(void *ensemble);
   series_solver solve_many_taylor_##level;                                                     \
   fixed_solver solve_many_fixed_##level;                                                       \
   runner run_lanes_##level;                                                                    \
+  runner solve_tape_bodies_##level;                                                            \
   solver solve_tape_##level;                                                                   \
   solver step_tape_##level;                                                                    \
   solver vary_solution_##level;
 #define TAKEN(level)                                                                           \
   {taylor_solve_##level,       quick_solve_##level,      solve_many_free_##level,              \
    solve_many_taylor_##level,  solve_many_fixed_##level, run_lanes_##level,                    \
-   solve_tape_##level,         step_tape_##level,        vary_solution_##level}
+   solve_tape_##level,         step_tape_##level,        vary_solution_##level,                \
+   solve_tape_bodies_##level}
 
 DECLARED(plain)
 #ifdef WITH_LEVELS
@@ -42,6 +44,7 @@ static struct {
   solver *tape;
   solver *step;
   solver *vary;
+  runner *bodies;
 } chosen, known[] = {
   TAKEN(plain),
 #ifdef WITH_LEVELS
@@ -114,5 +117,7 @@ void tape_variation(const void *tape, const void *request, void *variation)
 {
   chosen.vary(tape, request, variation);
 }
+
+void tape_bodies(void *bodies) { chosen.bodies(bodies); }
 
 void run_lanes(void *ensemble) { chosen.lanes(ensemble); }

@@ -7,7 +7,7 @@ module levels
   private
 
   public :: choose_level, many_fixed, many_free, many_taylor, quick_solve, run_lanes, &
-            tape_solve, tape_step, tape_variation, taylor_solve
+            tape_bodies, tape_solve, tape_step, tape_variation, taylor_solve
 
   interface
     integer(c_int) function choose_level(highest) bind(c, name="choose_level")
@@ -30,6 +30,12 @@ module levels
       type(*), intent(in) :: tape, request
       type(*), intent(inout) :: solution
     end subroutine tape_solve
+
+    subroutine tape_bodies(bodies) bind(c, name="tape_bodies")
+      !! Call solve_tape_bodies of tape_lanes.c at the chosen level.
+      implicit none(type, external)
+      type(*), intent(inout) :: bodies
+    end subroutine tape_bodies
 
     subroutine tape_step(tape, request, step) bind(c, name="tape_step")
       !! Call step_tape of tape_step.f90 at the chosen level.

@@ -10,8 +10,9 @@ module scaled_motion
   private
 
   integer, parameter, public :: MOST_WAVES = 8
-  real(dp), parameter :: FAST = 8.0_dp       ! frequency of a fast wave over rate of the motion
-  real(dp), parameter :: RESOLVED_STEPS = 0.7_dp ! for a radian of a wave that is resolved
+  real(dp), parameter, public :: FAST = 8.0_dp ! frequency of a fast wave over rate of the motion
+  ! Steps for a radian of a wave that is resolved.
+  real(dp), parameter, public :: RESOLVED_STEPS = 0.7_dp
   real(dp), parameter :: SLOW = 1e-8_dp      ! rad; a wave of a smaller angle is linear to rounding
   real(dp), parameter :: WAVE_ERROR = 1.0_dp/2880.0_dp ! error of Simpson's rule over radians**4
 
@@ -124,9 +125,14 @@ contains
     real(dp) :: largest                  ! largest scale
     real(dp) :: change                   ! rate of change of the unknowns, 1/s2
     real(dp) :: f                        ! frequency, rad/s
-    real(dp) :: size, error
+    real(dp) :: size(MOST_WAVES)         ! of the integral of each wave, 1/s
+    real(dp) :: error
+    logical :: is_weak
     integer :: n, k
 
+    do n = 1, motion%waves
+      size(n) = size_of(motion, n)
+    end do
     largest = maxval(abs(motion%scale))
     change = 2.0_dp*rate*rate + maxval(abs(motion%slope)) + abs(t_end)*maxval(abs(motion%climb))
     motion%resolved = 0
@@ -135,21 +141,28 @@ contains
     left_out = 0.0_dp
     do n = 1, motion%waves
       f = abs(motion%frequency(n))
-      size = size_of(motion, n)
-      error = left_out + 2.0_dp*(size/f)*(change/f + size + 2.0_dp*rate*abs(t_end)*size)
-      do k = 1, motion%waves
-        ! Two waves together contain their difference frequency, which may be slow.
-        if (k /= n) error = error + 4.0_dp*size*size_of(motion, k) &
-                            *min(abs(t_end), 1.0_dp/abs(f - abs(motion%frequency(k))))
-      end do
-      if (f > FAST*rate .and. error*largest <= faint) then
+      is_weak = f > FAST*rate
+      if (is_weak) then
+        error = left_out + 2.0_dp*(size(n)/f)*(change/f + size(n) &
+                                               + 2.0_dp*rate*abs(t_end)*size(n))
+        do k = 1, motion%waves
+          ! Two waves together contain their difference frequency, which may be slow.
+          if (k /= n) error = error + 4.0_dp*size(n)*size(k) &
+                              *min(abs(t_end), 1.0_dp/abs(f - abs(motion%frequency(k))))
+        end do
+        is_weak = error*largest <= faint
+      end if
+      if (is_weak) then
         motion%mean = motion%mean + motion%on_versine(:, n)
         motion%push = motion%push + 0.5_dp*(slopes(motion%on_sine(:, n), motion%sign_2) &
                                             + slopes(motion%on_versine(:, n), motion%sign_2))
         left_out = error
       else
         motion%resolved = motion%resolved + 1
-        call swap(motion, n, motion%resolved)
+        if (n /= motion%resolved) then
+          call swap(motion, n, motion%resolved)
+          size([n, motion%resolved]) = size([motion%resolved, n])
+        end if
       end if
     end do
   end subroutine average
@@ -159,7 +172,6 @@ contains
     type(motion_t), intent(inout) :: motion
     integer, intent(in) :: n, k
 
-    if (n == k) return
     motion%frequency([n, k]) = motion%frequency([k, n])
     motion%on_sine(:, [n, k]) = motion%on_sine(:, [k, n])
     motion%on_versine(:, [n, k]) = motion%on_versine(:, [k, n])

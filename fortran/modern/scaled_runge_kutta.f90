@@ -7,8 +7,8 @@ module scaled_runge_kutta
   use kinds, only: dp
   use problem, only: problem_t, request_t, solution_t
   use scaled_march, only: GAIN, march_constant, march_varying, marched_t
-  use scaled_motion, only: amplification, average, integral, MOST_WAVES, motion_t, reach_of, &
-                           scaled, steps_for_waves
+  use scaled_motion, only: amplification, average, FAST, integral, MOST_WAVES, motion_t, &
+                           reach_of, RESOLVED_STEPS, scaled, steps_for_waves
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED, SENSITIVE
   use torque_noise, only: torque_noise_of
   implicit none(type, external)
@@ -33,8 +33,11 @@ module scaled_runge_kutta
   real(dp), parameter :: SERIES_STEPS = 1.9_dp
   real(dp), parameter :: SERIES_STEPS_A_BIT = 0.25_dp
   real(dp), parameter :: WAVE_RADIAN = 0.4_dp ! cost of a wave's radian to the series, in radians
-  real(dp), parameter :: VARYING = 1.5_dp    ! cost of a step under varying torque
-  real(dp), parameter :: A_WAVE = 0.9_dp     ! cost of each wave in such a step
+  real(dp), parameter :: SERIES_START = 10.0_dp ! cost of the series before its first radian
+  real(dp), parameter :: VARYING = 1.7_dp    ! cost of a step under varying torque
+  real(dp), parameter :: A_WAVE = 0.6_dp     ! cost of each wave in such a step
+  real(dp), parameter :: WAVE_START = 12.0_dp ! cost of each wave before the first step
+  real(dp), parameter :: WORTH = 0.9_dp      ! largest cost to choose this method, over the series'
   real(dp), parameter :: WEAK = 0.5_dp       ! error of averaging over the target
 
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
@@ -115,6 +118,10 @@ contains
     solution%error = 0.0_dp
     solution%rows(:, 1) = omega
     if (problem%n_sines + problem%n_cosines > MOST_WAVES) return
+    bits = 1023.0_dp - real(ishft(transfer(aim, 0_int64), -52), dp)
+    if (is_contest) then
+      if (is_slower(problem, omega, abs(t_end), aim, bits)) return
+    end if
     call scaled(problem, t_end, motion, solution%status)
     if (solution%status /= COMPLETE) return
     start = omega(motion%axes)/motion%scale
@@ -140,16 +147,16 @@ contains
       n_steps = max(n_steps, steps_for_waves(motion, t_end, aim))
     end if
     if (is_contest) then
-      radians = 0.5_dp*(turn_0 + turn)
-      do n = 1, motion%waves
-        radians = radians + WAVE_RADIAN*abs(motion%frequency(n)*t_end)
-      end do
-      cost = n_steps
-      if (varies) cost = n_steps*(VARYING + A_WAVE*motion%resolved)
-      bits = 1023.0_dp - real(ishft(transfer(aim, 0_int64), -52), dp)
-      if (cost > 10.0_dp + radians*(SERIES_STEPS + SERIES_STEPS_A_BIT*bits)) then
-        solution%status = REFUSED
-        return
+      if (motion%waves > 0) then
+        radians = 0.5_dp*(turn_0 + turn)
+        do n = 1, motion%waves
+          radians = radians + WAVE_RADIAN*abs(motion%frequency(n)*t_end)
+        end do
+        cost = n_steps*(VARYING + A_WAVE*motion%resolved) + WAVE_START*motion%waves
+        if (cost > WORTH*cost_of_series(radians, bits)) then
+          solution%status = REFUSED
+          return
+        end if
       end if
       if (KEPT*abs(start(2)*t_end) > LOG_2*(BITS_KEPT - bits)) then
         solution%status = REFUSED
@@ -216,5 +223,76 @@ contains
     solution%status = merge(COMPLETE, SENSITIVE, noise + blurred*bound <= CERTAIN*request%tolerance)
     if (solution%status == COMPLETE) solution%error = solution%error + noise
   end subroutine solve
+
+  pure real(dp) function cost_of_series(radians, bits)
+    !! Return the forecast cost of the series in steps of this method under constant torque.
+    real(dp), intent(in) :: radians    !! of the motion and of the waves
+    real(dp), intent(in) :: bits       !! bits of the target error
+
+    cost_of_series = SERIES_START + radians*(SERIES_STEPS + SERIES_STEPS_A_BIT*bits)
+  end function cost_of_series
+
+  pure logical function is_slower(problem, omega, time, aim, bits)
+    !! Return whether this method loses the contest. If the torque has waves, the radians that they
+    !! add to the motion are left out, so that the method may lose although the result is false.
+    !! Sines of one frequency, and very slow waves, cost more here than in `solve`. No scaled
+    !! unknowns are needed, because making them would take longer than the contest.
+    type(problem_t), intent(in) :: problem
+    real(dp), intent(in) :: omega(3)   !! rad/s
+    real(dp), intent(in) :: time       !! s, from 0
+    real(dp), intent(in) :: aim        !! target error, relative
+    real(dp), intent(in) :: bits       !! bits of the target error
+    real(dp) :: c(3), root(3)
+    real(dp) :: rate         ! largest rate of the torque in the unknowns, 1/s3
+    real(dp) :: turn_0, turn ! as in solve, rad
+    real(dp) :: both         ! squares of these two, summed
+    real(dp) :: frequencies(MOST_WAVES) ! of the sines, and of the cosines that differ, rad/s
+    real(dp) :: radians      ! of the motion and of the waves
+    real(dp) :: resolved     ! number of the waves that are too slow to be averaged
+    real(dp) :: steps        ! number of steps that resolve them
+    real(dp) :: cost         ! allowed cost, then the number of steps that it allows
+    real(dp) :: f            ! angle of a wave, rad
+    integer :: n, waves
+
+    c = abs(problem%coefficients)
+    root = sqrt([c(2)*c(3), c(1)*c(3), c(1)*c(2)])
+    rate = max(root(1)*abs(problem%rate(1)), root(2)*abs(problem%rate(2)), &
+               root(3)*abs(problem%rate(3)))
+    turn_0 = time*max(root(1)*abs(omega(1)), root(2)*abs(omega(2)), root(3)*abs(omega(3)))
+    turn = turn_0 + time*time*(max(root(1)*abs(problem%constant(1)), &
+                                   root(2)*abs(problem%constant(2)), &
+                                   root(3)*abs(problem%constant(3))) + 0.5_dp*time*rate)
+    waves = problem%n_sines
+    do n = 1, waves
+      frequencies(n) = problem%sines(4, n)
+    end do
+    do n = 1, problem%n_cosines
+      if (any(abs(frequencies(:waves) - problem%cosines(4, n)) <= 0.0_dp)) cycle
+      waves = waves + 1
+      frequencies(waves) = problem%cosines(4, n)
+    end do
+    radians = 0.5_dp*(turn_0 + turn)
+    resolved = 0.0_dp
+    steps = 0.0_dp
+    do n = 1, waves
+      f = abs(frequencies(n))*time
+      radians = radians + WAVE_RADIAN*f
+      if (f > FAST*turn) cycle
+      resolved = resolved + 1.0_dp
+      steps = max(steps, RESOLVED_STEPS*f)
+    end do
+    cost = WORTH*cost_of_series(radians, bits)
+    if (waves > 0 .or. rate > 0.0_dp) then
+      cost = (cost - WAVE_START*waves)/(VARYING + A_WAVE*resolved)
+    end if
+    is_slower = steps > cost
+    if (is_slower) return
+    cost = max(0.0_dp, cost - LEAST_STEPS)
+    ! The fourth powers of the planned steps and of the allowed cost; see FIRST_GUESS. The mean of
+    ! x**5 from turn_0 to turn is (turn**6 - turn_0**6)/(6 (turn - turn_0)).
+    both = turn_0*turn_0 + turn*turn
+    is_slower = FIRST_GUESS*(turn_0 + turn)*(both - turn_0*turn)*(both + turn_0*turn) &
+                > 6.0_dp*min(aim, COARSEST)*(cost*cost)**2
+  end function is_slower
 
 end module scaled_runge_kutta

@@ -5,8 +5,9 @@ module taylor
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use problem, only: problem_t, request_t, solution_t
+  use series, only: LONG
   use statuses, only: COMPLETE, GAVE_UP, SENSITIVE
-  use taylor_march, only: attempt_t, march
+  use taylor_march, only: attempt_t, coupling_of, march
   use taylor_rows, only: outcome_t, room_t
   use torque_noise, only: torque_noise_of, wave_rounding_of
   use torque_terms, only: wave_t, waves_of
@@ -28,6 +29,9 @@ module taylor
   real(dp), parameter :: SAFETY = 10.0_dp
   real(dp), parameter :: CHOOSING = 1e15_dp ! amplification that makes rounding errors large
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
+  ! Steps whose rounding errors may amount to one more at the worst time; measured. In some scenes
+  ! they do not cancel as in a random walk.
+  real(dp), parameter :: WALK = 5e3_dp
   real(dp), parameter :: UNSURE = 0.3_dp ! rounding times amplification, in tolerances
   integer, parameter :: FEW_WAVES = 16    ! waves that need no allocated array
   integer(c_intptr_t), parameter :: ALIGNED = 64 ! bytes: no column crosses a cache line
@@ -80,6 +84,7 @@ contains
     type(attempt_t) :: attempt ! this integration
     real(dp) :: planned ! amplification that it allows for
     real(dp) :: t_end   ! last of the times, s
+    real(dp) :: farthest ! rotation of perturbations without torque, rad
     real(dp) :: cost    ! cost of a step, in steps without waves
     real(dp) :: most    ! steps allowed for all integrations
     real(dp) :: spent   ! steps of all integrations so far
@@ -94,7 +99,9 @@ contains
     most = min(FARTHEST_COUNT, request%effort*(MOST_STEPS/cost))
     spent = 0.0_dp
     attempt%tolerance = request%tolerance
-    attempt%precise = .false.
+    ! Where a precise integration is likely to exceed the work limit, another one is tried first.
+    farthest = coupling_of(problem%coefficients)*maxval(abs(request%omega))*abs(t_end)
+    attempt%precise = farthest > LONG .and. farthest < 0.25_dp*most
     attempt%stride = 1 + int(STEPS_BETWEEN_LOOKS/cost, int64)
     solution%needed = 0.0_dp
     call waves_of(problem, waves)
@@ -107,7 +114,7 @@ contains
       if (outcome%largest > CHOOSING) growth = outcome%largest
       if (solution%status /= COMPLETE) exit
       if (outcome%finest .and. (attempt%precise .or. growth <= planned)) exit
-      again = growth > planned
+      again = growth > planned .or. (.not. attempt%precise .and. outcome%precise_steps > LONG)
       attempt%precise = attempt%precise .or. again
       ! Where perturbations grow, a few steps cause most of the error; their estimates may be wrong
       ! by chance.
@@ -131,7 +138,7 @@ contains
     solution%steps = outcome%steps
     ! The factor for the attitude is known, and requires no precise integration.
     growth = growth*outcome%way
-    blurred = ROUNDING*growth
+    blurred = ROUNDING*growth*(1.0_dp + real(solution%steps, dp)/WALK)
     if (problem%n_sines + problem%n_cosines > 0) then
       blurred = blurred + blurred*torque_noise_of(problem, t_end, real(solution%steps, dp), &
                                                   outcome%scale)

@@ -54,7 +54,7 @@ contains
                                + parts(i, 3, j)*s%terms(3, k - 1 - j))
         end do
       end do
-      s%turns(:, k) = sums*(1.0_dp/real(k, dp))
+      s%turns(:, k) = sums/real(k, dp)
     end do
     do k = order, 1, -1
       s%turn = s%turn + s%turns(:, k)

@@ -9,7 +9,7 @@ module taylor_error
 
   integer, parameter :: STEPS_IN_BLOCK = 8
   integer, parameter :: STEPS_IN_FINE_BLOCK = 2
-  integer, parameter :: MOST_BLOCKS = 512 ! even
+  integer, parameter :: MOST_BLOCKS = 256 ! even
   real(dp), parameter :: RIDGE = 1.001_dp   ! makes the fit work for one pole or none
   real(dp), parameter :: LEAST = tiny(1.0_dp)
   real(dp), parameter :: FIRST(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp] ! selects the first lane
@@ -23,10 +23,15 @@ module taylor_error
   ! full.
   type, public :: blocks_t
     real(dp) :: derivatives(3, 3, MOST_BLOCKS) !! of omega at a block's end by omega at its start
+    !! The derivative at a block's end by omega at a start within it: of all blocks merged into it,
+    !! the start whose derivative has the largest norm. Near the separatrix, a motion amplifies much
+    !! only from few starts.
+    real(dp) :: largest(3, 3, MOST_BLOCKS)
     logical :: has_row(MOST_BLOCKS) !! whether it has a row of the output before the last
     integer :: steps        !! steps in the open block
     integer :: closed
     integer :: steps_a_block
+    logical :: is_merged    !! whether blocks were merged
   end type blocks_t
 
   public :: begin, count_step, estimate_truncation, estimate_truncation_from_rest, growths_of, &
@@ -45,6 +50,7 @@ contains
     blocks%steps = 0
     blocks%closed = 0
     blocks%has_row(1) = .false.
+    blocks%is_merged = .false.
     blocks%steps_a_block = merge(STEPS_IN_FINE_BLOCK, STEPS_IN_BLOCK, precise)
   end subroutine begin
 
@@ -164,6 +170,7 @@ contains
     logical, intent(in) :: with_row !! whether the step has a row of the output before the last
     real(dp), intent(inout) :: lanes(4, 3)
     type(blocks_t), intent(inout) :: blocks
+    real(dp) :: largest(3, 3)
     integer :: n
 
     blocks%steps = blocks%steps + 1
@@ -177,18 +184,24 @@ contains
     else
       lanes(2:, :) = UNIT
     end if
+    blocks%largest(:, :, blocks%closed) = blocks%derivatives(:, :, blocks%closed)
     if (blocks%closed < MOST_BLOCKS) then
       blocks%has_row(blocks%closed + 1) = .false.
       return
     end if
     do n = 1, MOST_BLOCKS/2
-      blocks%derivatives(:, :, n) = bounded(composed(blocks%derivatives(:, :, 2*n), &
-                                                     blocks%derivatives(:, :, 2*n - 1)))
+      associate (second => blocks%derivatives(:, :, 2*n))
+        largest = bounded(composed(second, blocks%largest(:, :, 2*n - 1)))
+        if (norm(largest) < norm(blocks%largest(:, :, 2*n))) largest = blocks%largest(:, :, 2*n)
+        blocks%largest(:, :, n) = largest
+        blocks%derivatives(:, :, n) = bounded(composed(second, blocks%derivatives(:, :, 2*n - 1)))
+      end associate
       blocks%has_row(n) = blocks%has_row(2*n - 1) .or. blocks%has_row(2*n)
     end do
     blocks%closed = MOST_BLOCKS/2
     blocks%has_row(blocks%closed + 1) = .false.
     blocks%steps_a_block = 2*blocks%steps_a_block
+    blocks%is_merged = .true.
   end subroutine count_step
 
   pure subroutine turn_axes(derivative, lanes)
@@ -246,6 +259,9 @@ contains
     growth_until = norm(derivative)
     do n = last, 1, -1
       if (growth_until >= LARGEST) exit
+      if (blocks%is_merged) then
+        growth_until = max(growth_until, norm(composed(derivative, blocks%largest(:, :, n))))
+      end if
       derivative = composed(derivative, blocks%derivatives(:, :, n))
       growth_until = max(growth_until, norm(derivative))
     end do

@@ -5,15 +5,15 @@ module taylor_march
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use problem, only: problem_t, request_t, solution_t
-  use series, only: LEAST_LOCAL_TOLERANCE, SLACK
+  use series, only: LEAST_LOCAL_TOLERANCE, LONG, SLACK
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use taylor_attitude, only: begin_attitude, expand_both, turn_error, turn_on
   use taylor_error, only: begin, count_step, estimate_truncation, &
                           estimate_truncation_from_rest, growths_of, likely_remainder
   use taylor_plan, only: plan
   use taylor_rows, only: add_last_row, add_rows, outcome_t, room_t, state_t
-  use taylor_series, only: expand, fitting, predict_step, propagate_precisely, &
-                           propagate_variations, rescale, size_of
+  use taylor_series, only: expand, fitting, ORDER_LONG, ORDER_PRECISE, predict_step, &
+                           propagate_precisely, propagate_variations, rescale, size_of
   use torque_terms, only: longest_turn, steps_by_turns, torque_terms_at, turn_waves, wave_t
   use two_words, only: two_sum
   implicit none(type, external)
@@ -29,6 +29,11 @@ module taylor_march
   ! Radians about the body in a step. Perturbations rotate even where omega is steady.
   real(dp), parameter :: A_STEP = 60.0_dp
   real(dp), parameter :: A_PRECISE_STEP = 1.0_dp
+  ! Steps of a few lengths that recur would round the same factors with the same errors, and these
+  ! errors would add up over many steps. Each step of a precise integration, such as any long one,
+  ! is therefore shorter by a fraction of SPREAD that varies.
+  real(dp), parameter :: SPREAD = 2.0_dp**(-12)
+  real(dp), parameter :: GOLDEN = 0.6180339887498949_dp ! its multiples are spread evenly, modulo 1
   real(dp), parameter :: LARGEST = 2.0_dp**511 ! largest omega whose products are in range, rad/s
   ! Part of the largest error so far: a smaller estimate may be small by chance.
   real(dp), parameter :: BY_CHANCE = 0.1_dp
@@ -43,7 +48,7 @@ module taylor_march
     integer(int64) :: stride   ! steps between polls for an interrupt
   end type attempt_t
 
-  public :: march
+  public :: coupling_of, march
 
 contains
 
@@ -77,6 +82,7 @@ contains
     integer :: order
     integer :: lasting        ! steps for which waves are advanced, not recomputed
     integer :: n_before       ! rows before this step
+    real(dp) :: varied        ! multiple of GOLDEN modulo 1
     integer :: i, tries
     integer(int64) :: next_look  ! step of the next poll
     integer(int64) :: half_way   ! half of the steps allowed
@@ -117,10 +123,16 @@ contains
       half_way = max(1_int64, int(0.5_dp*attempt%most_steps, int64))
       t_half = 0.0_dp
       decay = 0
+      varied = 0.0_dp
       tries = 0
       do
         now%scale = max(now%scale, abs(now%w(1)), abs(now%w(2)), abs(now%w(3)))
         call shorten_to(farthest, coupling*now%scale, h)
+        if (attempt%precise) then
+          varied = varied + GOLDEN
+          if (varied >= 1.0_dp) varied = varied - 1.0_dp
+          h = h - (SPREAD*varied)*h
+        end if
         call fit_to_end(h, rest, at_end)
         allowed = local_tolerance*now%scale
         ! Four at once: numbers stored one by one could not be loaded together without a wait.
@@ -179,7 +191,8 @@ contains
         end if
         error = s%lanes(1, :)
         if (attempt%precise) then
-          call propagate_precisely(s)
+          call propagate_precisely(merge(ORDER_LONG, ORDER_PRECISE, &
+                                         coupling*now%scale*abs(t_end) > LONG), s)
         else
           call propagate_variations(s)
         end if

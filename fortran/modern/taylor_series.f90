@@ -29,7 +29,8 @@ module taylor_series
   integer, parameter :: ORDER_CARRIED = 7 ! order of the exponential
   real(dp), parameter :: EXPONENT = 3.0_dp ! largest norm of an exponent that is taken at once
   real(dp), parameter :: MOST_PARTS = 1e3_dp
-  integer, parameter :: ORDER_PRECISE = 10
+  ! Orders of precise variations. In a long motion, whose steps must not lose its phase, the higher.
+  integer, parameter, public :: ORDER_PRECISE = 10, ORDER_LONG = 14
   integer, parameter :: MOST_MOMENTS = 8 ! terms that count in means and moments
   integer :: k_
   ! Weights of term k: its integral over the step, and its integral times the time from the middle.
@@ -106,15 +107,16 @@ contains
   end subroutine propagate_variations
 
   ! unroll: propagate_precisely
-  pure subroutine propagate_precisely(s)
+  pure subroutine propagate_precisely(order, s)
     !! Propagate perturbations to higher order, by the linear part of the recurrence of the terms.
+    integer, intent(in) :: order       !! ORDER_PRECISE or ORDER_LONG
     type(series_t), intent(inout) :: s
-    real(dp) :: d(4, 3, 0:ORDER_PRECISE)
+    real(dp) :: d(4, 3, 0:ORDER_LONG)
     real(dp) :: x(4), y(4), z(4)
     integer :: i, j, k
 
     d(:, :, 0) = s%lanes
-    do k = 1, ORDER_PRECISE
+    do k = 1, order
       x = 0.0_dp
       y = 0.0_dp
       z = 0.0_dp
@@ -129,7 +131,7 @@ contains
       d(:, 2, k) = (s%factors(2)/k)*y
       d(:, 3, k) = (s%factors(3)/k)*z
     end do
-    do k = 1, ORDER_PRECISE
+    do k = 1, order
       s%lanes = s%lanes + d(:, :, k)
     end do
   end subroutine propagate_precisely

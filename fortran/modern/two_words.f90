@@ -74,8 +74,8 @@ contains
   end subroutine two_sum
 
   pure subroutine two_product(x, y, product, rest)
-    !! Compute product and rest with x y = product + rest to 2**-106 of it (Dekker, with truncated
-    !! halves).
+    !! Compute product and rest with x y = product + rest to 2**-104 of it (Dekker, with truncated
+    !! halves, of which the lower ones have 27 bits).
     real(dp), intent(in) :: x, y
     real(dp), intent(out) :: product, rest
     real(dp) :: xh, xl, yh, yl, p

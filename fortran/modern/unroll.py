@@ -10,9 +10,10 @@ generates the permutations of their lanes that it needs. Other processors get Fo
 import re
 import sys
 from collections.abc import Iterator
+from fractions import Fraction
 from pathlib import Path
 
-from unroll_many import many_steps, paired
+from unroll_many import attitude_sums, many_steps, paired
 
 MODULES = (
     "two_words",
@@ -37,9 +38,12 @@ MODULES = (
     "tape_variation",
     "many_circular",
     "many_columns",
+    "many_orbits",
+    "many_turns",
     "many_free",
     "many_fixed",
     "many_slots",
+    "many_attitudes",
     "many_taylor",
     "lanes",
     "lanes_two_term",
@@ -50,7 +54,7 @@ MODULES = (
 LEAST_ORDER, MOST_ORDER = 12, 24
 ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)
 ORDER_CARRIED = 7
-ORDER_PRECISE = 10
+ORDERS_PRECISE = (10, 14)
 # The two factors of the products in equations 13-15, and the arrays in which the plain code stores
 # each unknown.
 FACTORS = (("y", "z"), ("x", "z"), ("x", "y"))
@@ -59,6 +63,10 @@ PLACES = {
     "y": ("left(1", "right(3"),
     "z": ("right(1", "right(2"),
 }
+# A factor over k is a product with 1/k, which is rounded. The rounding error has the same sign in
+# each step, so that the energy would drift in proportion to time. In these terms 1/k is therefore
+# corrected by its rounding error. Higher terms cause no drift that could be measured.
+CORRECTIONS = {k: float(Fraction(1, k) - Fraction(1.0 / k)) for k in (3, 5, 6)}
 WIDE, LAG = 10, 2  # order from which sums are over all axes at once; newest terms not in them
 # Offsets of the members of series_t, in numbers.
 TORQUE = 4 * (MOST_ORDER + 1)
@@ -91,8 +99,9 @@ def recurrence(order: int) -> Iterator[str]:
     """Yield the statements for the terms up to `order`, each for three unknowns at once.
 
     Term k is t; a and b are t rotated by one and by two axes. m is the torque's part of it, f the
-    step times A, B, C, and i one over k. Products of older terms are summed first and products of
-    the newest term last, so that there is one rotation and two sums from one term to the next.
+    step times A, B, C, i one over k, and e the rounding error of i. Products of older terms are
+    summed first and products of the newest term last, so that there is one rotation and two sums
+    from one term to the next.
     """
     yield from ("g = f*a0", "h = f*b0", "t1 = g*b0 + m1")
     for k in range(2, order + 1):
@@ -105,10 +114,15 @@ def recurrence(order: int) -> Iterator[str]:
             yield f"{place} = a{j}*b{i}" + (f" + {place}" if m >= len(sums) else "")
         if len(sums) > 1:
             yield f"q{k} = q{k} + r{k}"
-        yield f"v{k} = g*i{k}"
-        yield f"w{k} = h*i{k}"
+        if k in CORRECTIONS:
+            yield f"u{k} = f*e{k}"
+            yield f"u{k} = f*i{k} + u{k}"
+            yield from (f"v{k} = u{k}*a0", f"w{k} = u{k}*b0")
+        else:
+            yield from (f"v{k} = g*i{k}", f"w{k} = h*i{k}")
         if pairs:
-            yield f"u{k} = f*i{k}"
+            if k not in CORRECTIONS:
+                yield f"u{k} = f*i{k}"
             yield f"s{k} = q{k}*u{k} + m{k}"
             yield f"s{k} = v{k}*b{n} + s{k}"
         else:
@@ -130,6 +144,7 @@ def fortran_source(text: str, level: str, file: str) -> str:
         "multiply": fortran_multiply(),
         "propagate_precisely": fortran_precise(),
         "many_step": many_steps(),
+        "many_attitude": attitude_sums(),
     }
     if level == "plain":
         written["expand"] = fortran_terms()
@@ -239,8 +254,9 @@ def term(k: int, total: str) -> Iterator[str]:
             yield f"{place} = {start}{u}{low}*{v}{high}"
             start = f"{place} + "
     for axis, name in enumerate("xyz", 1):
-        factor = f"(s%factors({axis})*(1.0_dp/{k}.0_dp))"
-        yield f"{name}{k} = {factor}*{total}{axis} + s%torque({axis}, {k})"
+        # Without a fused multiply-add, a correction would be lost.
+        share = f"/{k}.0_dp" if k in CORRECTIONS else f"*(1.0_dp/{k}.0_dp)"
+        yield f"{name}{k} = (s%factors({axis}){share})*{total}{axis} + s%torque({axis}, {k})"
         yield f"s%terms({axis}, {k}) = {name}{k}"
         if LAG <= k <= MOST_ORDER - LAG:
             yield from (f"{place}, {k}) = {name}{k}" for place in PLACES[name])
@@ -278,15 +294,26 @@ def fortran_multiply() -> Iterator[str]:
 
 
 def fortran_precise() -> Iterator[str]:
-    """Yield the linear part of the recurrence for vectors side by side."""
-    names = [f"{name}{k}" for k in range(ORDER_PRECISE + 1) for name in "xyz"]
-    yield "pure subroutine propagate_precisely(s)"
+    """Yield the linear part of the recurrence for vectors side by side, with a loop an order."""
+    names = [f"{name}{k}" for k in range(ORDERS_PRECISE[-1] + 1) for name in "xyz"]
+    yield "pure subroutine propagate_precisely(order, s)"
+    yield "  integer, intent(in) :: order"
     yield "  type(series_t), intent(inout) :: s"
     yield from (f"  real(dp) :: {name}" for name in names)
     yield "  integer :: i"
+    yield "  select case (order)"
+    for order in ORDERS_PRECISE:
+        yield f"  case ({order})"
+        yield from (f"  {line}" for line in precise_loop(order))
+    yield "  end select"
+    yield "end subroutine propagate_precisely"
+
+
+def precise_loop(order: int) -> Iterator[str]:
+    """Yield the loop over the vectors for the terms up to `order`."""
     yield "  do i = 1, 4"
     yield from (f"    {name}0 = s%lanes(i, {axis})" for axis, name in enumerate("xyz", 1))
-    for k in range(1, ORDER_PRECISE + 1):
+    for k in range(1, order + 1):
         for axis, (name, (u, v)) in enumerate(zip("xyz", FACTORS, strict=True), 1):
             start = ""
             for j in range(k - 1, -1, -1):
@@ -297,10 +324,9 @@ def fortran_precise() -> Iterator[str]:
             yield f"    {name}{k} = (s%factors({axis})*(1.0_dp/{k}.0_dp))*{name}{k}"
     for axis, name in enumerate("xyz", 1):
         yield f"    s%lanes(i, {axis}) = {name}0"
-        for k in range(1, ORDER_PRECISE + 1):
+        for k in range(1, order + 1):
             yield f"    s%lanes(i, {axis}) = s%lanes(i, {axis}) + {name}{k}"
     yield "  end do"
-    yield "end subroutine propagate_precisely"
 
 
 # ---- C ------------------------------------------------------------------------------------------
@@ -430,24 +456,33 @@ def attitude_term(k: int, wide: bool) -> Iterator[str]:
                 yield f"__m256d e{axis}_{k} = _mm256_mul_pd({given});"
     if not wide and rest:
         yield f"__m256d e{k} = _mm256_add_pd(e1_{k}, _mm256_add_pd(e2_{k}, e3_{k}));"
-    part = f"_mm256_set1_pd(1.0 / {k})"
     for axis in (1, 2, 3):
-        yield f"const __m256d n{axis}_{k} = _mm256_mul_pd(o{axis}_0, {part});"
+        yield f"const __m256d n{axis}_{k} = {c_over(f'o{axis}_0', k)};"
     newest = f"_mm256_mul_pd(p3_{k - 1}, n3_{k})"
     yield f"const __m256d y{k} = _mm256_fmadd_pd(p2_{k - 1}, n2_{k}, {newest});"
     first = f"p1_{k - 1}, n1_{k}"
     if k > 1:
-        yield f"const __m256d z{k} = _mm256_fmadd_pd({first}, _mm256_mul_pd(e{k}, {part}));"
+        yield f"const __m256d z{k} = _mm256_fmadd_pd({first}, {c_over(f'e{k}', k)});"
     else:
         yield f"const __m256d z{k} = _mm256_mul_pd({first});"
     yield f"const __m256d k{k} = _mm256_add_pd(y{k}, z{k});"
     yield f"_mm256_store_pd(s + {TURNS + 4 * k}, k{k});"
 
 
+def c_over(value: str, k: int) -> str:
+    """Return the C expression of a register over k."""
+    whole = f"{value}, _mm256_set1_pd(1.0 / {k})"
+    if k in CORRECTIONS:
+        rest = f"_mm256_mul_pd({value}, _mm256_set1_pd({CORRECTIONS[k]}))"
+        return f"_mm256_fmadd_pd({whole}, {rest})"
+    return f"_mm256_mul_pd({whole})"
+
+
 def c(line: str, known: set[str]) -> str:
     """Return a C statement for a register, which the statement declares if it is new."""
     target, value = line.split(" = ")
     value = re.sub(r"\bi(\d+)", r"_mm256_set1_pd(1.0 / \1)", value)
+    value = re.sub(r"\be(\d+)", lambda k: f"_mm256_set1_pd({CORRECTIONS[int(k[1])]})", value)
     value = re.sub(r"\bm(\d+)", lambda found: load(TORQUE + 4 * int(found[1]) - 4), value)
     first, _, second = value.partition(" + ")
     if "*" not in first:

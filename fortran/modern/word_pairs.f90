@@ -1,6 +1,6 @@
 module word_pairs
-  !! The operators of double-double arithmetic, accurate to some 1e-31: a second number holds the
-  !! rounding error of the first.
+  !! The operators of double-double arithmetic: a second number holds the rounding error of the
+  !! first. Errors are at most 2.4e-31 of the result, or of |x| + |y| in sums of opposite signs.
   use kinds, only: dp
   use two_words, only: scaled, square_root, two_product, two_sum
   implicit none(type, external)
@@ -34,7 +34,7 @@ module word_pairs
 contains
 
   pure type(pair_t) function product_of(x, y) result(found)
-    !! Compute x y with an error of at most 2**-106 of it.
+    !! Compute x y with an error of at most 2**-104 of it.
     real(dp), intent(in) :: x, y
 
     call two_product(x, y, found%high, found%low)
@@ -61,8 +61,8 @@ contains
   end function longer_product
 
   pure subroutine exact_product(x, y, product, rest)
-    !! Compute product and rest with x y = product + rest where 2**-106 of it counts (Dekker, with
-    !! halves rounded to nearest).
+    !! Compute product and rest with x y = product + rest, exactly if nothing underflows (Dekker,
+    !! with halves rounded to nearest).
     real(dp), intent(in) :: x, y
     real(dp), intent(out) :: product, rest
     real(dp) :: xh, xl, yh, yl, part

@@ -1,9 +1,9 @@
 module wide_functions
   !! Square root, sine and cosine in binary128, computed with + - * / alone, because the compiler's
   !! own functions need its library at run time. The root is correctly rounded. Sine and cosine are
-  !! computed with twice the bits and then rounded, so that they are the nearest number wherever the
-  !! next 80 bits decide the rounding. The Python twin computes them with mpmath, by the same
-  !! definition.
+  !! computed with twice the bits and then rounded, so that they are the nearest number if the next
+  !! 53 bits decide the rounding (80 bits below 2**33 rad). The Python twin computes them with
+  !! mpmath, by the same definition.
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: binary64, wp => binary128
   use waves, only: ANGLE_BITS

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pyharness.methods.linearised import growth, jacobians, propagators
+from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
@@ -25,6 +26,12 @@ ATTITUDE = 40.0 * ROUNDING
 # Up to this error amplification, the error of a method must be at most its tolerance. Beyond it,
 # the tolerance is multiplied by the error amplification.
 LIVELY = 1e3
+FLOW = Basis(
+    "derived",
+    "error of omega or attitude: tolerance and rounding errors, with the error amplification",
+    "first-order perturbations of the linearised equations (`theory/conditioning.py`)",
+)
+"""Basis of the limits of `Conditioning`."""
 _NODES_PER_RADIAN = 12.0
 _FEWEST_NODES = 50
 _MOST_NODES = 400_000

@@ -63,7 +63,8 @@ end subroutine run_programs
 subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, body, n_constant, &
                           constant, n_rate, rate, n_sines, n_sine_sets, sines, n_cosines, &
                           n_cosine_sets, cosines, n, omega0, n_times, times, n_attitudes, &
-                          attitude0, given_up, omega, n_results, attitude, status, raised)
+                          attitude0, given_up, omega, n_results, attitude, status, n_estimates, &
+                          estimates, raised)
   ! Solve many bodies in one call: omega of each body at its time, and its attitude if attitude0 is
   ! specified. An array with one column applies to all bodies.
   !f2py threadsafe
@@ -93,12 +94,15 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   integer(4), intent(in) :: n_times
   real(8), intent(in), target :: times(n_times) ! s
   integer(4), intent(in) :: n_attitudes
-  real(8), intent(in) :: attitude0(4, n_attitudes)
+  real(8), intent(in), target :: attitude0(4, n_attitudes)
   integer(4), intent(inout), target :: given_up(1) ! not 0: another thread ends this call
   real(8), intent(inout) :: omega(3, n)         ! rad/s; NaN unless the status is 0 or 6
   integer(4), intent(in) :: n_results           ! n with attitude, else 0
-  real(8), intent(inout) :: attitude(4, n_results)
+  real(8), intent(inout), target :: attitude(4, n_results)
   integer(1), intent(inout) :: status(n)        ! of the module statuses
+  integer(4), intent(in) :: n_estimates         ! n if the estimates are requested, else 0
+  ! Relative error of a result, and error amplification; negative: unknown.
+  real(8), intent(inout), target :: estimates(2, n_estimates)
   integer(4), intent(out) :: raised             ! 1: interrupted by the user
   type(bodies_t) :: bodies
   real(8) :: packed(0)
@@ -115,8 +119,11 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   bodies%cosines => cosines
   bodies%omega0 => omega0
   bodies%times => times
+  bodies%attitude0 => attitude0
+  bodies%attitude => attitude
+  bodies%estimates => estimates
   call watch(c_loc(given_up))
-  call solve_bodies(bodies, code, packed, attitude0, omega, attitude, status, raised)
+  call solve_bodies(bodies, code, packed, omega, status, raised)
   call watch(c_null_ptr)
 end subroutine solve_ensemble
 

@@ -104,3 +104,43 @@ subroutine tape_derivatives(n_numbers, numbers, n, state, n_columns, starts, for
   n_rows = variation%n_rows
   status = variation%status
 end subroutine tape_derivatives
+
+subroutine tape_many(n_packed, packed, n, omega0, n_times, times, n_attitudes, attitude0, &
+                     given_up, omega, n_results, attitude, status, n_estimates, estimates, raised)
+  ! Solve many bodies under one torque: omega of each body at its time and, if n_attitudes > 0, its
+  ! attitude. The status is 0, or -1 if a body is left to `tape_rows`.
+  !f2py threadsafe
+  use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr
+  use bodies, only: bodies_t
+  use interruption, only: watch
+  use many_tape, only: solve_tape_bodies
+  implicit none
+  integer(4), intent(in) :: n_packed
+  real(8), intent(in), target :: packed(n_packed) ! the scene, as in prepared.f90
+  integer(4), intent(in) :: n                   ! number of bodies
+  real(8), intent(in), target :: omega0(3, n)   ! rad/s
+  integer(4), intent(in) :: n_times             ! n, or 1
+  real(8), intent(in), target :: times(n_times) ! s
+  integer(4), intent(in) :: n_attitudes         ! n, or 0 without attitude
+  real(8), intent(in), target :: attitude0(4, n_attitudes) ! unit quaternions
+  integer(4), intent(inout), target :: given_up(1) ! not 0: another thread ends this call
+  real(8), intent(inout), target :: omega(3, n)
+  integer(4), intent(in) :: n_results           ! as n_attitudes
+  real(8), intent(inout), target :: attitude(4, n_results)
+  integer(1), intent(inout), target :: status(n)
+  integer(4), intent(in) :: n_estimates         ! n if the estimates are requested, else 0
+  ! Relative error of a result, and error amplification; only of bodies with a result.
+  real(8), intent(inout), target :: estimates(2, n_estimates)
+  integer(4), intent(out) :: raised             ! 1: interrupted by the user
+  type(bodies_t) :: bodies
+
+  bodies%n = n
+  bodies%omega0 => omega0
+  bodies%times => times
+  bodies%attitude0 => attitude0
+  bodies%attitude => attitude
+  bodies%estimates => estimates
+  call watch(c_loc(given_up))
+  call solve_tape_bodies(packed, bodies, omega, status, raised)
+  call watch(c_null_ptr)
+end subroutine tape_many

@@ -25,8 +25,8 @@ _TAYLOR = (
 )  # fmt: skip
 _MANY = ("two_words", "problem", "torque_noise", "torque_terms", "taylor_plan")
 _BODIES = (
-    "bodies", "many_circular", "many_columns", "many_free", "many_fixed", "many_slots",
-    "many_taylor",
+    "bodies", "many_circular", "many_columns", "many_orbits", "many_turns", "many_free",
+    "many_fixed", "many_slots", "many_attitudes", "many_taylor",
 )  # fmt: skip
 
 
@@ -73,27 +73,28 @@ def as_written(folder: Path, changes: Mapping[str, tuple[str, str]] | None = Non
     return solved
 
 
-def many_as_written(folder: Path) -> Callable[..., tuple[Array, NDArray[np.int8]]]:
+def many_as_written(folder: Path) -> Callable[..., tuple[Array, Array, NDArray[np.int8]]]:
     """Compile the loops over bodies as written, not unrolled; return a function that uses them."""
     sources = [f"modern/{name}.f90" for name in _MANY]
     # Order of compilation: `bodies` uses `problem`, and the other modules use both.
     sources += [f"many/{name}.f90" for name in _BODIES] + ["../tests/many_as_written.f90"]
     loops = _compiled(folder, sources, {}).many_as_written
     loops.argtypes = [ctypes.c_int] * 3 + [ctypes.c_double] * 2 + [ctypes.c_void_p] * 6 + [
-        ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p
-    ]  # fmt: skip
+        ctypes.c_int, ctypes.c_int
+    ] + [ctypes.c_void_p] * 4  # fmt: skip
 
     def solved(
         method: int, tolerance: float, step: float, *arrays: Array
-    ) -> tuple[Array, NDArray[np.int8]]:
-        body, constant, rate, sines, omega0, times = map(np.ascontiguousarray, arrays)
+    ) -> tuple[Array, Array, NDArray[np.int8]]:
+        body, constant, rate, sines, omega0, times, attitude0 = map(np.ascontiguousarray, arrays)
         omega, status = np.empty_like(omega0), np.empty(len(omega0), np.int8)
+        attitude = np.empty_like(attitude0)
         loops(
             method, len(omega0), sines.shape[1], tolerance, step, body.ctypes, constant.ctypes,
-            rate.ctypes, sines.ctypes, omega0.ctypes, times.ctypes, len(times), omega.ctypes,
-            status.ctypes,
+            rate.ctypes, sines.ctypes, omega0.ctypes, times.ctypes, len(times), len(attitude0),
+            attitude0.ctypes, omega.ctypes, attitude.ctypes, status.ctypes,
         )  # fmt: skip
-        return omega, status
+        return omega, attitude, status
 
     return solved
 

@@ -34,11 +34,15 @@ module bodies
     real(dp), pointer, contiguous :: cosines(:, :, :)   !! (4, waves, 1 or n)
     real(dp), pointer, contiguous :: omega0(:, :)       !! (3, n), rad/s
     real(dp), pointer, contiguous :: times(:)           !! (1 or n), s
+    real(dp), pointer, contiguous :: attitude0(:, :)    !! (4, 0, 1 or n), quaternions
+    real(dp), pointer, contiguous :: attitude(:, :)     !! (4, 0 or n), results
+    !! (2, 0 or n), results: estimated relative error, and amplification; negative: unknown
+    real(dp), pointer, contiguous :: estimates(:, :)
     integer(i1) :: mark         !! status of the bodies that a kernel must solve
     integer :: n_waves          !! largest number of waves that act on one of them
   end type bodies_t
 
-  public :: acts, coefficients_of, has_torque, of_body
+  public :: acts, coefficients_of, has_torque, of_body, put_estimates, with_attitude
 
 contains
 
@@ -48,6 +52,23 @@ contains
 
     of_body = merge(1, i, count == 1)
   end function of_body
+
+  pure logical function with_attitude(bodies)
+    !! Return whether attitudes are requested.
+    type(bodies_t), intent(in) :: bodies
+
+    with_attitude = size(bodies%attitude0) > 0
+  end function with_attitude
+
+  subroutine put_estimates(bodies, i, error, growth)
+    !! Store the estimates of body i if they are requested.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: i
+    real(dp), intent(in) :: error  !! of the result, relative; negative: unknown
+    real(dp), intent(in) :: growth !! error amplification; negative: unknown
+
+    if (size(bodies%estimates) > 0) bodies%estimates(:, i) = [error, growth]
+  end subroutine put_estimates
 
   pure function coefficients_of(bodies, i) result(a)
     !! Compute A, B, C of equations 13-15.

@@ -3,12 +3,13 @@ module many_bodies
   !! enough; the single-body kernel solves the others one by one. Which kernel solves a body depends
   !! on that body alone.
   use, intrinsic :: iso_c_binding, only: c_loc
-  use bodies, only: bodies_t, FREE, i1, NEEDS_FALLBACK, RAMPED, STEPPED, WAVED
+  use bodies, only: bodies_t, FREE, i1, NEEDS_FALLBACK, RAMPED, STEPPED, WAVED, with_attitude
   use kinds, only: dp
   use levels, only: many_fixed, many_free, many_taylor
   use many_kinds, only: mark_bodies
   use many_left, only: solve_left, solve_left_with_attitude
-  use methods, only: QUICK_OR_TAYLOR, TAYLOR
+  use many_tape, only: solve_tape_bodies
+  use methods, only: QUICK_OR_TAYLOR, TAPE, TAYLOR
   use places, only: COEFFICIENTS, CONSTANT, EFFORT, METHOD, N_COSINES, N_SINES, RATE, STEP, &
                     TOLERANCE, WAVES
   implicit none(type, external)
@@ -28,7 +29,7 @@ contains
     integer(i1), intent(inout) :: status(n)
     integer, intent(out) :: raised
     type(bodies_t) :: bodies
-    real(dp) :: no_attitude(4, 0)
+    real(dp), target :: no_attitude(4, 0), no_estimates(2, 0)
     real(dp) :: own(0:n_packed - 1)
     integer :: code, middle
 
@@ -51,37 +52,38 @@ contains
     bodies%cosines(1:4, 1:int(packed(N_COSINES)), 1:1) => packed(middle:n_packed - 1)
     bodies%omega0 => omega0
     bodies%times => times
-    call solve_bodies(bodies, code, own, no_attitude, omega, no_attitude, status, raised)
+    bodies%attitude0 => no_attitude
+    bodies%attitude => no_attitude
+    bodies%estimates => no_estimates
+    if (code == TAPE) then
+      call solve_tape_bodies(packed, bodies, omega, status, raised)
+      if (raised == 0) call solve_left(bodies, code, own, omega, status, raised)
+      return
+    end if
+    call solve_bodies(bodies, code, own, omega, status, raised)
   end subroutine solve_packed_bodies
 
-  subroutine solve_bodies(bodies, code, packed, attitude0, omega, attitude, status, raised)
+  subroutine solve_bodies(bodies, code, packed, omega, status, raised)
     !! Compute omega of each body at its time, and its attitude if attitude0 is specified.
     type(bodies_t), intent(in), target :: bodies
     integer, intent(in) :: code                !! code of the module methods
     real(dp), intent(in) :: packed(0:)         !! scene of all bodies, as in prepared.f90; or none
-    real(dp), intent(in) :: attitude0(:, :)    !! (4, 0, 1 or n)
     real(dp), intent(inout) :: omega(3, bodies%n) !! rad/s; NaN unless the status is 0 or 6
-    real(dp), intent(inout) :: attitude(:, :)  !! (4, n), or size 0
     integer(i1), intent(inout) :: status(bodies%n) !! of the module statuses
     integer, intent(out) :: raised             !! 1: interrupted by the user, no result is valid
     integer :: n_waves
 
     raised = 0
     if (bodies%n == 0) return
-    n_waves = 0
-    if (size(attitude0) > 0) then
-      status = NEEDS_FALLBACK
-    else
-      call mark_bodies(bodies, code, status, n_waves)
-    end if
+    call mark_bodies(bodies, code, status, n_waves)
     call solve_marked(bodies, FREE, 0, code, omega, status, raised)
     if (raised == 0) call solve_marked(bodies, STEPPED, 0, code, omega, status, raised)
     if (raised == 0) call solve_marked(bodies, RAMPED, 0, code, omega, status, raised)
     if (raised == 0) call solve_marked(bodies, WAVED, n_waves, code, omega, status, raised)
     if (raised /= 0 .or. .not. any(status == NEEDS_FALLBACK)) then
       continue
-    else if (size(attitude0) > 0) then
-      call solve_left_with_attitude(bodies, code, attitude0, omega, attitude, status, raised)
+    else if (with_attitude(bodies)) then
+      call solve_left_with_attitude(bodies, code, omega, status, raised)
     else
       call solve_left(bodies, code, packed, omega, status, raised)
     end if

@@ -4,16 +4,17 @@ module many_free
   !! the limits of the range, are left to the single-body kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK
+  use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK, put_estimates, with_attitude
   use kinds, only: dp
   use many_circular, only: sine_cosine_lanes
   use many_columns, only: block_t, columns_of, equations_of, next_block, odd_axes, put_back, &
                           times_of, turn_axes, turn_back
+  use many_orbits, only: LEVELS, orbits_t
+  use many_turns, only: put_attitudes, turns_t, turn_bodies
   use statuses, only: COMPLETE
   implicit none(type, external)
   private
 
-  integer, parameter :: LEVELS = 5     ! levels of the arithmetic-geometric mean
   real(dp), parameter :: NEARLY_CIRCULAR = 2e-4_dp ! modulus left by them: 4th power is negligible
   ! Bound of the relative rounding error of the frequency; measured errors are at most a quarter of
   ! it.
@@ -31,47 +32,29 @@ module many_free
   real(dp), parameter :: LEAST = tiny(1.0_dp)
   real(dp), parameter :: NEVER = huge(1.0_dp) ! error that leaves the body to the single-body kernel
 
-  type :: orbits_t
-    !! The members of orbit_t of torque_free.f90, lane by lane; the axes are in the same order.
-    real(dp), dimension(LANES) :: omega1, omega2, omega3
-    real(dp), dimension(LANES) :: rate1, rate2, rate3
-    real(dp), dimension(LANES) :: modulus, amplitude2, amplitude3, half_gap
-    real(dp), dimension(LANES) :: odd       !! body's axis that is axis 2 here; 0: none
-    real(dp), dimension(LANES) :: gap       !! negative: axes 1 and 3 are exchanged
-    real(dp), dimension(LANES) :: error     !! estimate of the relative error
-    real(dp), dimension(LANES) :: turning   !! square of phase amplification in 1 s, times a divisor
-    real(dp), dimension(LANES) :: most      !! square of its limit, times the same divisor
-    real(dp), dimension(LANES) :: rate      !! square of exponent over largest exponent, 1/s2
-    real(dp), dimension(LANES) :: unsure    !! 1 if the first amplification bound does not suffice
-    real(dp), dimension(LANES) :: a, b      !! the two means
-    real(dp), dimension(LANES) :: half      !! half of the difference of the means
-    real(dp), dimension(LANES) :: frequency
-    real(dp), dimension(LANES) :: sine, cosine !! in the ratio of sn and cn
-    real(dp), dimension(LANES) :: numerator, denominator !! dn is their quotient
-    real(dp), dimension(LANES) :: square    !! of the sine, at the last level but one
-    real(dp) :: upper(LANES, LEVELS), lower(LANES, LEVELS)
-  end type orbits_t
-
 contains
 
   subroutine many_free_solve(bodies_at, n, omega, status) bind(c, name="solve_many_free_level")
-    !! Compute omega of each marked body at its time. Its status becomes COMPLETE, or NEEDS_FALLBACK
-    !! if it is left to the single-body kernel.
+    !! Compute omega of each marked body at its time, and its attitude if it is specified at time 0.
+    !! Its status becomes COMPLETE, or NEEDS_FALLBACK if it is left to the single-body kernel.
     type(c_ptr), intent(in), value :: bodies_at           !! address of a bodies_t, passed through C
     integer(c_int), intent(in), value :: n                !! number of bodies
     real(c_double), intent(inout) :: omega(3, n)          !! rad/s
     integer(i1), intent(inout) :: status(n)
     type(bodies_t), pointer :: bodies
     type(orbits_t) :: o
+    type(turns_t) :: turns
     real(dp), dimension(LANES, 3) :: a, w, moments
     real(dp) :: t(LANES)
     type(block_t) :: block
-    logical :: is_first
+    logical :: is_first, is_turned, is_estimated
     integer :: i, m
 
     call c_f_pointer(bodies_at, bodies)
     block%last = 0
     is_first = .true.
+    is_turned = with_attitude(bodies)
+    is_estimated = size(bodies%estimates) > 0
     do
       call next_block(n, status, bodies%mark, block)
       if (block%there == 0) exit
@@ -80,6 +63,7 @@ contains
         call equations_of(bodies, block, m, a, moments)
         call odd_axes(m, a, o%odd)
         call turn_axes(m, o%odd, a)
+        if (is_turned) call turn_axes(m, o%odd, moments)
       end if
       call columns_of(bodies%omega0, block, m, w)
       call turn_axes(m, o%odd, w)
@@ -88,15 +72,29 @@ contains
       call begin(m, bodies%tolerance, a, w, o)
       call climb(m, o)
       call turn(m, t, o)
+      if (is_turned) then
+        turns%sine(:m) = o%sine(:m)
+        turns%cosine(:m) = o%cosine(:m)
+      end if
       call descend(m, o)
       call finish(m, o, w)
-      if (maxval(o%unsure(1:m)) > 0.0_dp) call ask_again(m, bodies%tolerance, a, w, t, o)
+      if (is_estimated .or. maxval(o%unsure(1:m)) > 0.0_dp) then
+        call ask_again(m, bodies%tolerance, a, w, t, o)
+      end if
+      if (is_turned) then
+        call turn_bodies(m, moments, a, w, t, o, turns)
+        call turn_back(m, o%odd, turns%vector)
+        call put_attitudes(m, bodies, block, turns, o%error)
+      end if
       call turn_back(m, o%odd, w)
       call put_back(block, w, omega)
       do i = 1, block%there
         status(block%at(i)) = merge(int(COMPLETE, i1), NEEDS_FALLBACK, &
                                     o%error(i) <= bodies%tolerance &
                                     .and. .not. o%unsure(i) > 0.0_dp)
+        if (is_estimated) then
+          call put_estimates(bodies, block%at(i), o%error(i) + ROUNDING*o%growth(i), o%growth(i))
+        end if
       end do
     end do
   end subroutine many_free_solve
@@ -152,8 +150,8 @@ contains
       o%amplitude3(i) = s1*s2*y3
       o%half_gap(i) = 0.5_dp*(s2*s3*y1 + s1*s3*y2)
       gap = abs(gap)
-      o%a(i) = sqrt(o%modulus(i))
-      o%b(i) = sqrt(s2*gap)
+      o%a(i, 0) = sqrt(o%modulus(i))
+      o%b(i, 0) = sqrt(s2*gap)
       ! Where cancellation makes the gap small, the frequency has the relative rounding error of the
       ! gap.
       o%error(i) = ERROR*(left + right)/gap
@@ -183,18 +181,16 @@ contains
     !! Compute the arithmetic-geometric mean, with the same number of levels for all lanes.
     integer, intent(in) :: m
     type(orbits_t), intent(inout) :: o
-    real(dp) :: mean
     integer :: i, n
 
     do n = 1, LEVELS
       do i = 1, m
-        mean = 0.5_dp*(o%a(i) + o%b(i))
-        o%upper(i, n) = mean*o%a(i)
-        o%lower(i, n) = mean*o%b(i)
-        o%half(i) = 0.5_dp*(o%a(i) - o%b(i))
-        if (n < LEVELS) o%b(i) = sqrt(o%a(i)*o%b(i))
-        o%a(i) = mean
+        o%a(i, n) = 0.5_dp*(o%a(i, n - 1) + o%b(i, n - 1))
+        if (n < LEVELS) o%b(i, n) = sqrt(o%a(i, n - 1)*o%b(i, n - 1))
       end do
+    end do
+    do i = 1, m
+      o%half(i) = 0.5_dp*(o%a(i, LEVELS - 1) - o%b(i, LEVELS - 1))
     end do
   end subroutine climb
 
@@ -204,30 +200,27 @@ contains
     integer, intent(in) :: m
     real(dp), intent(in) :: t(LANES) !! s
     type(orbits_t), intent(inout) :: o
-    real(dp) :: inverse, square, error
+    real(dp) :: last, inverse, square, error
     integer :: i
 
     do i = 1, m
-      inverse = 1.0_dp/o%a(i)
+      last = o%a(i, LEVELS)
+      inverse = 1.0_dp/last
       square = (o%half(i)*inverse)*(o%half(i)*inverse)
       error = o%error(i)
-      if (.not. o%half(i) <= NEARLY_CIRCULAR*o%a(i)) error = NEVER
+      if (.not. o%half(i) <= NEARLY_CIRCULAR*last) error = NEVER
       o%numerator(i) = 0.5_dp*square
       o%denominator(i) = inverse*(1.0_dp + 0.25_dp*square)
       ! One more level of the mean would subtract this term.
-      o%frequency(i) = (o%a(i) - 0.25_dp*square*o%a(i))*t(i)
+      o%mean(i) = last - 0.25_dp*square*last
+      o%phase(i) = o%mean(i)*t(i)
       o%unsure(i) = 1.0_dp
       if (o%turning(i)*(t(i)*t(i)) <= o%most(i) &
           .or. o%rate(i)*(t(i)*t(i)) <= 1.0_dp) o%unsure(i) = 0.0_dp
       if (.not. abs(t(i)) > 0.0_dp) error = NEVER ! the single-body kernel returns omega0
-      o%error(i) = error + error*abs(o%frequency(i))
+      o%error(i) = error + error*abs(o%phase(i))
     end do
-    call sine_cosine_lanes(m, o%frequency, o%sine, o%cosine)
-    do i = 1, m
-      o%numerator(i) = 1.0_dp - o%numerator(i)*(o%sine(i)*o%sine(i))
-      o%sine(i) = o%sine(i)*o%denominator(i)
-      o%denominator(i) = 1.0_dp
-    end do
+    call sine_cosine_lanes(m, o%phase, o%sine, o%cosine)
   end subroutine turn
 
   pure subroutine descend(m, o)
@@ -238,14 +231,19 @@ contains
     real(dp) :: s2, c2
     integer :: i, n
 
+    do i = 1, m
+      o%numerator(i) = 1.0_dp - o%numerator(i)*(o%sine(i)*o%sine(i))
+      o%sine(i) = o%sine(i)*o%denominator(i)
+      o%denominator(i) = 1.0_dp
+    end do
     do n = LEVELS, 1, -1
       do i = 1, m
         c2 = o%cosine(i)*o%cosine(i)
         s2 = o%sine(i)*o%sine(i)
         o%cosine(i) = o%cosine(i)*o%numerator(i)
         o%sine(i) = o%sine(i)*o%denominator(i)
-        o%numerator(i) = c2 + o%lower(i, n)*s2
-        o%denominator(i) = c2 + o%upper(i, n)*s2
+        o%numerator(i) = c2 + (o%a(i, n)*o%b(i, n - 1))*s2
+        o%denominator(i) = c2 + (o%a(i, n)*o%a(i, n - 1))*s2
         o%square(i) = s2
       end do
     end do
@@ -328,7 +326,9 @@ contains
       relative = (1.0_dp - share)*sqrt((s2 + s3)/c3) &
                  + share*(s1*sqrt(c3/s2) + s3*sqrt(c1/s2))/gap
       amplified = sqrt(max(1.0_dp, s1/s2, s2/s1, s3/s2))*(s1/s2)*(c3/gap)
-      if (amplified + abs(t(i))*speed*relative <= enough) o%unsure(i) = 0.0_dp
+      amplified = amplified + abs(t(i))*speed*relative
+      if (amplified <= enough) o%unsure(i) = 0.0_dp
+      o%growth(i) = max(1.0_dp, ABOVE_ESTIMATE*amplified)
     end do
   end subroutine ask_again
 

@@ -2,7 +2,7 @@ module many_kinds
   !! The choice of the kernel that solves each of many bodies. Only the numbers of a body decide it,
   !! so that no result depends on the other bodies of a call.
   use bodies, only: acts, bodies_t, coefficients_of, FREE, has_torque, i1, MOST_WAVES, &
-                    NEEDS_FALLBACK, of_body, RAMPED, STEPPED, WAVED
+                    NEEDS_FALLBACK, of_body, RAMPED, STEPPED, WAVED, with_attitude
   use kinds, only: dp
   use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, IMPROVED_EULER, RK4, SPHERE, TAYLOR
   implicit none(type, external)
@@ -29,7 +29,7 @@ contains
     else if (shares_torque(bodies) .and. code /= CLOSED_FORM_OR_TAYLOR) then
       status = mark_of(bodies, 1, code, n_waves)
     else if (shares_torque(bodies) .and. .not. feels_torque(bodies, 1)) then
-      status = FREE
+      status = mark_of(bodies, 1, code, n_waves)
     else
       do i = 1, bodies%n
         status(i) = mark_of(bodies, i, code, n_waves)
@@ -79,15 +79,18 @@ contains
 
     if (code == CLOSED_FORM_OR_TAYLOR) then
       mark_of = FREE
-      if (.not. feels_torque(bodies, i)) return
+      if (.not. feels_torque(bodies, i)) then
+        if (single_code(bodies, i, code) == TAYLOR) mark_of = RAMPED
+        return
+      end if
       mark_of = NEEDS_FALLBACK
-      if (is_sphere(coefficients_of(bodies, i))) return
+      if (single_code(bodies, i, code) == SPHERE) return
     end if
     own_waves = waves_on(bodies, i)
     if (code >= IMPROVED_EULER .and. code <= RK4) then
       mark_of = STEPPED
       if (has_torque(bodies%rate(:, of_body(size(bodies%rate, 2), i)))) mark_of = NEEDS_FALLBACK
-      if (own_waves > 0) mark_of = NEEDS_FALLBACK
+      if (own_waves > 0 .or. with_attitude(bodies)) mark_of = NEEDS_FALLBACK
     else if (own_waves > MOST_WAVES) then
       mark_of = NEEDS_FALLBACK
     else if (own_waves > 0) then
@@ -104,19 +107,20 @@ contains
     is_sphere = all(abs(coefficients) <= 0.0_dp)
   end function is_sphere
 
-  integer function single_code(bodies, i, code, with_attitude)
+  pure integer function single_code(bodies, i, code)
     !! Return the method by which the single-body kernel solves body i if `code` was requested.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: i, code
-    logical, intent(in) :: with_attitude
 
     single_code = code
     if (code /= CLOSED_FORM_OR_TAYLOR) return
     if (feels_torque(bodies, i)) then
       single_code = TAYLOR
       ! With attitude, a sphere under torque has no closed form.
-      if (is_sphere(coefficients_of(bodies, i)) .and. .not. with_attitude) single_code = SPHERE
-    else if (with_attitude .and. .not. bodies%by_moments) then
+      if (is_sphere(coefficients_of(bodies, i)) .and. .not. with_attitude(bodies)) then
+        single_code = SPHERE
+      end if
+    else if (with_attitude(bodies) .and. .not. bodies%by_moments) then
       ! The coefficients do not determine the angular momentum of the body.
       single_code = TAYLOR
     end if

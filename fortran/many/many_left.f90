@@ -2,8 +2,9 @@ module many_left
   !! Bodies that no multi-lane kernel solves: the single-body kernel solves them one after the
   !! other.
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: acts, bodies_t, coefficients_of, i1, NEEDS_FALLBACK, of_body
+  use bodies, only: acts, bodies_t, coefficients_of, i1, NEEDS_FALLBACK, of_body, put_estimates
   use kinds, only: dp
+  use nearness, only: bring_near_one
   use many_kinds, only: is_sphere, single_code
   use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, GAUSS, SPHERE, TAYLOR
   use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, MOMENTS, &
@@ -19,6 +20,7 @@ module many_left
 
   ! As in sensitivity.py, which decides what a prepared solver reports.
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
+  real(dp), parameter :: CLOSED_FORM_ERROR = 16.0_dp*ROUNDING ! relative
   real(dp), parameter :: UNSURE = 0.3_dp ! rounding times amplification, in tolerances
   real(dp), parameter :: COARSE = 1e-3_dp, LITTLE_WORK = 5e-3_dp
   real(dp), parameter :: HARDLY_ANY = 1e300_dp ! steps: so many that their roundings average out
@@ -38,9 +40,11 @@ contains
     real(dp) :: own(0:WAVES + 4*(size(bodies%sines, 2) + size(bodies%cosines, 2)) - 1)
     real(dp) :: found(2), time
     integer(int64) :: steps
+    logical :: is_estimated
     integer :: ended, i, n_own
 
     raised = 0
+    is_estimated = size(bodies%estimates) > 0
     do i = 1, bodies%n
       if (status(i) /= NEEDS_FALLBACK) cycle
       time = bodies%times(of_body(size(bodies%times), i))
@@ -49,14 +53,19 @@ contains
                             steps, found)
         call tell_sensitive(packed, size(packed), bodies%omega0(:, i), time, steps, ended)
       else
-        call pack(bodies, i, code, .false., own, n_own)
+        call pack(bodies, i, code, own, n_own)
         if (.not. is_body(bodies, i, own(:n_own - 1))) then
           status(i) = int(REFUSED, i1)
           omega(:, i) = transfer(huge(0_int64), 1.0_dp)
+          call put_estimates(bodies, i, -1.0_dp, -1.0_dp)
           cycle
         end if
         call solve_prepared(own, n_own, bodies%omega0(:, i), time, omega(:, i), ended, steps, found)
         call tell_sensitive(own, n_own, bodies%omega0(:, i), time, steps, ended)
+        if (is_estimated) then
+          call estimate(own, n_own, bodies%omega0(:, i), time, steps, ended, found)
+          call put_estimates(bodies, i, found(1), found(2))
+        end if
       end if
       status(i) = int(ended, i1)
       if (ended == INTERRUPTED) raised = 1
@@ -64,36 +73,44 @@ contains
     end do
   end subroutine solve_left
 
-  subroutine solve_left_with_attitude(bodies, code, attitude0, omega, attitude, status, raised)
-    !! Solve all bodies with attitude, one by one.
+  subroutine solve_left_with_attitude(bodies, code, omega, status, raised)
+    !! Solve the bodies that are left, with attitude, one by one.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: code
-    real(dp), intent(in) :: attitude0(:, :)
     real(dp), intent(inout) :: omega(3, bodies%n)
-    real(dp), intent(inout) :: attitude(:, :)
     integer(i1), intent(inout) :: status(bodies%n)
     integer, intent(out) :: raised
     real(dp) :: own(0:WAVES + 4*(size(bodies%sines, 2) + size(bodies%cosines, 2)) - 1)
     real(dp) :: start(7), state(7), found(2), time
     integer(int64) :: steps
-    integer :: ended, i, n_own
+    logical :: is_estimated
+    integer :: ended, i, n_own, power
 
     raised = 0
+    is_estimated = size(bodies%estimates) > 0
     do i = 1, bodies%n
-      call pack(bodies, i, code, .true., own, n_own)
+      if (status(i) /= NEEDS_FALLBACK) cycle
+      call pack(bodies, i, code, own, n_own)
       if (.not. is_body(bodies, i, own(:n_own - 1))) then
         status(i) = int(REFUSED, i1)
         omega(:, i) = transfer(huge(0_int64), 1.0_dp)
-        attitude(:, i) = omega(1, i)
+        bodies%attitude(:, i) = omega(1, i)
+        call put_estimates(bodies, i, -1.0_dp, -1.0_dp)
         cycle
       end if
       time = bodies%times(of_body(size(bodies%times), i))
       start(:3) = bodies%omega0(:, i)
-      start(4:) = attitude0(:, of_body(size(attitude0, 2), i))
+      start(4:) = bodies%attitude0(:, of_body(size(bodies%attitude0, 2), i))
+      call bring_near_one(start(4:), power)
+      start(4:) = start(4:)/sqrt(sum(start(4:)**2))
       call solve_prepared_attitude(own, n_own, start, time, state, ended, steps, found)
       call tell_sensitive(own, n_own, start, time, steps, ended)
+      if (is_estimated) then
+        call estimate(own, n_own, start, time, steps, ended, found)
+        call put_estimates(bodies, i, found(1), found(2))
+      end if
       omega(:, i) = state(:3)
-      attitude(:, i) = state(4:)
+      bodies%attitude(:, i) = state(4:)
       status(i) = int(ended, i1)
       if (ended == INTERRUPTED) raised = 1
       if (raised /= 0) return
@@ -112,11 +129,10 @@ contains
     end if
   end function is_body
 
-  subroutine pack(bodies, i, code, with_attitude, packed, n_packed)
+  subroutine pack(bodies, i, code, packed, n_packed)
     !! Pack body i as prepared.f90 reads it.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: i, code
-    logical, intent(in) :: with_attitude
     real(dp), intent(inout) :: packed(0:)
     integer, intent(out) :: n_packed   !! length, with the waves that act on the body
     real(dp) :: of(3)
@@ -124,7 +140,7 @@ contains
 
     of = 1.0_dp
     if (bodies%by_moments) of = bodies%body(:, of_body(size(bodies%body, 2), i))
-    packed(METHOD) = real(single_code(bodies, i, code, with_attitude), dp)
+    packed(METHOD) = real(single_code(bodies, i, code), dp)
     packed(TOLERANCE) = bodies%tolerance
     packed(STEP) = bodies%step
     packed(COEFFICIENTS:COEFFICIENTS + 2) = coefficients_of(bodies, i)
@@ -168,7 +184,6 @@ contains
     real(dp) :: copy(0:n_packed - 1)
     real(dp) :: enough       ! amplification beyond which the result is sensitive
     real(dp) :: growth, omega(3), found(2)
-    type(problem_t) :: torque
     integer(int64) :: coarse_steps
     integer :: code, coarse_status
 
@@ -176,14 +191,7 @@ contains
     if (status /= COMPLETE .or. steps /= 0 .and. code < GAUSS) return
     if (.not. (code > GAUSS .or. code == SPHERE .or. code == CLOSED_FORM &
                .or. code == CLOSED_FORM_OR_TAYLOR)) return
-    enough = UNSURE*packed(TOLERANCE)/ROUNDING
-    if (n_packed > WAVES) then
-      ! Terms of the torque that nearly cancel have larger rounding errors than omega.
-      call unpack(packed, n_packed, torque)
-      growth = HARDLY_ANY
-      if (code > GAUSS) growth = min(HARDLY_ANY, abs(time)/packed(STEP))
-      enough = enough/(1.0_dp + torque_noise_of(torque, time, growth, -maxval(abs(omega0))))
-    end if
+    enough = UNSURE*packed(TOLERANCE)/ROUNDING/roundings_of(packed, n_packed, omega0, time)
     growth = 1.0_dp
     if (.not. is_sphere(packed(COEFFICIENTS:COEFFICIENTS + 2))) then
       growth = -1.0_dp
@@ -204,6 +212,47 @@ contains
     end if
     if (growth > enough .and. status == COMPLETE) status = SENSITIVE
   end subroutine tell_sensitive
+
+  real(dp) function roundings_of(packed, n_packed, omega0, time)
+    !! Return the rounding errors of omega and of the torque's terms, in roundings of omega. Terms
+    !! that nearly cancel have larger ones than their sum.
+    integer, intent(in) :: n_packed
+    real(dp), intent(in), target :: packed(0:n_packed - 1)
+    real(dp), intent(in) :: omega0(3)   !! rad/s
+    real(dp), intent(in) :: time        !! s
+    real(dp) :: steps
+    type(problem_t) :: torque
+
+    roundings_of = 1.0_dp
+    if (n_packed <= WAVES) return
+    call unpack(packed, n_packed, torque)
+    steps = HARDLY_ANY
+    if (int(packed(METHOD)) > GAUSS) steps = min(HARDLY_ANY, abs(time)/packed(STEP))
+    roundings_of = 1.0_dp + torque_noise_of(torque, time, steps, -maxval(abs(omega0)))
+  end function roundings_of
+
+  subroutine estimate(packed, n_packed, omega0, time, steps, status, found)
+    !! Complete the estimates of a result where a prepared solver does; see closed_form_estimate of
+    !! sensitivity.py.
+    integer, intent(in) :: n_packed
+    real(dp), intent(in), target :: packed(0:n_packed - 1)
+    real(dp), intent(in) :: omega0(3)   !! rad/s
+    real(dp), intent(in) :: time        !! s
+    integer(int64), intent(in) :: steps !! 0 with a closed form
+    integer, intent(in) :: status
+    real(dp), intent(inout) :: found(2) !! estimated relative error, amplification; negative: none
+
+    if (.not. (status == COMPLETE .or. status == SENSITIVE)) then
+      found = -1.0_dp
+    else if (steps == 0 .and. int(packed(METHOD)) < GAUSS .and. int(packed(METHOD)) /= TAYLOR) then
+      found = [-1.0_dp, 1.0_dp]
+      if (.not. is_sphere(packed(COEFFICIENTS:COEFFICIENTS + 2))) then
+        found(2) = torque_free_growth_of(packed(COEFFICIENTS:COEFFICIENTS + 2), omega0, time)
+      end if
+      if (found(2) < 0.0_dp) return
+      found(1) = ROUNDING*found(2)*roundings_of(packed, n_packed, omega0, time) + CLOSED_FORM_ERROR
+    end if
+  end subroutine estimate
 
   pure real(dp) function remainder_of(x, y, z)
     !! Return the rounding error of (x - y)/z.

@@ -1,10 +1,11 @@
 module many_slots
   !! The bodies under torque that are being integrated side by side, and those that are next.
-  use bodies, only: acts, bodies_t, i1, LANES, MOST_WAVES, of_body
+  use, intrinsic :: iso_fortran_env, only: int64
+  use bodies, only: acts, bodies_t, i1, LANES, MOST_WAVES, of_body, with_attitude
   use kinds, only: dp
   use many_columns, only: block_t, columns_of, equations_of, next_block, times_of
   use problem, only: problem_t
-  use series, only: MOST_ORDER
+  use series, only: LONG, MOST_ORDER
   use taylor_plan, only: add_wave_rates, first_step, local_tolerance_of, steady_rates
   use torque_noise, only: torque_noise_of
   implicit none(type, external)
@@ -13,6 +14,10 @@ module many_slots
   integer, parameter, public :: SLOTS = 16      !! bodies that are being integrated
   integer, parameter, public :: KIND_OF = 5     !! index in a wave: 1 for a cosine, else 0
   real(dp), parameter :: SURE = 0.03_dp !! error of the waves' angles, in tolerances
+  ! Largest rounding error times amplification, in tolerances. This is a third of what the
+  ! single-body kernel reports as sensitive, as that kernel measures the amplification from later
+  ! instants too.
+  real(dp), parameter, public :: BLURRED = 0.1_dp
   real(dp), parameter, public :: SHORTEST = 1e-7_dp !! shortest step over the time
   real(dp), parameter, public :: FAR = 1e60_dp  !! products of rates from 1/FAR to FAR are finite
   ! Factor by which the truncation error of a step may exceed that in an integration of one body,
@@ -27,6 +32,11 @@ module many_slots
   real(dp), parameter, public :: MOST_GROWTH = 1000.0_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: WAVES_ERR = 16.0_dp*2.0_dp**(-53) ! rounding error per radian of a wave
+  real(dp), parameter, public :: LEAST = 1e-290_dp
+  integer, parameter :: SPARE = 12           ! bits of a number that its logarithm does not need
+  real(dp), parameter :: MOST_BITS = 2.0_dp**45 ! largest logarithm of a ratio, without those bits
+  ! Integers are converted to reals and back by a sum: few processors convert many at once.
+  real(dp), parameter :: WHOLE = 1.5_dp*2.0_dp**52
 
   type, public :: slots_t
     real(dp), dimension(SLOTS, 3) :: w, low   !! omega and its rounding error, rad/s
@@ -42,7 +52,11 @@ module many_slots
     real(dp), dimension(SLOTS) :: local_tolerance !! largest last terms, relative to scale
     real(dp), dimension(SLOTS) :: spin        !! rate of change of perturbations, 1/s
     real(dp), dimension(SLOTS) :: going       !! above 0 while a body is being integrated
-    real(dp) :: torque(SLOTS, 3, MOST_ORDER)  !! terms of the waves, rad/s
+    ! Terms of the waves, rad/s; with attitudes or waves then those of omega.
+    real(dp) :: torque(SLOTS, 3, MOST_ORDER)
+    ! If the time to go is at most `one` steps, the next step is the last. If it is less than `two`,
+    ! the next step is this part of it.
+    real(dp) :: one, two, part
   end type slots_t
 
   type, public :: ready_t
@@ -54,7 +68,7 @@ module many_slots
     type(block_t) :: block
   end type ready_t
 
-  public :: fill, make_ready, put_in
+  public :: fill, make_ready, put_in, ratio
 
 contains
 
@@ -78,6 +92,9 @@ contains
     s%local_tolerance = 1.0_dp
     s%spin = 1.0_dp
     s%going = 0.0_dp
+    s%one = 1.0_dp
+    s%two = 2.0_dp
+    s%part = 0.5_dp
   end subroutine fill
 
   subroutine make_ready(bodies, status, waves, r)
@@ -92,6 +109,7 @@ contains
     type(problem_t) :: torque
     real(dp), target :: own(4, MOST_WAVES)
     real(dp) :: push, ramp, tolerance
+    real(dp) :: farthest  ! rotation of perturbations, rad
     real(dp) :: cancelled ! noise of a torque above which the body is left
     integer :: i, n
 
@@ -158,6 +176,8 @@ contains
         end if
       end do
     end if
+    ! The attitude rotates even if omega is steady.
+    if (with_attitude(bodies)) coupling = max(coupling, 1.0_dp)
     do i = 1, LANES
       r%h(i) = first_step(rate(i), r%rest(i))
       r%local_tolerance(i) = local_tolerance_of(coupling(i), r%scale(i), gain(i), turned(i), &
@@ -168,6 +188,9 @@ contains
       rate(i) = sqrt(abs(r%a(i, 3)))
       r%spin(i) = r%scale(i)*max(push*ramp, ramp*rate(i), rate(i)*push)
       if (.not. abs(r%h(i)) > SHORTEST*abs(r%rest(i))) r%fits(i) = -1.0_dp
+      ! A long motion needs precise variations.
+      farthest = (r%spin(i)*abs(r%rest(i)))*(1.0_dp + gain(i)/r%scale(i))
+      if (.not. farthest <= LONG) r%fits(i) = -1.0_dp
     end do
   end subroutine make_ready
 
@@ -223,5 +246,20 @@ contains
     s%spin(i) = r%spin(j)
     s%going(i) = 1.0_dp
   end subroutine put_in
+
+  pure real(dp) function ratio(order, allowed, last)
+    !! Return the factor on the step with which the last terms would be as large as allowed. The
+    !! bits of a positive number, read as an integer, are its logarithm to 6 %.
+    integer, intent(in) :: order
+    real(dp), intent(in) :: allowed, last
+    integer(int64) :: bits
+    real(dp) :: power
+
+    bits = ishft(transfer(allowed, bits), -SPARE) - ishft(transfer(max(last, LEAST), bits), -SPARE)
+    power = transfer(bits + transfer(WHOLE, bits), power) - WHOLE
+    power = max(-MOST_BITS, min(MOST_BITS, power*(1.0_dp/real(order, dp))))
+    bits = transfer(power + WHOLE, bits) - transfer(WHOLE, bits)
+    ratio = transfer(transfer(1.0_dp, bits) + ishft(bits, SPARE), 1.0_dp)
+  end function ratio
 
 end module many_slots

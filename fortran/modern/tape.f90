@@ -1,7 +1,7 @@
 module tape
   !! The equations of motion as a tape: a list of operations, each of which writes a slot. Slot 1 is
   !! the time, slots 2 to 4 are omega, and slots 5 to 8 are the attitude, a quaternion.
-  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int, c_loc, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_loc, c_ptr
   use kinds, only: dp
   implicit none(type, external)
   private
@@ -36,6 +36,22 @@ module tape
     integer(c_int) :: n_unknowns, n_operations, n_combinations
     type(c_ptr) :: operations, starts, slots, coefficients, constants, a, v
   end type tape_arrays_t
+
+  ! Many bodies under one torque, as tape_lanes.c reads them.
+  type, bind(c), public :: tape_bodies_t
+    type(tape_arrays_t) :: tape
+    type(c_ptr) :: table_starts, breaks, pieces
+    real(c_double) :: tolerance         !! relative, and of the angle of the attitude in rad
+    integer(c_int) :: n_slots, n_tables
+    integer(c_int) :: n                 !! number of bodies
+    integer(c_int) :: n_times           !! 1 or n
+    integer(c_int) :: interrupted       !! out: not 0 if the user interrupted it
+    type(c_ptr) :: omega0, attitude0    !! (3, n), rad/s; (4, n), unit quaternions
+    type(c_ptr) :: times                !! (n_times), s
+    type(c_ptr) :: omega, attitude      !! (3, n), (4, n): results
+    type(c_ptr) :: status               !! (n), of one byte
+    type(c_ptr) :: estimates            !! (2, n): relative error, amplification; or null
+  end type tape_bodies_t
 
   public :: arrays_of, next_break, piece_at, tape_of
 

@@ -3,10 +3,7 @@
    sums in registers. Registers of fewer than eight numbers work too: the compiler divides them. */
 #include <string.h>
 
-#include "codes.h"
-
-#define JOINED(name, level) name##_##level
-#define OF_LEVEL(name, level) JOINED(name, level)
+#include "tape.h"
 
 enum { SIDE_BY_SIDE = 8, TERMS = 40, TERMS_OF_PERTURBATION = 29 };
 
@@ -15,19 +12,8 @@ typedef long long bits __attribute__((vector_size(8 * SIDE_BY_SIDE)));
 typedef double series[TERMS];
 typedef double perturbations[TERMS_OF_PERTURBATION][SIDE_BY_SIDE];
 
-/* tape_arrays_t of tape.f90. Numbers of slots and combinations begin with 1. */
-struct tape {
-  int n_unknowns, n_operations, n_combinations;
-  const int (*operations)[4]; /* kind, two operands and result */
-  const int *starts, *slots;
-  const double *coefficients, *constants;
-  series *a;        /* terms of each slot */
-  perturbations *v; /* terms of the perturbations of each slot */
-};
-
 /* block_t of tape_series.f90. Where the derivative of unknown i depends on a parameter itself,
    combination forcings[i][lane] of the series is the partial derivative; 0 stands for none. */
-enum { MOST_UNKNOWNS = 7 };
 struct block {
   struct tape tape;
   int forcings[MOST_UNKNOWNS][SIDE_BY_SIDE];
@@ -38,7 +24,7 @@ struct block {
 enum { SMALL_TERMS = 3, MOST_TRIES = 60 }; /* last terms of derivatives that are small; cuts of a step */
 #define SHORTER 0.7        /* factor of a cut */
 #define MOST_CANCELLED 1e3 /* largest term over the size of a derivative */
-enum { FIRST_UNKNOWN = 1 }; /* the slot of omega's first component, from 0 */
+static inline perturbations *perturbations_of(const struct tape *tape) { return tape->v; }
 
 /* The same at any address. */
 typedef lanes lanes_anywhere __attribute__((aligned(8)));
@@ -291,7 +277,7 @@ static inline lanes largest_terms(const struct tape *tape, int k, const double *
   const bits magnitude = ~(bits)(-(lanes){0.0});
   lanes most = {0.0};
   for (int i = 0; i < tape->n_unknowns; i++) {
-    const lanes x = (lanes)((bits)loaded(tape->v[FIRST_UNKNOWN + i][k]) & magnitude);
+    const lanes x = (lanes)((bits)loaded(perturbations_of(tape)[FIRST_UNKNOWN + i][k]) & magnitude);
     most = larger(most, weights[i] * units * x);
   }
   return most;
@@ -336,7 +322,7 @@ static void force(const struct tape *tape, int n, double h, int order, double (*
 {
   series sum = {tape->constants[n]};
   for (int i = tape->starts[n] - 1; i < tape->starts[n + 1] - 1; i++) {
-    const double coefficient = tape->coefficients[i], *from = tape->a[tape->slots[i] - 1];
+    const double coefficient = tape->coefficients[i], *from = ((series *)tape->a)[tape->slots[i] - 1];
     for (int k = 0; k < order; k++) sum[k] += coefficient * from[k];
   }
   for (int k = 0; k < order; k++) to[k + 1][0] = h / (k + 1) * sum[k];
@@ -379,7 +365,7 @@ double OF_LEVEL(vary_tape, LEVEL)(struct block *block, double h, int order, doub
   powers[0] = 1.0;
   for (int j = 1; j <= order; j++) powers[j] = factor * powers[j - 1];
   for (int i = 0; i < tape->n_unknowns; i++) {
-    double(*terms)[SIDE_BY_SIDE] = tape->v[FIRST_UNKNOWN + i];
+    double(*terms)[SIDE_BY_SIDE] = perturbations_of(tape)[FIRST_UNKNOWN + i];
     memset(terms[1], 0, order * sizeof terms[1]);
     for (int lane = 0; lane < SIDE_BY_SIDE; lane++)
       if (block->forcings[i][lane])
@@ -413,8 +399,8 @@ void OF_LEVEL(sum_perturbations, LEVEL)(const struct tape *tape, int last, doubl
                                         double (*sums)[SIDE_BY_SIDE])
 {
   for (int i = 0; i < tape->n_unknowns; i++) {
-    lanes sum = loaded(tape->v[FIRST_UNKNOWN + i][last]);
-    for (int k = last - 1; k >= 0; k--) sum = factor * sum + loaded(tape->v[FIRST_UNKNOWN + i][k]);
+    lanes sum = loaded(perturbations_of(tape)[FIRST_UNKNOWN + i][last]);
+    for (int k = last - 1; k >= 0; k--) sum = factor * sum + loaded(perturbations_of(tape)[FIRST_UNKNOWN + i][k]);
     store(sums[i], sum);
   }
 }

@@ -75,6 +75,8 @@ class Batch:
         The quantities that differ between the scenes, as arrays with one row for each scene. The
         keys are names of arguments of `solve_many` and `run_many`. `omega0` is always among them;
         for programs `step_size` and `lipschitz` may be.
+    attitude : bool
+        Whether the method computes attitudes too. The programs of the thesis compute none.
     """
 
     scene: Scene
@@ -82,6 +84,7 @@ class Batch:
     listing: Listing | None
     t_end: Array
     arrays: Mapping[str, Array]
+    attitude: bool = False
 
     @property
     def omega0(self) -> Array:
@@ -158,14 +161,10 @@ class Batch:
         integrates anew from time 0 to each of these times, so that errors of earlier parts do not
         add up. For a program the times are those of the steps that `sample_steps` returns.
         """
+        if not self.is_program:
+            return np.stack([each.omega for each in self._samples(samples)], axis=1)
         if samples not in self._rows:
-            if self.is_program:
-                found = self.run(self.sample_steps(samples)).omega
-            else:
-                parts = [(i + 1) / samples for i in range(samples - 1)]
-                ends = [self._solve_own(self.t_end * part).omega for part in parts]
-                found = np.stack([*ends, self.omega], axis=1)
-            self._rows[samples] = found
+            self._rows[samples] = self.run(self.sample_steps(samples)).omega
         return self._rows[samples]
 
     def attitudes(self, samples: int) -> Array:
@@ -173,24 +172,24 @@ class Batch:
 
         The times are the ends of `samples` equal parts of the time from 0 to `t_end`. Attitudes are
         quaternions, scalar first, from the body to the axes of the body at time 0. The attitude at
-        time 0 is therefore (1, 0, 0, 0). The batch must be solved by a modern method of this
-        package, because the programs of the thesis compute no attitude.
+        time 0 is therefore (1, 0, 0, 0). The field `attitude` of the batch must be true.
         """
-        is_free = not self.scene.torque.needs_attitude
-        more = {"attitude0": IDENTITY} if is_free else {}
         ends = []
-        for i in range(samples):
-            part = (i + 1) / samples
-            found = self._solve_own(self.t_end * part, **more)
-            assert found.attitude is not None
-            ends.append(found.attitude if is_free else self._from_start(found.attitude))
-        return np.stack(ends, axis=1)
+        for each in self._samples(samples):
+            assert each.attitude is not None
+            ends.append(each.attitude)
+        found = np.stack(ends, axis=1)
+        if self.scene.torque.needs_attitude:
+            w, x, y, z = self.first_attitudes.T[:, :, None]
+            found = np.stack(product((w, -x, -y, -z), np.moveaxis(found, 2, 0)), axis=2)
+        return found
 
-    def _from_start(self, attitude: Array) -> Array:
-        start = np.array(self.arrays.get("attitude0", [self.scene.attitude or IDENTITY]))
-        w, x, y, z = (start / np.linalg.norm(start, axis=1, keepdims=True)).T
-        a, b, c, d = attitude.T
-        return np.stack(product((w, -x, -y, -z), (a, b, c, d)), axis=1)
+    @property
+    def first_attitudes(self) -> Array:
+        """Return the attitudes at time 0, from the body to space, shape (n, 4) or (1, 4)."""
+        first = np.array(self.arrays.get("attitude0", [self.scene.attitude or IDENTITY]))
+        found: Array = first / np.linalg.norm(first, axis=1, keepdims=True)
+        return found
 
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
         """Return omega (rad/s) of each scene at the time `part` * `t_end`, shape (n, 3).
@@ -248,10 +247,26 @@ class Batch:
     def _rows(self) -> dict[int, Array]:
         return {}
 
-    def _solve_own(self, t_end: Array, **more: tuple[float, ...]) -> Ensemble:
+    @cached_property
+    def _found(self) -> dict[int, list[Ensemble]]:
+        return {}
+
+    def _samples(self, samples: int) -> list[Ensemble]:
+        """Return the states at the ends of `samples` equal parts of the time from 0 to `t_end`."""
+        if samples not in self._found:
+            parts = [(i + 1) / samples for i in range(samples - 1)]
+            ends = [self._solve_own(self.t_end * part) for part in parts]
+            self._found[samples] = [*ends, self._ends]
+        return self._found[samples]
+
+    def _solve_own(self, t_end: Array) -> Ensemble:
         method = self.solver.method
         assert method is not None
         tolerance = requested_tolerance(method, self.solver.tolerance)
+        more = {}
+        if self.attitude and not self.scene.torque.needs_attitude:
+            # One attitude suits all scenes: `first_attitudes` turns the result.
+            more["attitude0"] = IDENTITY
         return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
@@ -270,8 +285,12 @@ class Batch:
         arrays: dict[str, Any] = {
             name: array for name, array in self.arrays.items() if name not in OF_PROGRAMS
         }
+        scene = self.scene
+        if not scene.torque.needs_attitude:
+            scene = scene if scene.attitude is None else replace(scene, attitude=None)
+            arrays.pop("attitude0", None)
         arrays |= more
-        return solve_many(self.scene, t_end, method=method, tolerance=tolerance, **arrays)
+        return solve_many(scene, t_end, method=method, tolerance=tolerance, **arrays)
 
     def _solve_each(self, method: str, tolerance: float, t_end: Array) -> Ensemble:
         n = len(self.omega0)

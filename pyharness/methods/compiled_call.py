@@ -30,7 +30,10 @@ def compiled_call(solver: Any) -> CompiledCall:
 
 
 def get_include() -> str:
-    """Return the folder of the header `pyharness.h`, with which C code calls prepared solvers.
+    """Return the folder of the headers for C code.
+
+    With `pyharness.h` C code calls prepared solvers. `free_rotor.h` has the closed form of a body
+    without torque in itself, and needs neither Python nor this package.
 
     Returns
     -------
@@ -41,7 +44,7 @@ def get_include() -> str:
     --------
     >>> from pathlib import Path
     >>> from pyharness import get_include
-    >>> Path(get_include(), "pyharness.h").exists()
-    True
+    >>> sorted(path.name for path in Path(get_include()).glob("*.h"))
+    ['free_rotor.h', 'pyharness.h']
     """
     return str(Path(__file__).parent.parent / "include")

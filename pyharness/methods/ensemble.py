@@ -26,6 +26,8 @@ class Ensemble(BatchResult):
     attitude : ndarray, shape (n, 4), or None
         Unit quaternions from body to space at the end, scalar first; None if they were not
         requested.
+    estimates : ndarray, shape (n, 2), or None
+        The columns `error` and `growth`; None if they were not requested.
 
     Examples
     --------
@@ -39,21 +41,55 @@ class Ensemble(BatchResult):
     """
 
     attitude: Array | None = None
+    estimates: Array | None = None
+
+    @property
+    def error(self) -> Array | None:
+        """The estimated error of each body's result, shape (n,); None if it was not requested.
+
+        The error of omega is relative to the largest component of omega from 0 to the end. With
+        attitudes it is the larger of this error and the error of the attitude's angle (rad). It is
+        NaN for a body without result, and for a method that does not estimate its error.
+        """
+        return None if self.estimates is None else self.estimates[:, 0]
+
+    @property
+    def growth(self) -> Array | None:
+        """The error amplification of each motion, shape (n,); None if it was not requested.
+
+        It is the largest norm of the state-transition matrices from time 0 to any later time, or an
+        upper bound of the largest norm to the end. It is NaN where it is unknown.
+        """
+        return None if self.estimates is None else self.estimates[:, 1]
+
+    def estimates_of(self, piece: slice) -> Array:
+        """Return the estimates of the bodies in `piece` as a kernel writes them, or an empty array.
+
+        The shape is (2, m), where m is the number of bodies, or (2, 0).
+        """
+        return _NO_ESTIMATES if self.estimates is None else self.estimates[piece].T
 
 
-def place_for(out: "Ensemble | Array | None", n: int, with_attitude: bool) -> Ensemble:
+_NO_ESTIMATES = np.empty((2, 0), order="F")
+
+
+def place_for(
+    out: "Ensemble | Array | None", n: int, with_attitude: bool, with_estimates: bool = False
+) -> Ensemble:
     """Return an Ensemble into whose arrays the results of n bodies can be written.
 
     If `out` is None, the arrays are new. If `out` is the Ensemble of an earlier call, it is
     returned. If `out` is an array of shape (n, 3), it becomes the array of omega, and the other
-    arrays are new. `with_attitude` states whether the results include attitudes. Raise InputError
-    if an array of `out` has the wrong shape or type.
+    arrays are new. `with_attitude` states whether the results include attitudes, `with_estimates`
+    whether they include estimates of error and error amplification. Raise InputError if an array of
+    `out` has the wrong shape or type.
     """
     shape = (n, 3)
     if out is None or isinstance(out, np.ndarray):
         omega = np.empty(shape) if out is None else buffer_of("out", out, shape, "d")
         attitude = np.empty((n, 4)) if with_attitude else None
-        return Ensemble(omega, np.empty(n, np.int8), attitude)
+        estimates = np.empty((n, 2)) if with_estimates else None
+        return Ensemble(omega, np.empty(n, np.int8), attitude, estimates)
     if not isinstance(out, Ensemble):
         raise InputError("out has the wrong type; allowed: an Ensemble, or an array of float64")
     buffer_of("out.omega", out.omega, shape, "d")
@@ -65,4 +101,11 @@ def place_for(out: "Ensemble | Array | None", n: int, with_attitude: bool) -> En
         )
     if out.attitude is not None:
         buffer_of("out.attitude", out.attitude, (n, 4), "d")
+    if (out.estimates is None) == with_estimates:
+        raise InputError(
+            "out.estimates does not match estimates; allowed: an array with estimates=True, None "
+            "without it"
+        )
+    if out.estimates is not None:
+        buffer_of("out.estimates", out.estimates, (n, 2), "d")
     return out

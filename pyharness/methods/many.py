@@ -17,10 +17,10 @@ from pyharness.methods.ensemble import place_for
 from pyharness.methods.many_scenes import (
     Axes,
     check_alike,
+    checked_rows,
     from_rows,
-    from_scene,
     from_scenes,
-    units_of,
+    rows_of_scene,
 )
 from pyharness.methods.many_space import (
     NO_ATTITUDE,
@@ -38,8 +38,8 @@ from pyharness.model.arrays import (
     rows_of,
     spread,
     threads_of,
-    waves_of,
 )
+from pyharness.model.attitude import scalar_first
 from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
@@ -47,13 +47,16 @@ from pyharness.model.extension import extension
 from pyharness.model.pieces import for_each_piece
 from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.trajectory import Array
+from pyharness.model.trajectory import ROUNDING, Array
 from pyharness.model.values import Number, boolean, finite
 from pyharness.model.waves import with_merged_rows
 
 _BODY = ("moments", "coefficients", "inertia")
 _TORQUE = ("torque_constant", "torque_rate", "sines", "cosines")
 _STARTS = ("omega0", "attitude0")
+_MERGED = ("torque_constant", "sines", "cosines")  # what `with_merged_rows` may change
+_NOTHING = np.empty((4, 0), order="F")  # in place of attitudes
+_UNKNOWN = -1.0  # a kernel's estimate of what it does not know
 
 
 def solve_many(
@@ -73,6 +76,7 @@ def solve_many(
     tolerance: Number | None = None,
     step: Number | None = None,
     effort: float = 1.0,
+    estimates: bool = False,
     threads: int = 1,
     out: "Ensemble | Array | None" = None,
     progress: bool = False,
@@ -88,9 +92,10 @@ def solve_many(
         Final time of each scene, s; positive, negative or 0.
     omega0 : array, shape (n, 3) or (3,)
         Initial angular velocities, rad/s. An array of one row is shared by all bodies.
-    attitude0 : array, shape (n, 4) or (4,)
-        Quaternions at time 0, from body to space, scalar first. The default is the scene's
-        attitude. If there is no initial attitude, no attitudes are returned.
+    attitude0 : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
+        Quaternions at time 0, from body to space, scalar first, of any norm; or SciPy rotations.
+        The default is the scene's attitude. If there is no initial attitude, no attitudes are
+        returned.
     moments, coefficients : array, shape (n, 3) or (3,)
         Principal moments (kg m2), or Euler's coefficients A, B, C; not both.
     inertia : array, shape (n, 3, 3) or (3, 3)
@@ -108,12 +113,16 @@ def solve_many(
         without torque and for each sphere, and the Taylor series for any other body.
     tolerance : float
         The largest allowed error of any component of omega at the end, relative to the largest
-        |omega| from 0 to the end, as in `prepare`. The default depends on the method.
+        |omega| from 0 to the end, as in `prepare`. With attitudes it is also the largest allowed
+        error of the attitude's angle (rad). The default depends on the method.
     step : float, optional
         Step size of Gauss collocation and of the methods with a fixed step, s. The default is the
         scene's step size.
     effort : float
         Factor on the work limit of a body. A body that exceeds the limit has the status `gave up`.
+    estimates : bool
+        Whether to return the estimated error of each result, and the error amplification of each
+        motion.
     threads : int
         Number of threads. The kernel releases the interpreter's lock (GIL).
     out : Ensemble, or array of shape (n, 3), optional
@@ -147,53 +156,54 @@ def solve_many(
            [ 1.196944, -1.602287,  5.      ]])
     """
     arrays = {
-        "omega0": omega0, "attitude0": attitude0, "moments": moments, "coefficients": coefficients,
-        "inertia": inertia, "torque_constant": torque_constant, "torque_rate": torque_rate,
-        "sines": sines, "cosines": cosines,
+        "omega0": omega0, "attitude0": scalar_first(attitude0), "moments": moments,
+        "coefficients": coefficients, "inertia": inertia, "torque_constant": torque_constant,
+        "torque_rate": torque_rate, "sines": sines, "cosines": cosines,
     }  # fmt: skip
     with bar_of_bodies(boolean("progress", progress)):
         return _solved(
             scene, t_end, arrays, out, step, method=method, tolerance=tolerance, effort=effort,
-            threads=threads,
+            estimates=boolean("estimates", estimates), threads=threads,
         )  # fmt: skip
 
 
 def _solved(
     scene: Scene | Sequence[Scene], t_end: Any, arrays: dict[str, Any],
     out: "Ensemble | Array | None", step: Number | None, *, method: str, tolerance: Number | None,
-    effort: float, threads: int,
+    effort: float, estimates: bool, threads: int,
 ) -> Ensemble:  # fmt: skip
     """Return the final states of many scenes; `arrays` has the arrays of `solve_many` by name."""
-    kinds, torques, starts = (
-        {name: arrays[name] for name in names} for names in (_BODY, _TORQUE, _STARTS)
-    )
-    own = {name: value for name, value in {**starts, **torques}.items() if value is not None}
-    kind = only_one(kinds)
-    settings: dict[str, Any] = {
-        "method": method, "tolerance": tolerance, "effort": effort, "threads": threads,
-    }  # fmt: skip
+    own = {name: value for name, value in arrays.items() if value is not None}
+    kind = only_one({name: own[name] for name in _BODY if name in own})
+    ready: dict[str, Any] = {}
+    axes: Axes | None = None
     if isinstance(scene, Scene):
         if kind and scene.changing is not None:  # the arrays give other bodies
             scene = replace(scene, changing=None, moments=(1.0, 1.0, 1.0))
-        if is_solved_alone(scene, torques):
+        if is_solved_alone(scene, {name: own[name] for name in _TORQUE if name in own}):
             _, asked = _chosen(method, tolerance)
             return solve_one_by_one(
-                scene, t_end, {**torques, **kinds, **starts}, out, method=method, tolerance=asked,
-                effort=checked_effort(effort), threads=threads_of(threads),
+                scene, t_end, {name: arrays[name] for name in (*_TORQUE, *_BODY, *_STARTS)}, out,
+                method=method, tolerance=asked, effort=checked_effort(effort),
+                estimates=estimates, threads=threads_of(threads),
             )  # fmt: skip
+        step_size = scene.step_size
         if kind == "inertia" or (scene.inertia is not None and not kind):
-            given = from_rows(inertia_scenes(scene, {**torques, **kinds}))
-            own = {name: value for name, value in own.items() if name in starts}
-            given |= {"step": scene.step_size, **own}
-            given["axes"].about_principal(given, own)
-            own = {}
+            given, axes = from_rows(
+                inertia_scenes(scene, {name: arrays[name] for name in (*_TORQUE, *_BODY)})
+            )
+            starts = {name: own[name] for name in _STARTS if name in own}
+            own = {**given, **starts}
+            axes.about_principal(own, starts)
         else:
             if scene.inertia is not None:  # the arrays give other bodies
                 scene = replace(scene, inertia=None, moments=(1.0, 1.0, 1.0))
-            given = from_scene(scene)
+            ready = rows_of_scene(scene)
     else:
         scene = list(scene)
-        for name in filter(None, (*own, kind)):
+        for name in (*_STARTS, *_TORQUE, *_BODY):
+            if name not in own:
+                continue
             raise InputError(
                 f"{name} is given beside many scenes; allowed: arrays with one scene, or many "
                 "scenes without arrays"
@@ -202,23 +212,29 @@ def _solved(
             if (len(scene) > 1 and not all(each.inertia is not None for each in scene)) or any(
                 is_solved_alone(each, {}) for each in scene
             ):
-                return _solve_groups(scene, t_end, step, out, **settings)
+                return _solve_groups(
+                    scene, t_end, step, out, method=method, tolerance=tolerance, effort=effort,
+                    estimates=estimates, threads=threads,
+                )  # fmt: skip
             check_alike(scene)
-            given = {**from_rows(scene), "step": scene[0].step_size}
+            own, axes = from_rows(scene)
         else:
-            given = from_scenes(scene)
-    if kind and kind != "inertia":
-        given |= {"by_moments": kind == "moments", "body": kinds[kind]}
-    given.update(own)
-    given["step"] = finite("step", given["step"] if step is None else step)
+            own = from_scenes(scene)
+        step_size = scene[0].step_size
+    if step is not None:
+        step_size = finite("step", step)
     code, asked = _chosen(method, tolerance)
-    bodies = _Bodies(given, t_end, code, asked, checked_effort(effort))
+    bodies = _Bodies(ready, {**own, "t_end": t_end}, step_size, code, asked, checked_effort(effort))
     if bodies.attitude is not None:
         check_attitude(method)
-    found = bodies.solve(threads_of(threads), out)
-    axes: Axes | None = given["axes"]
+    found = bodies.solve(threads_of(threads), out, estimates)
     if axes is not None:
         axes.give_back(found.omega, found.attitude)
+        if found.error is not None and bodies.attitude is not None:
+            # The initial omega was rounded after the rotation to principal axes.
+            found.error[:] += (
+                ROUNDING * np.max(np.abs(bodies.omega0), axis=1) * np.abs(bodies.times)
+            )
     return found
 
 
@@ -246,7 +262,7 @@ def _solve_groups(
     times, n = rows_of("t_end", t_end), len(scenes)
     check_rows("t_end", times, n)
     times = spread(times, n)
-    found = place_for(out, n, scenes[0].attitude is not None)
+    found = place_for(out, n, scenes[0].attitude is not None, settings["estimates"])
     expect_bodies(n)
     groups: dict[int, list[int]] = {}
     for row, each in enumerate(scenes):
@@ -258,75 +274,89 @@ def _solve_groups(
         found.omega[rows], found.status[rows] = part.omega, part.status
         if found.attitude is not None:
             found.attitude[rows] = part.attitude
+        if found.estimates is not None:
+            found.estimates[rows] = part.estimates
     return found
 
 
 class _Bodies:
     """The checked arguments of the kernel that solves n bodies in one call.
 
-    The constructor takes the arrays by name (`given`), the final times `t_end` (s), and the integer
-    that selects the method in the kernel (`code`). An array of one row is shared by all bodies.
-    `tolerance` is the largest allowed error, relative to the largest |omega|, and `effort`
-    multiplies the work limit of a body.
+    `ready` contains the rows of a scene, as `rows_of_scene` returns them, and may be empty. `own`
+    contains further arrays by name, which replace those of the scene, and the final times `t_end`
+    (s). An array of one row is shared by all bodies. `step` (s) is the step size of the methods
+    with a fixed step, and `code` the integer that selects the method in the kernel. `tolerance` is
+    the largest allowed error, relative to the largest |omega|, and `effort` multiplies the work
+    limit of a body.
     """
 
     def __init__(
-        self, given: dict[str, Any], t_end: Any, code: int, tolerance: float, effort: float
-    ) -> None:
-        self.by_moments = bool(given["by_moments"])
-        body = "moments" if self.by_moments else "coefficients"
-        shared = {"omega0": given["omega0"], body: given["body"]}
-        shared |= {name: given[name] for name in ("torque_constant", "torque_rate")}
-        rows = {name: rows_of(name, each, 3) for name, each in shared.items()}
-        rows |= {name: waves_of(name, given[name]) for name in ("sines", "cosines")}
-        rows["t_end"] = rows_of("t_end", t_end)
-        if given["attitude0"] is not None:
-            rows["attitude0"] = units_of(given["attitude0"])
-        self.n = count_bodies(rows)
-        self.body, self.rate, self.times = rows[body], rows["torque_rate"], rows["t_end"]
+        self, ready: dict[str, Any], own: dict[str, Any], step: float, code: int, tolerance: float,
+        effort: float,
+    ) -> None:  # fmt: skip
+        given = checked_rows(own)
+        self.n = count_bodies(given)
+        rows = {**ready, **given}
+        self.by_moments = "moments" in (given if "coefficients" in given else rows)
+        self.body = rows["moments" if self.by_moments else "coefficients"]
+        self.rate, self.times = rows["torque_rate"], rows["t_end"]
         self.attitude = rows.get("attitude0")
-        self.constant, self.sines, self.cosines = with_merged_rows(
-            rows["torque_constant"], rows["sines"], rows["cosines"]
-        )
+        law: tuple[Array, Array, Array] | None = ready.get("merged")
+        if law is None or not given.keys().isdisjoint(_MERGED):
+            law = with_merged_rows(*(rows[name] for name in _MERGED))
+        self.constant, self.sines, self.cosines = law
         self.omega0 = spread(rows["omega0"], self.n)
-        self.step = given["step"]
-        if not self.step > 0.0:
-            raise InputError(f"step is {self.step:g}; allowed: above 0")
+        self.step = step
+        if not step > 0.0:
+            raise InputError(f"step is {step:g}; allowed: above 0")
         self.code, self.tolerance, self.effort = code, tolerance, effort
+        if code == Methods.CLOSED_FORM:
+            self._check_form()
+
+    def _check_form(self) -> None:
         torques = (self.constant, self.rate, self.sines[..., :3], self.cosines[..., :3])
-        if code == Methods.CLOSED_FORM and any(each.any() for each in torques):
+        if any(each.any() for each in torques):
             raise InputError(
                 "closed-form can't solve bodies with a torque in one call; allowed: auto, taylor"
             )
-        if code == Methods.CLOSED_FORM and self.attitude is not None and not self.by_moments:
+        if self.attitude is not None and not self.by_moments:
             raise InputError(
                 "closed-form can't compute the attitude of bodies given by coefficients; "
                 "allowed: moments, or methods auto and taylor"
             )
 
-    def solve(self, threads: int, out: "Ensemble | Array | None") -> Ensemble:
+    def solve(self, threads: int, out: "Ensemble | Array | None", with_estimates: bool) -> Ensemble:
         """Return the final states of all bodies, computed in at most `threads` threads.
 
-        The states are omega, status and, if requested, attitude. They are written into `out` if it
-        is not None.
+        The states are omega, status and, if requested, attitude and estimates. They are written
+        into `out` if it is not None.
         """
-        found = place_for(out, self.n, self.attitude is not None)
+        found = place_for(out, self.n, self.attitude is not None, with_estimates)
+        if found.estimates is not None:
+            found.estimates[:] = _UNKNOWN
+        # A kernel may write a result before it reads the start again.
+        if np.may_share_memory(self.omega0, found.omega):
+            self.omega0 = self.omega0.copy()
+        attitude = self.attitude
+        if attitude is not None and np.may_share_memory(attitude, found.attitude):
+            self.attitude = attitude.copy()
         for_each_piece(partial(self._enter, found), self.n, threads)
+        if found.estimates is not None:
+            found.estimates[~(found.estimates >= 0.0)] = np.nan
         return found
 
     def _enter(self, found: Ensemble, piece: slice, given_up: NDArray[np.int32]) -> None:
         def part(array: Array) -> Array:
-            cut = array if len(array) in (0, 1) else array[piece]
-            return cut.T
+            return (array if len(array) in (0, 1, piece.stop - piece.start) else array[piece]).T
 
-        nothing = np.empty((4, 0), order="F")
-        attitude = nothing if self.attitude is None else part(self.attitude)
         extension().solve_ensemble(
             self.code, self.tolerance, self.step, self.effort, self.by_moments,
             part(self.body), part(self.constant), part(self.rate), part(self.sines),
-            part(self.cosines), self.omega0[piece].T, part(self.times), attitude, given_up,
+            part(self.cosines), part(self.omega0), part(self.times),
+            _NOTHING if self.attitude is None else part(self.attitude), given_up,
             found.omega[piece].T,
-            nothing if found.attitude is None else found.attitude[piece].T, found.status[piece],
+            _NOTHING if found.attitude is None else found.attitude[piece].T, found.status[piece],
+            found.estimates_of(piece),
         )  # fmt: skip
 
 

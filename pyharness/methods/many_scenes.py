@@ -1,18 +1,22 @@
 """Conversion of scenes to the arrays of `solve_many`, about principal axes where necessary."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from pyharness.methods.prepared_inertia import axes_and_turn, rotated, turned_back
-from pyharness.model.arrays import check_rows, rows_of
+from pyharness.model.arrays import check_rows, rows_of, unit_quaternions, waves_of
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError
 from pyharness.model.principal import principal
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import Array
+from pyharness.model.waves import with_merged_rows
+
+_MOST_KEPT = 8  # scenes whose arrays are kept
 
 
 class Axes:
@@ -40,7 +44,7 @@ class Axes:
             self._check("omega0", rows)
             given["omega0"] = rotated(rows, self.axes.transpose(0, 2, 1))
         if "attitude0" in names:
-            attitudes = units_of(given["attitude0"])
+            attitudes = unit_quaternions(rows_of("attitude0", given["attitude0"], 4))
             self._check("attitude0", attitudes)
             conjugate = self.turns * np.array([1.0, -1.0, -1.0, -1.0])
             given["attitude0"] = turned_back(attitudes, conjugate)
@@ -60,24 +64,23 @@ class Axes:
             check_rows(name, rows, len(self.axes))
 
 
-def from_rows(rows: Sequence[Scene | None]) -> dict[str, Any]:
+def from_rows(rows: Sequence[Scene | None]) -> tuple[dict[str, Any], Axes]:
     """Return scenes with a full inertia matrix as arrays about principal axes.
 
-    The result is a dict of the arrays of `solve_many`, with one row for each scene, and the `Axes`.
-    If `rows` contains None in place of a scene, the row is NaN, and the kernel returns the status
-    REFUSED for it. The arrays contain the coefficients A, B, C instead of moments, because the
-    function `principal` computes them more accurately than they can be computed from rounded
-    moments.
+    The first result is a dict of the arrays of `solve_many`, with one row for each scene. If `rows`
+    contains None in place of a scene, the row is NaN, and the kernel returns the status REFUSED for
+    it. The arrays contain the coefficients A, B, C instead of moments, because the function
+    `principal` computes them more accurately than they can be computed from rounded moments.
     """
     each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
     axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))
-    return {**_stacked(each), "by_moments": False, "axes": axes}
+    return _stacked(each), axes
 
 
 _NONE = (math.nan, math.nan, math.nan)
 _REFUSED: dict[str, Any] = {
-    "body": _NONE, "omega0": _NONE, "torque_constant": _NONE, "torque_rate": _NONE, "sines": [],
-    "cosines": [], "axes": np.eye(3), "turn": IDENTITY, "attitude0": None,
+    "coefficients": _NONE, "omega0": _NONE, "torque_constant": _NONE, "torque_rate": _NONE,
+    "sines": [], "cosines": [], "axes": np.eye(3), "turn": IDENTITY, "attitude0": None,
 }  # fmt: skip
 
 
@@ -85,7 +88,7 @@ def _full_row(scene: Scene) -> dict[str, Any]:
     turned, axes = principal(scene)
     law, moments = turned.body_torque, np.array(turned.moments)
     return {
-        "body": turned.euler_coefficients,
+        "coefficients": turned.euler_coefficients,
         "omega0": turned.omega,
         "torque_constant": np.array(law.constant) / moments,
         "torque_rate": np.array(law.rate) / moments,
@@ -107,26 +110,62 @@ def _filled(laws: list[Any]) -> list[Any]:
     return [waves + [[0.0] * 4] * (most - len(waves)) for waves in laws]
 
 
-def from_scene(scene: Scene) -> dict[str, Any]:
+def _from_scene(scene: Scene) -> dict[str, Any]:
     """Return the quantities of a scene as a dict of arguments of `solve_many`.
 
-    The keys are names such as `omega0` and `torque_constant`. The key `by_moments` states whether
-    the body is given by moments. The key `body` has the moments (kg m2) in this case, else the
-    coefficients A, B, C.
+    The keys are names such as `omega0` and `torque_constant`. The body is given either by `moments`
+    or by `coefficients`.
     """
     law = checked_scene(scene).body_torque
+    kind = "coefficients" if scene.moments is None else "moments"
     return {
-        "by_moments": scene.moments is not None,
-        "body": scene.moments or scene.coefficients,
-        "axes": None,
+        kind: getattr(scene, kind),
         "omega0": scene.omega,
         "torque_constant": law.constant,
         "torque_rate": law.rate,
         "sines": [[*amplitude, frequency] for amplitude, frequency in law.sines],
         "cosines": [[*amplitude, frequency] for amplitude, frequency in law.cosines],
         "attitude0": scene.attitude,
-        "step": scene.step_size,
     }
+
+
+_kept: dict[int, tuple[Scene, dict[str, Any]]] = {}
+
+
+def rows_of_scene(scene: Scene) -> dict[str, Any]:
+    """Return the quantities of a scene as arrays of one row, which the caller must not change.
+
+    The result has the arrays of `_from_scene` by name, as `checked_rows` returns them. `merged` is
+    the tuple of the constant torque, the sines and the cosines after `with_merged_rows`. The
+    arrays of the last scenes are kept, because for few bodies their conversion takes longer than
+    the solution.
+    """
+    # Equal scenes may differ in the signs of zeros. Hence an entry holds for one object only, and
+    # keeps it alive so that no other object gets its identity.
+    found = _kept.get(id(scene))
+    if found is not None:
+        return found[1]
+    rows: dict[str, Any] = checked_rows(_from_scene(scene))
+    rows["merged"] = with_merged_rows(rows["torque_constant"], rows["sines"], rows["cosines"])
+    if len(_kept) >= _MOST_KEPT:
+        _kept.clear()
+    _kept[id(scene)] = scene, rows
+    return rows
+
+
+def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
+    """Return the arrays of `solve_many` as float arrays with one row per body, or one shared row.
+
+    `given` contains a user's arrays, or those of scenes, by name. The result contains no array for
+    an attitude of None. Raise InputError for an array of another shape, or whose elements are not
+    real numbers.
+    """
+    rows = {}
+    for name, convert in _CONVERSIONS.items():
+        values = given.get(name)
+        if values is not None or (name == "t_end" and name in given):
+            rows[name] = convert(values)
+    return rows
 
 
 def check_alike(scenes: Sequence[Scene]) -> None:
@@ -151,8 +190,8 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
     if not scenes:
         raise InputError("the sequence of scenes is empty; give at least one scene")
     check_alike(scenes)
-    rows = [from_scene(each) for each in scenes]
-    if len({row["by_moments"] for row in rows}) > 1:
+    rows = [_from_scene(each) for each in scenes]
+    if len({"moments" in row for row in rows}) > 1:
         raise InputError(
             "some bodies are given by coefficients and others are not; allowed: "
             "coefficients for all, or for none"
@@ -163,12 +202,12 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return a dict of arrays with one row for each body, from one dict for each body.
 
-    `rows` contains the dicts of the bodies. A quantity that must be the same for all bodies, such
-    as the step size, is taken from the first dict.
+    `rows` contains the dicts of the bodies, all with moments or all with coefficients.
     """
-    found = {**rows[0]}
-    for name in ("body", "omega0", "torque_constant", "torque_rate"):
-        found[name] = np.array([row[name] for row in rows])
+    found: dict[str, Any] = {"attitude0": None}
+    for name in ("moments", "coefficients", "omega0", "torque_constant", "torque_rate"):
+        if name in rows[0]:
+            found[name] = np.array([row[name] for row in rows])
     for name in ("sines", "cosines"):
         found[name] = _filled([row[name] for row in rows])
     if any(row["attitude0"] is not None for row in rows):
@@ -176,13 +215,14 @@ def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def units_of(values: Any) -> Array:
-    """Return the quaternions `values` divided by their norms, shape (n, 4).
-
-    A quaternion that can't be normalised, such as four zeros, becomes NaN.
-    """
-    found = rows_of("attitude0", values, 4)
-    with np.errstate(all="ignore"):
-        found = found / np.abs(found).max(axis=1, keepdims=True)
-        units: Array = found / np.sqrt((found * found).sum(axis=1, keepdims=True))
-    return units
+# The arrays of `solve_many`, in the order in which they are checked.
+_CONVERSIONS: dict[str, Callable[[Any], Array]] = {
+    **{
+        name: lambda values, name=name: rows_of(name, values, 3)  # type: ignore[misc]
+        for name in ("omega0", "moments", "coefficients", "torque_constant", "torque_rate")
+    },
+    "sines": partial(waves_of, "sines"),
+    "cosines": partial(waves_of, "cosines"),
+    "t_end": partial(rows_of, "t_end"),
+    "attitude0": lambda values: rows_of("attitude0", values, 4),
+}

@@ -5,7 +5,7 @@ matrices. Bodies under such torques are also solved in this module, one after th
 solvers.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.methods.ensemble import Ensemble, place_for
+from pyharness.methods.many_recorded import solve_side_by_side
 from pyharness.methods.prepared import prepare
 from pyharness.methods.registry import check_prepared, check_torque
 from pyharness.model.arrays import count_bodies, row_of, rows_of, waves_of
@@ -53,7 +54,7 @@ def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
 
 def solve_one_by_one(
     scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
-    method: str, tolerance: float, effort: float, threads: int,
+    method: str, tolerance: float, effort: float, estimates: bool, threads: int,
 ) -> Ensemble:  # fmt: skip
     """Return the final states of many bodies, each of which is solved alone.
 
@@ -83,16 +84,24 @@ def solve_one_by_one(
         counted["attitude0"] = rows_of("attitude0", attitude0, 4)
     n = count_bodies(counted)
     at_rest = replace(scene, omega=_REST, attitude=None)
-    found = place_for(out, n, with_attitude)
+    found = place_for(out, n, with_attitude, estimates)
+    if found.estimates is not None:
+        found.estimates[:] = np.nan
     settings: Any = {"effort": effort, "attitude": with_attitude}
     # All bodies share one solver if they differ in their starts alone.
     shared = None if rows else prepare(at_rest, method, tolerance, **settings)
     # `omega0` or `attitude0` may share memory with `out`.
-    omega, attitude = np.full((n, 3), np.nan), np.full((n, 4), np.nan)
+    omega = np.full((n, 3), np.nan)
+    attitude = np.full((n, 4), np.nan) if with_attitude else None
     found.status[:] = Statuses.REFUSED
 
     def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
-        for i in range(piece.start, piece.stop):
+        left: Sequence[int] = range(piece.start, piece.stop)
+        if shared is not None:
+            turns = counted.get("attitude0")
+            whole = Ensemble(omega, found.status, attitude, found.estimates)
+            left = solve_side_by_side(shared, starts, times, turns, whole, piece, given_up)
+        for i in left:
             if given_up[0]:
                 return
             try:
@@ -100,7 +109,7 @@ def solve_one_by_one(
                     scene_of_row(at_rest, rows, i), method, tolerance, **settings
                 )
                 start, time = row_of(starts, i), float(row_of(times, i))
-                if with_attitude:
+                if attitude is not None:
                     turn = row_of(counted["attitude0"], i)
                     omega[i], attitude[i] = solver(start, time, turn)
                 else:
@@ -108,10 +117,14 @@ def solve_one_by_one(
             except InputError:
                 continue
             found.status[i] = ENDS.index(solver.status)
+            if found.estimates is not None:
+                found.estimates[i] = [
+                    np.nan if each is None else each for each in (solver.error, solver.growth)
+                ]
 
     for_each_piece(enter, n, threads)
     found.omega[:] = omega
-    if found.attitude is not None:
+    if found.attitude is not None and attitude is not None:
         found.attitude[:] = attitude
     return found
 

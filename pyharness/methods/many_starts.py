@@ -26,6 +26,8 @@ def many_starts(
     n = len(starts)
     check_rows("t_end", times, n)
     omega = np.empty((n, 3)) if out is None else buffer_of("out", out, (n, 3), "d")
+    if np.may_share_memory(starts, omega):  # a kernel may write a result before it reads the start
+        starts = starts.copy()
     status = np.empty(n, np.int8)
 
     def enter(piece: slice, given_up: NDArray[np.int32]) -> None:

@@ -1,11 +1,16 @@
 """Prepared solvers whose calls return the attitude together with omega."""
 
+from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from pyharness.dynamics.system import is_recorded
 from pyharness.methods.last_call import LastCall
+from pyharness.methods.many_attitudes import many_attitudes
 from pyharness.methods.packed import packed_scene
 from pyharness.methods.plan import Plan, plan
 from pyharness.methods.registry import check_attitude
@@ -13,6 +18,7 @@ from pyharness.model.attitude import IDENTITY, Quaternion, unit_quaternion
 from pyharness.model.codes import Methods, Places
 from pyharness.model.extension import extension
 from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
 from pyharness.model.values import number, three_floats
 
 if TYPE_CHECKING:
@@ -42,9 +48,13 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
     ----------
     plan : Plan
         The chosen method, and the parts of the computation that are carried out, with reasons.
+    many : callable
+        A function that solves the scene from many initial omegas and attitudes in one call.
     """
 
     _with_attitude = True
+    packed: Array
+    _code: int
 
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
         """Create a solver and pack the data that all calls share; users call `prepare` instead.
@@ -69,9 +79,24 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
         solver = super().__new__(
             cls, kernel, packed, partial(_check, attitude), packed_with_gil, attitude
         )
-        solver.plan = chosen
+        solver.plan, solver.packed, solver._code = chosen, packed, code
         solver._given = tolerance, asked, effort
         return solver
+
+    @cached_property
+    def many(self) -> Callable[..., tuple[Array, Array, NDArray[np.int8]]]:
+        """Return the function that solves many initial omegas and attitudes in one call.
+
+        Call it as ``solver.many(omega0, t_end, attitude0=None, threads=1, out=None)``. `omega0`
+        (rad/s) has shape (n, 3). `t_end` (s) is one number or has shape (n,). `attitude0` has shape
+        (n, 4) or (4,), and by default it is the scene's attitude, as in a call of the solver. A
+        call returns three arrays: omega at `t_end` (rad/s), shape (n, 3); the attitudes, shape (n,
+        4); and the statuses, int8, shape (n,), with the values that `Ensemble` documents. They are
+        written into the Ensemble or the array of omega that is passed as `out`, if it is not None.
+        The result of a row does not depend on the other rows or on the number of threads. An
+        argument of another type or shape raises an InputError.
+        """
+        return partial(many_attitudes, self, self._code)
 
 
 def prepared_attitude(scene: Scene, method: str, tolerance: float, effort: float) -> AttitudeSolver:

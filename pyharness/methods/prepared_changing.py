@@ -12,6 +12,7 @@ from pyharness.methods.plan import plan
 from pyharness.methods.prepared_attitude import AttitudeSolver, attitude_plan
 from pyharness.methods.solver import Solver
 from pyharness.model.arrays import rows_of
+from pyharness.model.attitude import Rotation
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Number, Numbers, number
@@ -45,7 +46,7 @@ class ChangingSolver(Solver):
         times = rows_of("t_end", t_end)
         # The kernel refuses a time that is not finite.
         reached = np.where((first < times) & (times < last), times, math.nan)
-        return many_starts(self._packed, omega0, reached, threads=threads, out=out)
+        return many_starts(self.packed, omega0, reached, threads=threads, out=out)
 
 
 class ChangingAttitudeSolver(AttitudeSolver):
@@ -55,7 +56,7 @@ class ChangingAttitudeSolver(AttitudeSolver):
     """
 
     def __call__(
-        self, omega0: Numbers, t_end: Number, attitude0: Numbers | None = None
+        self, omega0: Numbers, t_end: Number, attitude0: Numbers | Rotation | None = None
     ) -> tuple[Array, Array]:
         """Return omega (rad/s) and the attitude at `t_end` (s); see `AttitudeSolver`."""
         _check_time(self.plan.scene, number("t_end", t_end))

@@ -16,7 +16,7 @@ from pyharness.methods.plan import Plan
 from pyharness.methods.prepared_attitude import AttitudeSolver
 from pyharness.methods.solver import Solver, no_buffer
 from pyharness.model.arrays import buffer_of, rows_of
-from pyharness.model.attitude import IDENTITY, Quaternion, product, unit_quaternion
+from pyharness.model.attitude import IDENTITY, Quaternion, Rotation, product, unit_quaternion
 from pyharness.model.errors import InputError
 from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
@@ -99,7 +99,7 @@ class InertiaSolver(Solver):
         starts = rotated(rows_of("omega0", omega0, 3), self._axes.T)
         if out is not None:
             buffer_of("out", out, starts.shape, "d")
-        ends, status = many_starts(self._packed, starts, t_end, threads=threads, out=out)
+        ends, status = many_starts(self.packed, starts, t_end, threads=threads, out=out)
         ends[:] = rotated(ends, self._axes)
         return ends, status
 
@@ -144,7 +144,7 @@ class InertiaAttitudeSolver(AttitudeSolver):
         return type(self), (self.plan, *self._given, self._scene)
 
     def __call__(
-        self, omega0: Numbers, t_end: Number, attitude0: Numbers | None = None
+        self, omega0: Numbers, t_end: Number, attitude0: Numbers | Rotation | None = None
     ) -> tuple[Array, Array]:
         """Return omega (rad/s), shape (3,), and the attitude, shape (4,), at `t_end` (s).
 

@@ -1,0 +1,846 @@
+/* Many bodies under one torque that depends on the state, one in each lane of a register: Taylor
+   series with a step of its own for each body. When a body reaches its end, the next one takes its
+   lane. The truncation error of each step is estimated, propagated to the end and subtracted there.
+   A body whose error can't be relied on, or whose series is not what a step expects, is left to the
+   single-body kernel. This is C because no Fortran compiler keeps eight sums in registers. */
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "../modern/tape.h"
+
+/* Bodies in a register. Wider vectors of the compiler would be taken apart number by number. */
+#if defined(__AVX512F__)
+enum { SIDE_BY_SIDE = 8 };
+#elif defined(__AVX__)
+enum { SIDE_BY_SIDE = 4 };
+#else
+enum { SIDE_BY_SIDE = 2 };
+#endif
+
+typedef double lanes __attribute__((vector_size(8 * SIDE_BY_SIDE)));
+typedef long long bits __attribute__((vector_size(8 * SIDE_BY_SIDE)));
+
+enum { COMPLETE = 0 };                        /* as in codes.py */
+enum { LEAST_ORDER = 8, MOST_ORDER = 27, TERMS = MOST_ORDER + 1 };
+enum { MANY = 3 };                            /* factors of a product that may not show early */
+enum { FEW_TERMS = 5 };                       /* of values amid a step */
+enum { CARRIED = 6 };                         /* terms of an exponential */
+enum { PROBES = 3, VECTORS = PROBES + 1 };    /* perturbations; with the truncation error */
+enum { MOST_TRIES = 40, MOST_STEPS = 20000 }; /* of a step; of a body */
+enum { HALVINGS = 12 };                       /* of a step whose series do not converge */
+enum { BETWEEN_LOOKS = 10000 };               /* steps between polls for an interrupt */
+
+static const double TRUSTED = 0.4;     /* largest error that is subtracted, in tolerances */
+static const double DOUBTED = 64.0;    /* amplification at which it is half of that */
+static const double SURE = 0.1;        /* largest amplified rounding error, in tolerances */
+static const double MOST_GROWTH = 1e3; /* largest amplification */
+static const double ROUNDING = 0x1p-53;
+static const double A_STEP = 3.0;      /* largest norm of an exponent that is taken at once */
+static const double MOST_ANGLE = 5e3;  /* rad of a motion: longer ones need precise variations */
+static const double ROUNDINGS = 4.0;   /* of an unknown that add up before they are amplified */
+/* Factors on the subtracted error and on the last terms for the stated error, as in many_taylor. */
+static const double WRONG = 2.0, UNSEEN = 0.1;
+static const double SHARE = 0.25;      /* of the tolerance, for the truncation errors */
+static const double RIDGE = 1.001;     /* makes the fit work for one pole or none */
+static const double FAR = 1e60;        /* products of numbers from 1/FAR to FAR are finite */
+static const double LEAST = 1e-290;
+static const double SHORTER = 0.5;     /* least factor on a step that is not expanded again */
+static const double LONGER = 4.0;      /* largest factor */
+/* Largest difference of a derivative and that of its series at the end of a step, times the step,
+   over order times local tolerance, and over the rounding errors. */
+static const double MOST_DEFECT = 4.0;
+static const double MOST_ROUNDING = 1e3;
+static const double MOST_CANCELLED = 1e3; /* largest sum of the terms of a step, relative */
+static const double WITHIN_CIRCLE = 0.9;  /* as in tape_plan.f90 */
+static const double INVISIBLE = 100.0;    /* as in tape_powers.f90, and the next one too */
+static const double PART_OF_ORDER = 0.6;
+
+typedef lanes series[TERMS];
+
+/* tape_bodies_t of tape.f90. */
+struct bodies {
+  struct tape tape;
+  const int *table_starts;
+  const double *breaks;
+  const double (*pieces)[4];
+  double tolerance;
+  int n_slots, n_tables, n, n_times, interrupted;
+  const double (*omega0)[3], (*attitude0)[4];
+  const double *times;
+  double (*omega)[3], (*attitude)[4];
+  int8_t *status;
+  double (*estimates)[2]; /* relative error, amplification; or NULL */
+};
+
+/* What is known of the bodies that are being integrated. */
+struct group {
+  const struct bodies *all;
+  int n, order;
+  int body[SIDE_BY_SIDE], steps[SIDE_BY_SIDE], tries[SIDE_BY_SIDE]; /* body: -1 for none */
+  series *a;                      /* terms of each slot */
+  int *depends;                   /* of each slot: the unknowns on which it depends, as bits */
+  lanes *middle, *tangents, *noises; /* of each slot: value amid the step, tangent, rounding error */
+  lanes y[MOST_UNKNOWNS], low[MOST_UNKNOWNS]; /* unknowns and their rounding errors */
+  lanes error[MOST_UNKNOWNS];     /* truncation error, propagated so far */
+  lanes probes[PROBES][MOST_UNKNOWNS]; /* perturbations since time 0 */
+  lanes slope[MOST_UNKNOWNS];     /* derivatives times the step at its end, by the last series */
+  lanes weights[MOST_UNKNOWNS];   /* make the unknowns comparable */
+  lanes end, t, t_low, rest, h, previous, scale, local, allowed, worst, noise;
+  lanes growth;                   /* square of the amplification */
+  bits is_first;                  /* before the first step */
+  bits is_checked;                /* whether `slope` is compared with the derivatives */
+  bits fails;                     /* left to the single-body kernel */
+};
+
+extern int interrupt_raised(void);
+
+static inline lanes all_of(double x) { return (lanes){0.0} + x; }
+static inline lanes select_of(bits mask, lanes a, lanes b)
+{
+  return (lanes)(((bits)a & mask) | ((bits)b & ~mask));
+}
+static inline lanes absolute(lanes x) { return (lanes)((bits)x & 0x7fffffffffffffffLL); }
+static inline lanes larger(lanes a, lanes b) { return select_of(a > b, a, b); }
+static inline lanes smaller(lanes a, lanes b) { return select_of(a < b, a, b); }
+static inline int any(bits mask)
+{
+  long long found = 0;
+  for (int i = 0; i < SIDE_BY_SIDE; i++) found |= mask[i];
+  return found != 0;
+}
+
+static inline lanes each_of(double (*function)(double), lanes x)
+{
+  for (int i = 0; i < SIDE_BY_SIDE; i++) x[i] = function(x[i]);
+  return x;
+}
+
+/* Return (allowed/last)**(1/order), to some percent: the bits of a positive number, read as an
+   integer, are nearly its logarithm. */
+static inline lanes ratio_of(int order, lanes allowed, lanes last)
+{
+  const bits difference = (bits)allowed - (bits)larger(last, all_of(LEAST));
+  return (lanes)(difference / order + (bits)all_of(1.0));
+}
+
+static inline lanes combined(const struct group *g, int n, int k)
+{
+  const struct tape *tape = &g->all->tape;
+  lanes sum = all_of(k == 0 ? tape->constants[n] : 0.0);
+  for (int i = tape->starts[n] - 1; i < tape->starts[n + 1] - 1; i++)
+    sum += tape->coefficients[i] * g->a[tape->slots[i] - 1][k];
+  return sum;
+}
+
+/* Return the piece of a table that holds just after the time t, or just before it. */
+static int piece_at(const struct bodies *all, int table, double t, int forward)
+{
+  int low = all->table_starts[table], high = all->table_starts[table + 1];
+  while (high - low > 1) {
+    const int middle = (low + high) / 2;
+    const double start = all->breaks[middle - 1];
+    if (start < t || (forward && start <= t)) low = middle;
+    else high = middle;
+  }
+  return low - 1;
+}
+
+/* Return the first breakpoint of any table between t and the end; the end if there is none. */
+static double next_break(const struct bodies *all, double t, double end)
+{
+  for (int n = 0; n < all->n_tables; n++) {
+    const int place = piece_at(all, n, t, end > t);
+    if (end > t && place + 1 < all->table_starts[n + 1] - 1) end = fmin(end, all->breaks[place + 1]);
+    else if (end <= t && place > all->table_starts[n] - 1) end = fmax(end, all->breaks[place]);
+  }
+  return end;
+}
+
+static void set_table(struct group *g, int number, lanes *out)
+{
+  const struct bodies *all = g->all;
+  for (int k = 0; k <= g->order; k++) out[k] = all_of(0.0);
+  for (int i = 0; i < SIDE_BY_SIDE; i++) {
+    const double h = g->h[i];
+    const int n = piece_at(all, number, g->t[i], h > 0.0);
+    const double *c = all->pieces[n], u = (g->t[i] - all->breaks[n]) + g->t_low[i];
+    out[0][i] = c[0] + u * (c[1] + u * (c[2] + u * c[3]));
+    out[1][i] = h * (c[1] + u * (2.0 * c[2] + 3.0 * u * c[3]));
+    out[2][i] = h * h * (c[2] + 3.0 * u * c[3]);
+    out[3][i] = h * h * h * c[3];
+  }
+}
+
+/* Compute sine and cosine of frequency (t + t_low) for all lanes. */
+static void set_wave(struct group *g, double frequency, lanes *sine, lanes *cosine)
+{
+  for (int i = 0; i < SIDE_BY_SIDE; i++) {
+    const double angle = frequency * g->t[i];
+    const double rest = fma(frequency, g->t[i], -angle) + frequency * g->t_low[i];
+    const double s = sin(angle), c = cos(angle);
+    (*sine)[i] = s + c * rest;
+    (*cosine)[i] = c - s * rest;
+  }
+}
+
+/* Compute term 0 of all slots, and all terms of the tables. */
+static void set_values(struct group *g)
+{
+  const struct tape *tape = &g->all->tape;
+  for (int n = 0; n < tape->n_operations; n++) {
+    const int *operation = tape->operations[n];
+    const lanes x = g->a[operation[1] - 1][0], y = g->a[operation[2] > 0 ? operation[2] - 1 : 0][0];
+    series *out = g->a + operation[3] - 1;
+    lanes grown, shrunk;
+    switch (operation[0]) {
+    case LINEAR: out[0][0] = combined(g, operation[1] - 1, 0); break;
+    case PRODUCT: out[0][0] = x * y; break;
+    case QUOTIENT: out[0][0] = x / y; break;
+    case SQRT: out[0][0] = each_of(sqrt, x); break;
+    case EXP: out[0][0] = each_of(exp, x); break;
+    case TANH:
+      out[0][0] = each_of(tanh, x);
+      /* The square of the tangent may be rounded to 1. */
+      grown = each_of(exp, absolute(x));
+      shrunk = 2.0 / (grown + 1.0 / grown);
+      out[1][0] = shrunk * shrunk;
+      break;
+    case TABLE: set_table(g, operation[1] - 1, out[0]); break;
+    default:
+      if (operation[2] > 0) {
+        set_wave(g, tape->coefficients[tape->starts[operation[2] - 1] - 1], out[0], out[1]);
+      } else {
+        out[0][0] = each_of(sin, x);
+        out[1][0] = each_of(cos, x);
+      }
+    }
+  }
+}
+
+/* Return the sum of x(j) y(k - j) for j from `first` to `last`. */
+static __attribute__((noinline)) lanes convolved(const lanes *x, const lanes *y, int k, int first, int last)
+{
+  lanes one = {0.0}, two = {0.0};
+  int j = first;
+  for (; j < last; j += 2) {
+    one += x[j] * y[k - j];
+    two += x[j + 1] * y[k - j - 1];
+  }
+  if (j == last) one += x[j] * y[k - j];
+  return one + two;
+}
+
+/* Compute term k of a product. Every fourth term comes with the parts of the next three terms that
+   are known already, which saves most of the loads. */
+static inline void multiply(lanes *out, const lanes *x, const lanes *y, int k)
+{
+  const int late = k % 4;
+  if (k < 4) {
+    out[k] = convolved(x, y, k, 0, k);
+  } else if (late > 0) {
+    lanes sum = out[k];
+    for (int i = 0; i < late; i++) sum += x[k - i] * y[i] + y[k - i] * x[i];
+    out[k] = sum;
+  } else {
+    lanes a = {0.0}, b = {0.0}, c = {0.0}, d = {0.0}, a2 = {0.0}, b2 = {0.0}, c2 = {0.0}, d2 = {0.0};
+    lanes y1 = {0.0}, y2 = {0.0}, y3 = {0.0};
+    int j = 0;
+    for (; j < k; j += 4) {
+      const lanes u0 = y[k - j], u1 = y[k - j - 1], u2 = y[k - j - 2], u3 = y[k - j - 3];
+      a += x[j] * u0, b += x[j] * y1, c += x[j] * y2, d += x[j] * y3;
+      a2 += x[j + 1] * u1, b2 += x[j + 1] * u0, c2 += x[j + 1] * y1, d2 += x[j + 1] * y2;
+      a += x[j + 2] * u2, b += x[j + 2] * u1, c += x[j + 2] * u0, d += x[j + 2] * y1;
+      a2 += x[j + 3] * u3, b2 += x[j + 3] * u2, c2 += x[j + 3] * u1, d2 += x[j + 3] * u0;
+      y1 = u3, y2 = u2, y3 = u1;
+    }
+    out[k] = (a + a2) + x[k] * y[0];
+    out[k + 1] = (b + b2) + x[k] * y1;
+    out[k + 2] = (c + c2) + x[k] * y2;
+    out[k + 3] = (d + d2) + x[k] * y3;
+  }
+}
+
+/* Compute the terms of all slots, and those of the unknowns up to the order. */
+static void expand(struct group *g)
+{
+  const struct tape *tape = &g->all->tape;
+  const int derivatives = tape->n_combinations - g->n;
+  for (int k = 0; k < g->order; k++) {
+    for (int n = 0; k > 0 && n < tape->n_operations; n++) {
+      const int *operation = tape->operations[n];
+      const lanes *x = g->a[operation[1] - 1], *y = g->a[operation[2] > 0 ? operation[2] - 1 : 0];
+      series *out = g->a + operation[3] - 1;
+      const double whole = k;
+      switch (operation[0]) {
+      case LINEAR: out[0][k] = combined(g, operation[1] - 1, k); break;
+      case PRODUCT: multiply(out[0], x, y, k); break;
+      case QUOTIENT: out[0][k] = (x[k] - convolved(out[0], y, k, 0, k - 1)) / y[0]; break;
+      case SQRT:
+        out[0][k] = (x[k] - convolved(out[0], out[0], k, 1, k - 1)) / (2.0 * out[0][0]);
+        break;
+      case EXP: /* The second slot has k times the terms of the argument. */
+        out[1][k] = whole * x[k];
+        out[0][k] = convolved(out[0], out[1], k, 0, k - 1) / whole;
+        break;
+      case SINE_COSINE:
+        out[2][k] = whole * x[k];
+        out[0][k] = convolved(out[1], out[2], k, 0, k - 1) / whole;
+        out[1][k] = -convolved(out[0], out[2], k, 0, k - 1) / whole;
+        break;
+      case TANH: /* The second slot is 1 minus the square, the derivative. */
+        out[2][k] = whole * x[k];
+        out[0][k] = convolved(out[1], out[2], k, 0, k - 1) / whole;
+        out[1][k] = -convolved(out[0], out[0], k, 0, k);
+        break;
+      default: /* a table */
+        break;
+      }
+    }
+    const lanes part = g->h / (k + 1.0);
+    for (int i = 0; i < g->n; i++)
+      g->a[FIRST_UNKNOWN + i][k + 1] = part * combined(g, derivatives + i, k);
+  }
+}
+
+/* Reduce the factor until a slot changes by at most `most` in the circle of the step. */
+static lanes limited(const struct group *g, const lanes *slot, lanes most, lanes factor)
+{
+  for (int n = 0; n < HALVINGS; n++) {
+    lanes change = {0.0};
+    for (int k = g->order - 1; k > 0; k--) change = factor * (change + absolute(slot[k]));
+    const bits fits = change <= most;
+    if (!any(~fits)) break;
+    factor = select_of(fits, factor, factor * larger(all_of(SHORTER), most / change));
+  }
+  return factor;
+}
+
+/* Reduce the factor on the step so that the series of functions converge, as in tape_plan.f90. */
+static lanes converged(const struct group *g, lanes factor)
+{
+  const struct tape *tape = &g->all->tape;
+  for (int n = 0; n < tape->n_operations; n++) {
+    const int *operation = tape->operations[n];
+    const lanes *x = g->a[operation[1] - 1], *y = g->a[operation[2] > 0 ? operation[2] - 1 : 0];
+    const double order = g->order;
+    switch (operation[0]) {
+    case EXP: factor = limited(g, x, larger(all_of(0.5 * order), -x[0] - INVISIBLE), factor); break;
+    case TANH:
+      factor = limited(g, x, larger(all_of(0.25 * order), absolute(x[0]) - 0.5 * INVISIBLE), factor);
+      break;
+    case QUOTIENT: factor = limited(g, y, WITHIN_CIRCLE * absolute(y[0]), factor); break;
+    case SQRT: factor = limited(g, x, WITHIN_CIRCLE * x[0], factor); break;
+    default: break;
+    }
+  }
+  return factor;
+}
+
+/* Return bounds of the rounding errors of the derivatives, as noise_of in tape_series.f90. */
+static void set_noise(struct group *g, lanes *noise)
+{
+  const struct tape *tape = &g->all->tape;
+  for (int i = 0; i < FIRST_UNKNOWN + g->n; i++) g->noises[i] = all_of(0.0);
+  for (int n = 0; n < tape->n_operations + g->n; n++) {
+    lanes sum = {0.0};
+    const int is_output = n >= tape->n_operations;
+    const int *operation = tape->operations[is_output ? 0 : n];
+    if (is_output || operation[0] == LINEAR) {
+      const int c = is_output ? tape->n_combinations - g->n + n - tape->n_operations
+                              : operation[1] - 1;
+      for (int i = tape->starts[c] - 1; i < tape->starts[c + 1] - 1; i++) {
+        const int slot = tape->slots[i] - 1;
+        sum += fabs(tape->coefficients[i]) * (absolute(g->a[slot][0]) + g->noises[slot]);
+      }
+      if (tape->starts[c + 1] > tape->starts[c]) sum += fabs(tape->constants[c]);
+      if (is_output) noise[n - tape->n_operations] = sum;
+      else g->noises[operation[3] - 1] = sum;
+      continue;
+    }
+    const int first = operation[1] - 1, second = operation[2] > 0 ? operation[2] - 1 : 0;
+    const int out = operation[3] - 1;
+    const lanes x = g->noises[first], y = g->noises[second], value = absolute(g->a[out][0]);
+    switch (operation[0]) {
+    case PRODUCT:
+      sum = value + absolute(g->a[first][0]) * y + absolute(g->a[second][0]) * x;
+      break;
+    case QUOTIENT: sum = value + (x + value * y) / absolute(g->a[second][0]); break;
+    case SQRT: sum = value + x / (2.0 * value); break;
+    case EXP: sum = value * (2.0 + x); break;
+    case TANH: sum = 2.0 * value + g->a[out + 1][0] * x; break;
+    case TABLE: sum = 2.0 * value; break;
+    default: /* An angle proportional to time has no rounding error. */
+      sum = 2.0 + (operation[2] > 0 ? all_of(0.0) : absolute(g->a[out + 1][0]) * x);
+      g->noises[out + 1] = 2.0 + (operation[2] > 0 ? all_of(0.0) : value * x);
+    }
+    g->noises[out] = sum;
+  }
+}
+
+/* Find the unknowns on which each slot depends. */
+static void find_dependences(struct group *g)
+{
+  const struct tape *tape = &g->all->tape;
+  for (int i = 0; i < g->n; i++) g->depends[FIRST_UNKNOWN + i] = 1 << i;
+  for (int n = 0; n < tape->n_operations; n++) {
+    const int *operation = tape->operations[n];
+    int *out = g->depends + operation[3] - 1;
+    if (operation[0] == TABLE) continue;
+    if (operation[0] == LINEAR) {
+      for (int i = tape->starts[operation[1] - 1] - 1; i < tape->starts[operation[1]] - 1; i++)
+        *out |= g->depends[tape->slots[i] - 1];
+      continue;
+    }
+    *out = g->depends[operation[1] - 1];
+    if (operation[0] == PRODUCT || operation[0] == QUOTIENT) *out |= g->depends[operation[2] - 1];
+    if (operation[0] == SINE_COSINE || operation[0] == TANH) out[1] = *out;
+  }
+}
+
+/* Compute the derivatives of the rates by the unknowns amid the step, times the step. */
+static void set_jacobian(struct group *g, lanes factor, lanes jacobian[][MOST_UNKNOWNS])
+{
+  const struct tape *tape = &g->all->tape;
+  const lanes half = 0.5 * factor, step = factor * g->h;
+  for (int n = 0; n < g->all->n_slots; n++) {
+    lanes sum = {0.0};
+    /* The order is above the number of these terms. */
+    for (int k = FEW_TERMS - 1; k > 0; k--) sum = half * (sum + g->a[n][k]);
+    g->middle[n] = g->a[n][0] + sum;
+  }
+  for (int j = 0; j < g->n; j++) {
+    lanes *v = g->tangents;
+    memset(v, 0, g->all->n_slots * sizeof *v);
+    v[FIRST_UNKNOWN + j] = all_of(1.0);
+    for (int n = 0; n < tape->n_operations; n++) {
+      const int *operation = tape->operations[n];
+      if (!(g->depends[operation[3] - 1] >> j & 1)) continue;
+      const int first = operation[1] - 1, second = operation[2] > 0 ? operation[2] - 1 : 0;
+      const int out = operation[3] - 1;
+      const lanes *m = g->middle;
+      switch (operation[0]) {
+      case LINEAR:
+        for (int i = tape->starts[first] - 1; i < tape->starts[first + 1] - 1; i++)
+          v[out] += tape->coefficients[i] * v[tape->slots[i] - 1];
+        break;
+      case PRODUCT: v[out] = m[first] * v[second] + m[second] * v[first]; break;
+      case QUOTIENT: v[out] = (v[first] - m[out] * v[second]) / m[second]; break;
+      case SQRT: v[out] = v[first] / (2.0 * m[out]); break;
+      case EXP: v[out] = m[out] * v[first]; break;
+      case SINE_COSINE:
+        v[out] = m[out + 1] * v[first];
+        v[out + 1] = -m[out] * v[first];
+        break;
+      case TANH:
+        v[out] = m[out + 1] * v[first];
+        v[out + 1] = -2.0 * m[out] * v[out];
+        break;
+      default: break;
+      }
+    }
+    for (int i = 0; i < g->n; i++) {
+      const int c = tape->n_combinations - g->n + i;
+      lanes sum = {0.0};
+      for (int k = tape->starts[c] - 1; k < tape->starts[c + 1] - 1; k++)
+        sum += tape->coefficients[k] * v[tape->slots[k] - 1];
+      jacobian[i][j] = step * sum;
+    }
+  }
+}
+
+/* Return the truncation error of each unknown, as estimate_truncation in tape_march.f90. */
+static void set_truncation(const struct group *g, lanes factor, lanes *left)
+{
+  const int order = g->order;
+  lanes uu = {0.0}, vv = {0.0}, uv = {0.0}, ux = {0.0}, vx = {0.0}, power = all_of(1.0);
+  for (int k = 0; k < order - 3; k++) power *= factor;
+  const lanes second = power * factor, third = second * factor, fourth = third * factor;
+  for (int i = 0; i < g->n; i++) {
+    const lanes *a = g->a[FIRST_UNKNOWN + i] + order, weight = g->weights[i] / g->local;
+    const lanes x1 = weight * power * a[-3], x2 = weight * second * a[-2];
+    const lanes x3 = weight * third * a[-1], x4 = weight * fourth * a[0];
+    uu += x3 * x3 + x2 * x2;
+    vv += x2 * x2 + x1 * x1;
+    uv += x3 * x2 + x2 * x1;
+    ux += x3 * x4 + x2 * x3;
+    vx += x2 * x4 + x1 * x3;
+  }
+  uu *= RIDGE;
+  vv *= RIDGE;
+  lanes p = vv * ux - uv * vx, q = uv * ux - uu * vx;
+  lanes determinant = larger((uu * vv - uv * uv - p) + q, absolute(p - q));
+  /* A series that converges has no poles within the step, or nearly within. */
+  determinant = larger(larger(determinant, absolute(q)), all_of(LEAST));
+  p = (p - q) / determinant;
+  q = q / determinant;
+  for (int i = 0; i < g->n; i++) {
+    const lanes *a = g->a[FIRST_UNKNOWN + i] + order;
+    left[i] = p * (a[0] * fourth) - q * (a[-1] * third);
+  }
+}
+
+/* Replace vectors by the products of the exponential of a matrix and each vector. */
+static inline __attribute__((always_inline)) void carry_of(const int n,
+                                                           lanes matrix[][MOST_UNKNOWNS],
+                                                           lanes vectors[][MOST_UNKNOWNS])
+{
+  lanes sums[VECTORS][MOST_UNKNOWNS], next[VECTORS][MOST_UNKNOWNS];
+  memcpy(sums, vectors, sizeof sums);
+  for (int k = CARRIED; k > 0; k--) {
+    const double part = 1.0 / k;
+    for (int i = 0; i < n; i++) {
+      lanes a = {0.0}, b = {0.0}, c = {0.0}, d = {0.0};
+      for (int j = 0; j < n; j++) {
+        const lanes element = matrix[i][j];
+        a += element * sums[0][j];
+        b += element * sums[1][j];
+        c += element * sums[2][j];
+        d += element * sums[3][j];
+      }
+      next[0][i] = vectors[0][i] + part * a;
+      next[1][i] = vectors[1][i] + part * b;
+      next[2][i] = vectors[2][i] + part * c;
+      next[3][i] = vectors[3][i] + part * d;
+    }
+    memcpy(sums, next, sizeof sums);
+  }
+  memcpy(vectors, sums, sizeof sums);
+}
+
+static void carry(int n, lanes matrix[][MOST_UNKNOWNS],
+                                            lanes vectors[][MOST_UNKNOWNS])
+{
+  if (n == 3) carry_of(3, matrix, vectors);
+  else carry_of(MOST_UNKNOWNS, matrix, vectors);
+}
+
+/* Set the time, the unknowns and term 0 of all slots. */
+static void set_start(struct group *g)
+{
+  g->a[0][0] = g->t;
+  g->a[0][1] = g->h;
+  for (int i = 0; i < g->n; i++) g->a[FIRST_UNKNOWN + i][0] = g->y[i];
+  set_values(g);
+}
+
+/* Compare the derivatives with those that the last series had at its end. */
+static void check_derivatives(struct group *g)
+{
+  const int derivatives = g->all->tape.n_combinations - g->n;
+  for (int i = 0; i < g->n; i++) {
+    const lanes found = g->previous * combined(g, derivatives + i, 0);
+    const lanes defect = g->weights[i] * absolute(found - g->slope[i]);
+    /* NaN is not allowed. */
+    g->fails |= g->is_checked & ~(defect <= g->allowed);
+    const lanes least = defect * (1.0 / (g->order + 1));
+    g->worst = select_of(g->is_checked, larger(g->worst, least), g->worst);
+  }
+}
+
+/* Return the step, as a factor on the one that was tried, so that it ends at the next stop. */
+static lanes ended(struct group *g, lanes factor, bits *arrives, bits *at_end, lanes *stop)
+{
+  for (int i = 0; i < SIDE_BY_SIDE; i++) {
+    const double end = g->end[i];
+    double to_stop = g->rest[i];
+    (*stop)[i] = end;
+    if (g->all->n_tables > 0) {
+      (*stop)[i] = next_break(g->all, g->t[i], end);
+      if ((*stop)[i] != end) to_stop = ((*stop)[i] - g->t[i]) - g->t_low[i];
+    }
+    const double step = fabs(factor[i] * g->h[i]);
+    (*arrives)[i] = fabs(to_stop) <= step * (1.0 + 1e-3) ? -1 : 0;
+    (*at_end)[i] = (*arrives)[i] && (*stop)[i] == end ? -1 : 0;
+    if ((*arrives)[i]) factor[i] = to_stop / g->h[i];
+    else if (fabs(to_stop) < 2.0 * step) factor[i] = 0.5 * (to_stop / g->h[i]);
+  }
+  return factor;
+}
+
+/* Take a step in each lane, or shorten the step that the lane tries next. */
+static void step(struct group *g)
+{
+  const int n = g->n, order = g->order;
+  lanes jacobian[MOST_UNKNOWNS][MOST_UNKNOWNS], left[MOST_UNKNOWNS], noise[MOST_UNKNOWNS];
+  lanes change[MOST_UNKNOWNS], slope[MOST_UNKNOWNS], size[MOST_UNKNOWNS];
+  lanes last = {0.0}, total = {0.0}, norm = {0.0}, stop;
+  bits arrives, at_end;
+
+  expand(g);
+  for (int k = order - 2; k <= order; k++) {
+    for (int i = 0; i < n; i++) {
+      const lanes term = g->weights[i] * absolute(g->a[FIRST_UNKNOWN + i][k]);
+      last = larger(last, term);
+      total += term;
+    }
+  }
+  const bits is_finite = total <= 1.0 / LEAST;
+  lanes factor = smaller(ratio_of(order, g->local, last), all_of(LONGER));
+  if (any(g->is_first)) {
+    /* The local tolerance for the expected number of steps, as in tape_plan.f90. */
+    const lanes way = 0.12 * absolute(g->rest / (factor * g->h));
+    lanes local = SHARE * g->all->tolerance / (8.0 + way + way * (way / 14.0));
+    local = larger(local, all_of(1e-18));
+    g->local = select_of(g->is_first, local, g->local);
+    factor = smaller(ratio_of(order, g->local, last), all_of(LONGER));
+  }
+  factor = converged(g, factor);
+  set_jacobian(g, factor, jacobian);
+  for (int i = 0; i < n; i++) {
+    lanes row = {0.0};
+    for (int j = 0; j < n; j++) row += absolute(jacobian[i][j]) * (g->weights[i] / g->weights[j]);
+    norm = larger(norm, row);
+  }
+  const lanes tried = factor;
+  factor = select_of(norm > A_STEP, factor * (A_STEP / norm), factor);
+  const bits accepted = is_finite & (factor >= SHORTER) & (norm <= 1.0 / LEAST);
+  const lanes shorter = select_of(is_finite & (factor > 0.01), factor, all_of(0.01)) * g->h;
+  factor = ended(g, factor, &arrives, &at_end, &stop);
+  const lanes h = factor * g->h;
+  set_noise(g, noise);
+  lanes reached = g->scale, terms = {0.0}, turned = {0.0}, rounded = all_of(1.0), noises = {0.0};
+  for (int i = 0; i < n; i++) {
+    const lanes *a = g->a[FIRST_UNKNOWN + i];
+    change[i] = slope[i] = size[i] = all_of(0.0);
+    for (int k = order; k > 0; k--) {
+      change[i] = factor * (change[i] + a[k]);
+      slope[i] = factor * (slope[i] + (double)k * a[k]);
+      size[i] = factor * (size[i] + (double)k * absolute(a[k]));
+    }
+    size[i] = absolute(size[i]);
+    if (i < 3) {
+      reached = larger(reached, absolute(g->y[i] + change[i]));
+      terms = larger(terms, size[i]);
+    } else {
+      turned += 2.0 * size[i];
+    }
+    const lanes each = g->weights[i] * noise[i] * absolute(h);
+    rounded = larger(rounded, g->weights[i] * size[i] + each);
+    noises += each * each;
+  }
+  /* Large terms that cancel are rounded. */
+  const double most = fmax(MOST_CANCELLED, g->all->tolerance / (2.0 * ROUNDING));
+  g->fails |= accepted & ~(larger(terms / reached, turned) <= most);
+  set_truncation(g, factor, left);
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n; j++) jacobian[i][j] *= factor / tried;
+  lanes vectors[VECTORS][MOST_UNKNOWNS], worst = {0.0}, growth = {0.0};
+  lanes *const error = vectors[PROBES];
+  memcpy(vectors, g->probes, sizeof g->probes);
+  memcpy(vectors[PROBES], g->error, sizeof g->error);
+  carry(n, jacobian, vectors);
+  for (int j = 0; j < PROBES; j++) {
+    for (int i = 0; i < n; i++) {
+      const lanes each = g->weights[i] * vectors[j][i];
+      g->probes[j][i] = select_of(accepted, vectors[j][i], g->probes[j][i]);
+      growth += each * each;
+    }
+  }
+  /* As in tape_growth.f90: nearly the largest singular value, and 1 for a rotation. */
+  growth = growth * ((double)n / PROBES) + (1.0 - n);
+  g->fails |= accepted & ~(growth <= MOST_GROWTH * MOST_GROWTH);
+  for (int i = 0; i < n; i++) {
+    error[i] -= left[i];
+    worst += g->weights[i] * absolute(error[i]);
+    g->error[i] = select_of(accepted, error[i], g->error[i]);
+    const lanes changed = change[i] + g->low[i], sum = g->y[i] + changed, part = sum - g->y[i];
+    const lanes low = (g->y[i] - (sum - part)) + (changed - part);
+    g->y[i] = select_of(accepted, sum, g->y[i]);
+    g->low[i] = select_of(accepted, low, g->low[i]);
+    g->slope[i] = select_of(accepted, slope[i], g->slope[i]);
+    g->fails |= accepted & ~(absolute(sum) <= FAR);
+  }
+  g->worst = select_of(accepted, larger(g->worst, worst), g->worst);
+  g->growth = select_of(accepted, larger(g->growth, growth), g->growth);
+  g->noise = select_of(accepted, g->noise + noises, g->noise);
+  const lanes allowed = MOST_DEFECT * order * g->local + MOST_ROUNDING * 2.0 * ROUNDING * rounded;
+  g->allowed = select_of(accepted, allowed, g->allowed);
+  g->previous = select_of(accepted, h, g->previous);
+  g->scale = select_of(accepted, reached, g->scale);
+  for (int i = 0; i < 3; i++) g->weights[i] = 1.0 / g->scale;
+  /* The time at a stop is exact. */
+  const lanes moved = h + g->t_low, later = g->t + moved, part = later - g->t;
+  const lanes later_low = (g->t - (later - part)) + (moved - part);
+  const bits here = accepted & arrives, onward = accepted & ~arrives;
+  g->t = select_of(here, stop, select_of(onward, later, g->t));
+  g->t_low = select_of(here, all_of(0.0), select_of(onward, later_low, g->t_low));
+  g->rest = select_of(accepted & at_end, all_of(0.0), (g->end - g->t) - g->t_low);
+  g->h = select_of(accepted, h, shorter);
+  g->is_first &= ~accepted;
+  /* The derivatives may jump at a breakpoint. */
+  g->is_checked = g->all->n_tables > 0 ? accepted & ~arrives : accepted;
+  for (int i = 0; i < SIDE_BY_SIDE; i++) {
+    if (accepted[i]) g->tries[i] = 0;
+    g->steps[i] += accepted[i] ? 1 : 0;
+    if (!accepted[i] && ++g->tries[i] > MOST_TRIES) g->fails[i] = -1;
+    if (g->steps[i] > MOST_STEPS) g->fails[i] = -1;
+  }
+}
+
+/* Put body number `body` into a lane, and return whether this kernel takes it. */
+static int put_in(struct group *g, int lane, int body)
+{
+  const struct bodies *all = g->all;
+  const double *omega = all->omega0[body], end = all->times[all->n_times == 1 ? 0 : body];
+  const double scale = fmax(fabs(omega[0]), fmax(fabs(omega[1]), fabs(omega[2])));
+  const double even = 1.0 / sqrt(g->n);
+  double sum = fabs(omega[0]) + fabs(omega[1]) + fabs(omega[2]);
+  for (int i = 3; i < g->n; i++) sum += fabs(all->attitude0[body][i - 3]);
+  /* A sum, because a maximum may lose a NaN. */
+  if (!(sum <= FAR && scale >= 1.0 / FAR && fabs(end) <= FAR && fabs(end) >= 1.0 / FAR)) return 0;
+  if (!(scale * fabs(end) <= MOST_ANGLE)) return 0;
+  for (int i = 0; i < g->n; i++) {
+    g->y[i][lane] = i < 3 ? omega[i] : all->attitude0[body][i - 3];
+    g->weights[i][lane] = i < 3 ? 1.0 / scale : 2.0;
+    g->low[i][lane] = g->error[i][lane] = g->slope[i][lane] = 0.0;
+    for (int j = 0; j < PROBES; j++) {
+      const double sign = g->n == PROBES ? i == j : (i + 1) >> j & 1 ? -even : even;
+      g->probes[j][i][lane] = sign / g->weights[i][lane];
+    }
+  }
+  g->t[lane] = g->t_low[lane] = g->worst[lane] = g->noise[lane] = g->allowed[lane] = 0.0;
+  g->end[lane] = g->rest[lane] = end;
+  g->h[lane] = copysign(fmin(fabs(end), 1.0 / scale), end);
+  g->previous[lane] = g->h[lane];
+  g->scale[lane] = scale;
+  g->growth[lane] = 1.0;
+  g->local[lane] = 0.125 * all->tolerance;
+  g->is_first[lane] = -1;
+  g->is_checked[lane] = g->fails[lane] = 0;
+  g->steps[lane] = g->tries[lane] = 0;
+  g->body[lane] = body;
+  return 1;
+}
+
+/* Take the result of a lane's body, or leave the body to the single-body kernel. */
+static void take_out(struct group *g, int lane)
+{
+  const struct bodies *all = g->all;
+  const int body = g->body[lane];
+  const double growth = sqrt(g->growth[lane]), trusted = TRUSTED / (1.0 + growth / DOUBTED);
+  const double blurred = ROUNDING * growth * (1.0 + sqrt(g->noise[lane]));
+  double z[MOST_UNKNOWNS], square = 0.0;
+  g->body[lane] = -1;
+  if (g->fails[lane] || !(g->worst[lane] <= trusted * all->tolerance)
+      || !(blurred <= SURE * all->tolerance)) return;
+  for (int i = 0; i < g->n; i++) {
+    z[i] = g->y[i][lane] + (g->low[i][lane] - g->error[i][lane]);
+    if (i >= 3) square += z[i] * z[i];
+  }
+  for (int i = 0; i < 3; i++) all->omega[body][i] = z[i];
+  for (int i = 3; i < g->n; i++) all->attitude[body][i - 3] = z[i] / sqrt(square);
+  all->status[body] = COMPLETE;
+  if (all->estimates == NULL) return;
+  all->estimates[body][0] = WRONG * g->worst[lane] + UNSEEN * growth * g->local[lane]
+                            + ROUNDINGS * blurred;
+  all->estimates[body][1] = growth;
+}
+
+/* Put a motion that never ends into an empty lane: its numbers are finite. */
+static void clear(struct group *g, int lane)
+{
+  for (int i = 0; i < g->n; i++) {
+    g->weights[i][lane] = 1.0;
+    g->y[i][lane] = i == 3;
+  }
+  g->fails[lane] = -1;
+  g->body[lane] = -1;
+}
+
+/* Return the largest number of factors of a product. */
+static int most_factors(const struct tape *tape, int *factors)
+{
+  int most = 1;
+  for (int n = 0; n < tape->n_operations; n++) {
+    const int *operation = tape->operations[n];
+    int *out = factors + operation[3] - 1;
+    if (operation[0] == PRODUCT) {
+      *out = factors[operation[1] - 1] + factors[operation[2] - 1];
+      if (*out > MOST_ORDER) *out = MOST_ORDER;
+    } else if (operation[0] == LINEAR) {
+      for (int i = tape->starts[operation[1] - 1] - 1; i < tape->starts[operation[1]] - 1; i++)
+        if (factors[tape->slots[i] - 1] > *out) *out = factors[tape->slots[i] - 1];
+    }
+    if (*out > most) most = *out;
+  }
+  return most;
+}
+
+/* Return the order of the series; 0 if none suffices. */
+static int order_for(const struct bodies *all, int *factors)
+{
+  /* Measured: a lower order has shorter steps, whose other work costs more. */
+  int order = 1 + (int)ceil(-0.7 * log(all->tolerance / 20.0)), least = LEAST_ORDER;
+  for (int i = 0; i < all->n_slots; i++) factors[i] = 1;
+  const int most = most_factors(&all->tape, factors);
+  /* A product of many factors may not show in its first terms: see tape_powers.f90. */
+  if (most >= MANY) least = (int)ceil(2 * most / PART_OF_ORDER);
+  if (least > MOST_ORDER) return 0;
+  if (order > MOST_ORDER) order = MOST_ORDER;
+  return order > least ? order : least;
+}
+
+/* Compute omega of each body at its time, and its attitude. Its status becomes COMPLETE, and remains
+   NEEDS_FALLBACK if it is left to the single-body kernel. */
+void OF_LEVEL(solve_tape_bodies, LEVEL)(struct bodies *all)
+{
+  struct group g;
+  const size_t of_slot = TERMS + 3, n_slots = all->n_slots;
+  lanes *memory = aligned_alloc(sizeof(lanes), n_slots * of_slot * sizeof(lanes));
+  int next = 0, active = 0, unseen = 0;
+
+  all->interrupted = 0;
+  memset(&g, 0, sizeof g);
+  g.depends = calloc(n_slots, sizeof *g.depends);
+  if (memory != NULL && g.depends != NULL) g.order = order_for(all, g.depends);
+  if (g.order == 0) {
+    free(memory);
+    free(g.depends);
+    return;
+  }
+  memset(g.depends, 0, n_slots * sizeof *g.depends);
+  memset(memory, 0, n_slots * of_slot * sizeof(lanes));
+  g.all = all;
+  g.n = all->tape.n_unknowns;
+  g.a = (series *)memory;
+  g.middle = memory + n_slots * TERMS;
+  g.tangents = g.middle + n_slots;
+  g.noises = g.tangents + n_slots;
+  find_dependences(&g);
+  for (int i = 0; i < SIDE_BY_SIDE; i++) clear(&g, i);
+  g.h = g.previous = g.scale = g.local = all_of(1.0);
+  for (;;) {
+    int is_new = 0;
+    if (active > 0) {
+      set_start(&g);
+      check_derivatives(&g);
+    }
+    for (int i = 0; i < SIDE_BY_SIDE; i++) {
+      if (g.body[i] >= 0 && !g.fails[i] && g.rest[i] != 0.0) continue;
+      if (g.body[i] >= 0) {
+        take_out(&g, i);
+        active--;
+      }
+      while (next < all->n && !put_in(&g, i, next)) next++;
+      if (next < all->n) {
+        next++;
+        active++;
+        is_new = 1;
+      } else {
+        clear(&g, i);
+      }
+    }
+    if (active == 0) break;
+    if (is_new) set_start(&g);
+    step(&g);
+    if (++unseen >= BETWEEN_LOOKS) {
+      unseen = 0;
+      all->interrupted = interrupt_raised();
+      if (all->interrupted) break;
+    }
+  }
+  free(memory);
+  free(g.depends);
+}

@@ -1,0 +1,234 @@
+"""Attitudes of many bodies in one call: as accurate as single calls, whatever the other bodies."""
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import Ensemble, Scene, TorqueLaw, prepare, solve, solve_many, torques
+from pyharness.model.attitude import angle_between
+from pyharness.model.codes import Statuses
+from pyharness.model.errors import InputError
+from pyharness.model.trajectory import Array
+from tests.many_errors import KINDS, bodies, scene_of
+
+TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
+RESULTS = (Statuses.COMPLETE, Statuses.SENSITIVE)
+
+
+@cache
+def drawn_with_truth(kind: str, n: int) -> tuple[dict[str, Any], Array]:
+    """Return random bodies with attitudes, and their attitudes at the end; NaN where they grow."""
+    drawn = bodies(kind, n, 34)
+    drawn["attitude0"] = np.random.default_rng(34).standard_normal((n, 4))
+    truth = np.full((n, 4), np.nan)
+    for row in range(n):
+        scene = replace(scene_of(drawn, row), attitude=drawn["attitude0"][row])
+        found = solve(scene, [drawn["t_end"][row]], "taylor", 1e-15, attitude=True)
+        if found.has_all_rows and (found.growth or np.inf) < 1e4:
+            assert found.attitude is not None
+            truth[row] = found.attitude[-1]
+    return drawn, truth
+
+
+def beyond(found: Ensemble, truth: Array, tolerance: float) -> list[int]:
+    """Return the bodies whose complete attitude is further than the tolerance from the truth."""
+    assert found.attitude is not None
+    rows = np.flatnonzero(np.isfinite(truth[:, 0]) & (found.status == Statuses.COMPLETE))
+    angles = angle_between(found.attitude[rows], truth[rows])
+    return [int(row) for row in rows[~(angles <= tolerance)]]
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-11])
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_tolerance_holds(kind: str, tolerance: float, level: int) -> None:
+    drawn, truth = drawn_with_truth(kind, 60)
+    found = solve_many(TOP, tolerance=tolerance, **drawn)
+    assert found.attitude is not None
+    assert np.count_nonzero(np.isfinite(truth[:, 0])) > 40
+    assert np.count_nonzero(found.status == Statuses.COMPLETE) > 30
+    assert beyond(found, truth, tolerance + 4e-12) == []
+    assert np.isin(found.status, RESULTS).all()
+    assert np.abs((found.attitude**2).sum(axis=1) - 1.0).max() < 1e-14
+    # Most results come from lanes: one by one they would have the single solver's bits.
+    same = 0
+    for row in range(20):
+        solver = prepare(scene_of(drawn, row), tolerance=tolerance, attitude=True)
+        alone = solver(drawn["omega0"][row], drawn["t_end"][row], drawn["attitude0"][row])[1]
+        same += np.array_equal(alone, found.attitude[row])
+    assert same < 10 or tolerance < 1e-10
+
+
+def test_two_attitudes_that_are_swapped_are_noticed() -> None:
+    drawn, truth = drawn_with_truth("waves", 60)
+    found = solve_many(TOP, tolerance=1e-6, **drawn)
+    assert found.attitude is not None
+    assert beyond(found, truth, 1e-6) == []
+    found.attitude[[3, 11]] = found.attitude[[11, 3]]
+    assert beyond(found, truth, 1e-6) == [3, 11]
+
+
+def test_the_reference_agrees() -> None:
+    for kind in KINDS:
+        drawn, _ = drawn_with_truth(kind, 60)
+        found = solve_many(TOP, tolerance=1e-9, **drawn)
+        assert found.attitude is not None
+        for row in (0, 7):
+            scene = replace(scene_of(drawn, row), attitude=drawn["attitude0"][row])
+            truth = solve(scene, [drawn["t_end"][row]], "reference", attitude=True).attitude
+            assert truth is not None
+            assert angle_between(found.attitude[row : row + 1], truth[-1:])[0] <= 1e-9
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_sizes_and_threads_change_no_bit(kind: str, level: int) -> None:
+    drawn = bodies(kind, 1000, 5)
+    drawn["t_end"] = np.clip(drawn["t_end"], -3.0, 3.0)
+    drawn["attitude0"] = np.random.default_rng(5).standard_normal((1000, 4))
+    whole = solve_many(TOP, tolerance=1e-6, **drawn)
+    assert whole.attitude is not None
+    for n, threads in ((0, 1), (1, 1), (2, 1), (17, 1), (1000, 3)):
+        found = solve_many(
+            TOP, tolerance=1e-6, threads=threads, **{name: each[:n] for name, each in drawn.items()}
+        )
+        assert found.attitude is not None
+        assert found.attitude.shape == (n, 4)
+        assert np.array_equal(found.attitude, whole.attitude[:n], equal_nan=True)
+        assert np.array_equal(found.omega, whole.omega[:n], equal_nan=True)
+        assert np.array_equal(found.status, whole.status[:n])
+
+
+@pytest.mark.parametrize("with_torque", [False, True])
+def test_a_bad_body_spoils_no_other(with_torque: bool, level: int) -> None:
+    rng = np.random.default_rng(8)
+    drawn: dict[str, Any] = {
+        "omega0": rng.standard_normal((40, 3)), "attitude0": rng.standard_normal((40, 4)),
+        "moments": rng.uniform(2.0, 3.0, (40, 3)),
+    }  # fmt: skip
+    if with_torque:
+        drawn["torque_constant"] = rng.standard_normal((40, 3))
+    good = solve_many(TOP, 2.0, tolerance=1e-9, **drawn)
+    assert good.attitude is not None
+    assert good.has_result.all()
+    drawn["attitude0"][3] = 0.0
+    drawn["attitude0"][5, 2] = np.nan
+    drawn["moments"][7, 0] = -1.0
+    drawn["omega0"][9, 0] = np.inf
+    drawn["omega0"][11] = [1e300, -1e300, 1e300]
+    drawn["attitude0"][13] *= 1e200  # any norm is allowed
+    drawn["attitude0"][14] *= 1e-200
+    found = solve_many(TOP, 2.0, tolerance=1e-9, effort=1e-3, **drawn)
+    assert found.attitude is not None
+    assert found.has_result[[13, 14]].all()
+    assert angle_between(found.attitude[13:15], good.attitude[13:15]).max() <= 1e-9
+    assert np.isnan(found.attitude[[3, 5, 7, 9]]).all()
+    assert found.ended[7] == "refused"
+    others = ~np.isin(np.arange(40), (3, 5, 7, 9, 11, 13, 14))
+    assert np.array_equal(found.attitude[others], good.attitude[others])
+    assert np.array_equal(found.omega[others], good.omega[others])
+
+
+def test_one_attitude_for_all_and_arrays_of_the_caller() -> None:
+    starts = np.random.default_rng(1).standard_normal((30, 3))
+    turned = [0.5, -0.5, 0.5, 0.5]
+    each = solve_many(TOP, 3.0, omega0=starts, attitude0=np.tile(turned, (30, 1)))
+    out = solve_many(TOP, 1.0, omega0=starts, attitude0=turned)
+    shared = solve_many(TOP, 3.0, omega0=starts, attitude0=turned, out=out)
+    assert shared is out
+    assert shared.attitude is not None
+    assert each.attitude is not None
+    assert np.array_equal(shared.attitude, each.attitude)
+    scene = replace(TOP, attitude=(0.5, -0.5, 0.5, 0.5))
+    assert np.array_equal(solve_many(scene, 3.0, omega0=starts).omega, each.omega)
+
+
+@pytest.mark.parametrize("law", [TorqueLaw(), TorqueLaw((3.0, -2.0, 1.0))], ids=("free", "torque"))
+def test_results_may_replace_the_starts(law: TorqueLaw) -> None:
+    rng = np.random.default_rng(2)
+    starts, attitudes = rng.standard_normal((30, 3)), rng.standard_normal((30, 4))
+    starts[::3] = [0.0, 1.2, 1e-9]  # left to the single-body kernel
+    scene = replace(TOP, torque=law)
+    wanted = solve_many(scene, 30.0, omega0=starts, attitude0=attitudes)
+    place = Ensemble(starts, np.empty(30, np.int8), attitudes)
+    found = solve_many(scene, 30.0, omega0=starts, attitude0=attitudes, out=place)
+    assert found is place
+    assert wanted.attitude is not None
+    assert np.array_equal(starts, wanted.omega)
+    assert np.array_equal(attitudes, wanted.attitude)
+
+
+def test_omegas_may_replace_the_starts() -> None:
+    starts = np.random.default_rng(2).standard_normal((30, 3))
+    starts[::3] = [0.0, 1.2, 1e-9]  # left to the single-body kernel
+    many = prepare(TOP).many
+    wanted, whole = many(starts, 30.0)[0], solve_many(TOP, 30.0, omega0=starts).omega
+    place = starts.copy()
+    assert np.array_equal(many(place, 30.0, out=place)[0], wanted)
+    place = starts.copy()
+    assert np.array_equal(solve_many(TOP, 30.0, omega0=place, out=place).omega, whole)
+
+
+def test_bodies_given_by_coefficients_turn_without_a_torque(level: int) -> None:
+    """Their angular momentum is not known, so that the series solves them."""
+    rng = np.random.default_rng(3)
+    starts, attitudes = rng.standard_normal((20, 3)), rng.standard_normal((20, 4))
+    scene = Scene("", (1.0, 0.0, 0.0), coefficients=TOP.euler_coefficients)
+    found = solve_many(scene, 4.0, omega0=starts, attitude0=attitudes, tolerance=1e-9)
+    truth = solve_many(TOP, 4.0, omega0=starts, attitude0=attitudes)
+    assert found.attitude is not None
+    assert truth.attitude is not None
+    assert angle_between(found.attitude, truth.attitude).max() <= 2e-9
+
+
+def test_statuses_are_those_of_a_single_solver(level: int) -> None:
+    rng = np.random.default_rng(4)
+    beside = 10.0 ** rng.uniform(-9.0, 0.0, (60, 1)) * rng.standard_normal((60, 3))
+    starts = np.array([0.0, 1.0, 0.0]) + beside
+    times = 10.0 ** rng.uniform(0.0, 2.0, 60)
+    for law in (TorqueLaw(), TorqueLaw((3.0, -2.0, 1.0))):
+        scene = replace(TOP, torque=law, attitude=(1.0, 0.0, 0.0, 0.0))
+        solver = prepare(scene, tolerance=1e-12, attitude=True)
+        found = solve_many(scene, times, omega0=starts, tolerance=1e-12)
+        statuses = []
+        for start, time in zip(starts, times, strict=True):
+            solver(start, time)
+            statuses.append(solver.status)
+        assert found.ended.tolist() == statuses
+        assert {"complete", "sensitive"} <= set(statuses)
+
+
+def test_a_prepared_solver_takes_many_starts() -> None:
+    rng = np.random.default_rng(9)
+    starts, attitudes = rng.standard_normal((17, 3)), rng.standard_normal((17, 4))
+    laws = (TorqueLaw(), TorqueLaw((1.0, 2.0, 3.0)), TorqueLaw((1.0, 0.5, 2.0), frame="space"))
+    full = Scene("", (1.0, 0.0, 0.0), inertia=[[40, 3, 1], [3, 30, -2], [1, -2, 20]])
+    for body, law in ((TOP, laws[0]), (TOP, laws[1]), (TOP, laws[2]), (full, laws[1])):
+        scene = replace(body, torque=law, attitude=(0.5, 0.5, 0.5, -0.5))
+        many = prepare(scene, tolerance=1e-9, attitude=True).many
+        found = solve_many(scene, 2.0, omega0=starts, attitude0=attitudes, tolerance=1e-9)
+        assert found.attitude is not None
+        omega, attitude, status = many(starts, 2.0, attitudes, threads=2)
+        assert np.allclose(omega, found.omega, rtol=0.0, atol=1e-8)
+        assert np.allclose(attitude, found.attitude, rtol=0.0, atol=1e-9)
+        assert np.array_equal(omega, found.omega) or body is full
+        assert not status.any()
+        usual = solve_many(scene, 2.0, omega0=starts, tolerance=1e-9)
+        assert usual.attitude is not None
+        assert np.allclose(many(starts, 2.0)[1], usual.attitude, rtol=0.0, atol=1e-9)
+    with pytest.raises(InputError, match="omega0"):
+        many([1.0], 2.0)
+
+
+def test_a_torque_of_the_state_turns_many_bodies() -> None:
+    rng = np.random.default_rng(9)
+    starts, attitudes = rng.standard_normal((4, 3)), rng.standard_normal((4, 4))
+    scene = replace(TOP, torque=torques.gravity_gradient(TOP.moments or (), 0.5))
+    found = solve_many(scene, 2.0, omega0=starts, attitude0=attitudes, threads=2)
+    assert found.attitude is not None
+    for row in range(4):
+        alone = replace(scene, omega=starts[row], attitude=attitudes[row])
+        truth = solve(alone, [2.0], attitude=True)
+        assert truth.attitude is not None
+        assert angle_between(found.attitude[row : row + 1], truth.attitude).max() <= 1e-11

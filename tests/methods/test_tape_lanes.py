@@ -1,0 +1,173 @@
+"""Many bodies under one torque that depends on the state, which a kernel solves side by side."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import Scene, prepare, solve, solve_many, torques
+from pyharness.methods.ensemble import Ensemble
+from pyharness.methods.many_recorded import solve_side_by_side
+from pyharness.model.arrays import unit_quaternions
+from pyharness.model.codes import Statuses
+from pyharness.model.extension import extension
+from pyharness.scenes.state_scenes import STEADY, SUDDEN, TURNING, draw, draw_ready
+
+MOMENTS = (1.0, 2.0, 2.5)
+
+
+def lanes(
+    scene: Scene, starts: Any, times: Any, turns: Any = None, tolerance: float = 1e-10
+) -> tuple[Ensemble, list[int]]:
+    """Return the results of the kernel alone, and the numbers of the bodies that it leaves."""
+    n = len(starts)
+    at_rest = replace(scene, omega=(0.0, 0.0, 0.0))
+    solver: Any
+    if turns is None:
+        solver = prepare(at_rest, "taylor", tolerance)
+    else:
+        solver = prepare(at_rest, "taylor", tolerance, attitude=True)
+    found = Ensemble(
+        np.full((n, 3), np.nan), np.full(n, 99, np.int8),
+        None if turns is None else np.full((n, 4), np.nan),
+    )  # fmt: skip
+    left = solve_side_by_side(
+        solver, starts, np.atleast_1d(np.asarray(times, float)), turns, found, slice(0, n),
+        np.zeros(1, np.int32),
+    )  # fmt: skip
+    return found, left
+
+
+def cases() -> Iterator[Any]:
+    """Yield random scenes of each kind of term: the name, the scene and a time (s)."""
+    for name in STEADY + TURNING + SUDDEN:
+        yield pytest.param(*draw(Random(f"lanes {name}"), (name,)), id=name)
+    for number in range(12):
+        scene, time = draw_ready(Random(f"lanes {number}"))
+        yield pytest.param(scene, time, id=scene.name)
+
+
+@pytest.mark.parametrize(("scene", "time"), list(cases()))
+def test_errors_are_below_the_tolerance(scene: Scene, time: float) -> None:
+    source = np.random.default_rng(5)
+    n, tolerance = 24, 1e-9
+    starts = np.array(scene.omega) * (1.0 + 0.3 * source.normal(size=(n, 3)))
+    times = time * source.uniform(0.3, 1.0, n) * source.choice([-1.0, 1.0], n)
+    turns = unit_quaternions(source.normal(size=(n, 4)))
+    has_attitude = scene.torque.needs_attitude or scene.attitude is not None
+    given = turns if has_attitude else None
+    usual = (1.0, 0.0, 0.0, 0.0) if has_attitude else None
+    found, left = lanes(replace(scene, attitude=usual), starts, times, given, tolerance)
+    # A product of 24 factors may not show in the first terms.
+    assert (len(left) == n) == (scene.name == "swings")
+    assert (found.status[left] == 99).all()
+    for i in sorted(set(range(n)) - set(left))[:5]:
+        own = replace(scene, omega=tuple(starts[i]), attitude=tuple(turns[i]))
+        true = solve(own, times[i], "taylor", 1e-14, attitude=has_attitude)
+        growth = true.growth or 1.0
+        allowed = tolerance + 4e-15 * growth
+        scale = max(np.abs(starts[i]).max(), np.abs(true.omega[-1]).max())
+        assert found.status[i] == Statuses.COMPLETE
+        assert np.abs(found.omega[i] - true.omega[-1]).max() <= allowed * scale
+        if found.attitude is not None:
+            assert true.attitude is not None
+            assert 2.0 * np.abs(found.attitude[i] - true.attitude[-1]).max() <= allowed
+
+
+def test_most_bodies_of_a_batch_are_solved_side_by_side() -> None:
+    starts = np.random.default_rng(1).normal(size=(200, 3))
+    turns = np.tile([1.0, 0.0, 0.0, 0.0], (200, 1))
+    damped = Scene("", (1.0, 0.0, 0.0), moments=MOMENTS, torque=torques.damping(0.1))
+    assert len(lanes(damped, starts, 5.0)[1]) <= 2
+    orbit = torques.gravity_gradient(MOMENTS, 0.5)
+    turning = Scene("", (1.0, 0.0, 0.0), moments=MOMENTS, torque=orbit, attitude=(1, 0, 0, 0))
+    assert len(lanes(turning, starts, 5.0, turns)[1]) <= 10
+
+
+@pytest.mark.parametrize("level", [0, 1, 2])
+def test_results_do_not_depend_on_the_other_bodies(level: int) -> None:
+    scene, time = draw(Random("others"), ("field", "decay", "quotient"))
+    source = np.random.default_rng(2)
+    starts, turns = source.normal(size=(37, 3)), source.normal(size=(37, 4))
+    try:
+        if extension().choose_instructions(level) != level:
+            pytest.skip("this processor lacks the instruction set")
+        found = solve_many(scene, time, omega0=starts, attitude0=turns, method="taylor")
+        back = solve_many(scene, time, omega0=starts[::-1], attitude0=turns[::-1], method="taylor")
+        alone = solve_many(scene, time, omega0=starts[5], attitude0=turns[5], method="taylor")
+        threads = solve_many(
+            scene, time, omega0=np.tile(starts, (20, 1)), attitude0=np.tile(turns, (20, 1)),
+            method="taylor", threads=2,
+        )  # fmt: skip
+    finally:
+        extension().choose_instructions(2)
+    assert found.attitude is not None
+    assert alone.attitude is not None
+    assert back.attitude is not None
+    assert found.omega.tobytes() == back.omega[::-1].tobytes()
+    assert found.attitude.tobytes() == back.attitude[::-1].tobytes()
+    assert found.omega[5].tobytes() == alone.omega[0].tobytes()
+    assert found.attitude[5].tobytes() == alone.attitude[0].tobytes()
+    assert threads.omega.tobytes() == np.tile(found.omega, (20, 1)).tobytes()
+
+
+def test_every_entrance_has_the_same_results() -> None:
+    scene, time = draw(Random("entrances"), ("drag", "spring"))
+    source = np.random.default_rng(3)
+    starts, turns = source.normal(size=(30, 3)), source.normal(size=(30, 4))
+    found = solve_many(scene, time, omega0=starts, attitude0=turns, tolerance=1e-9, method="taylor")
+    solver = prepare(scene, "taylor", 1e-9, attitude=True)
+    omega, attitude, status = solver.many(starts, time, turns)
+    assert omega.tobytes() == found.omega.tobytes()
+    assert found.attitude is not None
+    assert attitude.tobytes() == found.attitude.tobytes()
+    assert status.tobytes() == found.status.tobytes()
+    spin = Scene("", (1.0, 0.0, 0.0), moments=MOMENTS, torque=torques.damping(0.1))
+    many, _ = prepare(spin, "taylor", 1e-9).many(starts, time)
+    assert many.tobytes() == lanes(spin, starts, time, tolerance=1e-9)[0].omega.tobytes()
+
+
+def test_bodies_that_can_not_be_solved_are_left() -> None:
+    spin = Scene("", (1.0, 0.0, 0.0), moments=MOMENTS, torque=torques.damping(0.1))
+    starts = np.array([
+        [1.0, 2.0, 3.0], [0.0, 0.0, 0.0], [np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0], [1e80, 1.0, 1.0],
+        [1e-80, 0.0, 0.0], [1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [1.0, 1.0, 1.0],
+    ])  # fmt: skip
+    times = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, np.nan, 1e9, 2.0])
+    found, left = lanes(spin, starts, times)
+    assert left == list(range(1, 9))
+    assert np.isnan(found.omega[1:9]).all()
+    singular = Scene(
+        "", (1.0, 1.0, 1.0), moments=MOMENTS, torque=lambda t, w: [1 / (w[0] - 1), 0, 0]
+    )
+    near = np.array([[2.0, 1.0, 1.0], [1.0, 1.0, 1.0], [2.0, 1.0, 1.0]])
+    assert lanes(singular, near, 0.1)[1] == [1]
+    rising = Scene("", (1.0, 1.0, 1.0), moments=MOMENTS, torque=lambda t, w: [w[0] ** 2, 0.0, 0.0])
+    assert 0 in lanes(rising, starts[[9, 9]], 3.0)[1]
+    turns = np.array([[1.0, 0.0, 0.0, 0.0], [np.nan, 0.0, 0.0, 0.0], [0.5, 0.5, 0.5, 0.5]])
+    assert lanes(spin, starts[[0, 9, 0]], 1.0, turns)[1] == [1]
+
+
+def test_breakpoints_of_tables_end_steps() -> None:
+    torque = torques.pulses([0.5, 1.5], [0.25, 0.5], [(3.0, 0.0, 1.0), (0.0, -4.0, 0.0)])
+    scene = Scene("", (1.0, 0.5, 0.2), moments=MOMENTS, torque=torque)
+    starts = np.random.default_rng(4).normal(size=(40, 3))
+    times = np.random.default_rng(5).uniform(-1.0, 3.0, 40)
+    found, left = lanes(scene, starts, times)
+    assert len(left) <= 4
+    for i in sorted(set(range(40)) - set(left)):
+        true = solve(replace(scene, omega=tuple(starts[i])), times[i], "taylor", 1e-13).omega[-1]
+        assert found.omega[i] == pytest.approx(true, abs=1e-9)
+
+
+def test_unstable_motions_are_left() -> None:
+    # Errors grow as exp(2 t), until the last digits are lost.
+    unstable = Scene(
+        "", (1.0, 0.0, 0.0), moments=MOMENTS, torque=lambda t, w: [0.0, 4.0 * w[1], 0.0]
+    )
+    starts = np.array([[1.0, 1e-6, 0.3]] * 8)
+    assert lanes(unstable, starts, 0.5)[1] == []
+    assert lanes(unstable, starts, 6.0)[1] == list(range(8))

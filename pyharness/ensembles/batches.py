@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.ensembles.fields import ATTITUDE, CHOICES, CONSTANTS, number_field
+from pyharness.ensembles.reductions import needs_attitudes
 from pyharness.ensembles.state_torques import follows_body, with_numbers
 from pyharness.ensembles.sweep import Indices, Sweep, groups, value_columns
 from pyharness.methods.batch import OF_PROGRAMS, Batch
@@ -103,8 +104,6 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     if is_refused:
         # No method solves a scene until a time that is no number.
         t_end = np.full(n, np.nan)
-    if isinstance(scene.torque, StateTorque) and not scene.torque.needs_attitude:
-        scene = replace(scene, attitude=None)
     found = {
         "omega0": _omega(scene, own, values if body == "moments" else None, n),
         "attitude0": _attitude(scene, own, n),
@@ -113,7 +112,7 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
         body: values,
     }
     arrays = {name: array for name, array in found.items() if array is not None}
-    return Batch(scene, solver, listing, t_end, arrays)
+    return Batch(scene, solver, listing, t_end, arrays, needs_attitudes(sweep.reductions))
 
 
 def _law_arrays(scene: Scene, own: Columns, n: int) -> dict[str, Array | None]:
@@ -130,11 +129,8 @@ def _law_arrays(scene: Scene, own: Columns, n: int) -> dict[str, Array | None]:
 
 
 def _attitude(scene: Scene, own: Columns, n: int) -> Array | None:
-    """Return the initial attitudes of n scenes, shape (n, 4), or None if no axis varies them.
-
-    The result is also None if the torque does not depend on the attitude.
-    """
-    if not scene.torque.needs_attitude or not any(name in own for name in ATTITUDE):
+    """Return the initial attitudes of n scenes, shape (n, 4), or None if no axis varies them."""
+    if not any(name in own for name in ATTITUDE):
         return None
     base = scene.attitude or IDENTITY
     columns = [own.get(name, np.full(n, base[i])) for i, name in enumerate(ATTITUDE)]

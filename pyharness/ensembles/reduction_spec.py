@@ -1,12 +1,14 @@
 """Reading and checking of the reductions (quantities to store) that a sweep file requests."""
 
+import math
 from collections.abc import Mapping
 
-from pyharness.ensembles.reductions import RANKS, REDUCTIONS
+from pyharness.ensembles.attitude_reductions import RANKS
+from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.sweep import ReductionSpec
 from pyharness.methods.registry import METHODS
 from pyharness.model.errors import InputError, unknown
-from pyharness.model.values import integer, number
+from pyharness.model.values import integer, number, three
 
 _MOST_SAMPLES = 10_000
 
@@ -39,6 +41,12 @@ def reduction_spec_of(entry: object, claims: Mapping[str, str]) -> ReductionSpec
         raise InputError(f"{where} offset {given['offset']:g}; allowed: above 0, to 1")
     if "of" in given and given["of"] not in RANKS:
         raise unknown("axis", given["of"], RANKS, f"{where} of")
+    if "above" in given and not 0.0 <= number(f"{where} above", given["above"]) <= math.pi:
+        raise InputError(f"{where} above {given['above']:g}; allowed: 0 to pi, rad")
+    if "towards" in table:
+        given["towards"] = three(f"{where} towards", table["towards"])
+        if not any(given["towards"]):
+            raise InputError(f"{where} towards: allowed: three finite numbers, not all 0")
     if "against" in given:
         if not isinstance(given["against"], str) or given["against"] not in METHODS:
             raise unknown("method", given["against"], METHODS, f"{where} against")

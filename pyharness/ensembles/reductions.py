@@ -1,13 +1,20 @@
 """Reductions: the quantities that a sweep can store for each scene, and their computation."""
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.ensembles.attitude_reductions import (
+    axis_flips,
+    end_attitude,
+    largest_tilt,
+    pointing_error,
+    tilted_time,
+)
 from pyharness.ensembles.sweep import ReductionSpec
 from pyharness.methods.batch import Batch
 from pyharness.model.codes import Statuses
@@ -16,8 +23,6 @@ from pyharness.model.trajectory import STOP_VARIABLES, Array
 from pyharness.theory.flips import flip_times
 
 Found = NDArray[Any]
-# Names of a body's principal axes, in ascending order of their moments.
-RANKS = ("least", "middle", "largest")
 # Value of an integer array where no scene has been computed yet.
 _NOT_YET = -1
 
@@ -132,18 +137,6 @@ def _largest_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
     return largest
 
 
-def _axis_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
-    squares = batch.attitudes(given["samples"]) ** 2
-    axis = np.argsort(batch.bodies, axis=1, kind="stable")[:, RANKS.index(given["of"])]
-    column = np.broadcast_to(axis, (len(squares),))
-    is_own = np.arange(3) == column[:, None, None]
-    # The squares of the cosine and the sine of half the angle from the initial to the present axis.
-    along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)
-    across = np.where(is_own, 0.0, squares[:, :, 1:]).sum(axis=2)
-    largest: Found = 2.0 * np.arctan2(np.sqrt(across), np.sqrt(along)).max(axis=1)
-    return largest
-
-
 def _flips(batch: Batch, given: Mapping[str, Any]) -> Found:
     middle = np.argsort(batch.bodies, axis=1, kind="stable")[:, 1]
     column = np.broadcast_to(middle, (len(batch.omega0),))
@@ -176,6 +169,7 @@ def _unit(vectors: Array) -> Array:
 
 
 _SAMPLES = {"samples": 100}
+_OF_AXES: dict[str, Any] = {"only": "method", "needs": ("moments", "attitude")}
 _STATUSES = {code: name for code, name in enumerate(ENDS) if name != "interrupted"}
 REDUCTIONS = {
     "end": Reduction(
@@ -229,13 +223,43 @@ REDUCTIONS = {
         _largest_tilt,
         parameters=_SAMPLES,
     ),
+    "attitude": Reduction(
+        "attitude at the end, a quaternion from the body to space, scalar first",
+        "1",
+        end_attitude,
+        labels=("0", "1", "2", "3"),
+        dimension="quaternion",
+        only="method",
+        needs=("attitude",),
+    ),
     "axis-tilt": Reduction(
         "largest angle in space of a body's axis from where it was",
         "rad",
-        _axis_tilt,
-        only="method",
-        needs=("moments", "attitude"),
+        largest_tilt,
         parameters={**_SAMPLES, "of": "middle"},
+        **_OF_AXES,
+    ),
+    "tilted-time": Reduction(
+        "time during which the angle in space of a body's axis from where it was exceeds a limit",
+        "s",
+        tilted_time,
+        parameters={**_SAMPLES, "of": "middle", "above": 0.5},
+        **_OF_AXES,
+    ),
+    "axis-flips": Reduction(
+        "times that the angle in space of a body's axis from where it was passes a right angle",
+        "1",
+        axis_flips,
+        "i4",
+        parameters={**_SAMPLES, "of": "middle"},
+        **_OF_AXES,
+    ),
+    "pointing-error": Reduction(
+        "angle of a body's axis from a direction in space at the end",
+        "rad",
+        pointing_error,
+        parameters={"of": "largest", "towards": ()},
+        **_OF_AXES,
     ),
     "flips": Reduction(
         "changes of sign of the component about the middle axis",
@@ -258,6 +282,11 @@ REDUCTIONS = {
         parameters={"offset": 1e-6},
     ),
 }
+
+
+def needs_attitudes(asked: Iterable[ReductionSpec]) -> bool:
+    """Return whether any of these reductions, quantities to store, needs attitudes."""
+    return any("attitude" in REDUCTIONS[each.reduction].needs for each in asked)
 
 
 def empty(asked: ReductionSpec, n: int) -> Found:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pyharness.ensembles.executors import Engine, engine
 from pyharness.ensembles.forecast import Estimate, byte_count, forecast, short_count
-from pyharness.ensembles.reductions import empty
+from pyharness.ensembles.reductions import empty, needs_attitudes
 from pyharness.ensembles.store import Store, check_store, opened
 from pyharness.ensembles.sweep import Sweep
 from pyharness.model.errors import InputError
@@ -80,7 +80,8 @@ def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int
 
 def _scene_memory(sweep: Sweep) -> int:
     samples = sum(int(dict(asked.parameters).get("samples", 1)) for asked in sweep.reductions)
-    return _COPIES * (bytes_per_scene(sweep) + 8 * len(sweep.axes)) + 24 * 3 * samples
+    state = 8 * (7 if needs_attitudes(sweep.reductions) else 3)
+    return _COPIES * (bytes_per_scene(sweep) + 8 * len(sweep.axes)) + 3 * state * samples
 
 
 @contextlib.contextmanager

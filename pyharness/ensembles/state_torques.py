@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pyharness.dynamics.scene_reader import scene_of
-from pyharness.ensembles.fields import ATTITUDE, CONSTANTS
+from pyharness.ensembles.fields import CONSTANTS
 from pyharness.methods.registry import check_torque
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene import STATE_TORQUE, Scene
@@ -20,14 +20,9 @@ def check_state_axis(scene: Scene, field: str) -> None:
     """Raise InputError if the scene of a sweep has no torque with the field of an axis.
 
     A torque that depends on the state has neither the constant nor the linear term of a torque law.
-    Only expressions have constants with names, and only a torque that depends on the attitude needs
-    its initial value.
+    Only expressions have constants with names.
     """
     torque = scene.torque
-    if field in ATTITUDE and not torque.needs_attitude:
-        raise InputError(
-            f"axis {field}: the torque does not depend on the attitude; leave the axis out"
-        )
     if isinstance(torque, StateTorque):
         names = [name for name, _ in torque.constants]
         if field.startswith(("torque.constant.", "torque.rate.")):

@@ -11,9 +11,9 @@ from typing import Any
 from pyharness.dynamics.scene_reader import scene_of, scene_of_file
 from pyharness.ensembles.axes import Axis, axis_of
 from pyharness.ensembles.batches import listing_of
-from pyharness.ensembles.fields import CHOICES, RIVALS
+from pyharness.ensembles.fields import ATTITUDE, CHOICES, RIVALS
 from pyharness.ensembles.reduction_spec import reduction_spec_of
-from pyharness.ensembles.reductions import REDUCTIONS
+from pyharness.ensembles.reductions import REDUCTIONS, needs_attitudes
 from pyharness.ensembles.state_torques import check_state_axis, check_state_solver
 from pyharness.ensembles.sweep import Sweep
 from pyharness.methods.batch import Solver
@@ -215,6 +215,13 @@ def _check_axes(axes: tuple[Axis, ...], scene: Scene, solver: Solver) -> None:
 
 
 def _check_reductions(sweep: Sweep) -> None:
+    has_attitudes = sweep.scene.torque.needs_attitude or needs_attitudes(sweep.reductions)
+    for axis in sweep.axes:
+        if axis.field in ATTITUDE and not has_attitudes:
+            raise InputError(
+                f"axis {axis.field}: neither the torque nor a reduction depends on the attitude; "
+                "leave the axis out"
+            )
     kind = "method" if sweep.solver.program is None else "program"
     names = [asked.name for asked in sweep.reductions]
     taken = {*sweep.dimensions, *(axis.field for axis in sweep.axes)}

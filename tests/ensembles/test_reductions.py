@@ -1,13 +1,15 @@
 """Reductions: each is compared with solutions of one scene at a time."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from pyharness import case_scene, run_program, solve
+from pyharness import InputError, case_scene, run_program, solve
 from pyharness.ensembles.batches import batches, listing_of
 from pyharness.ensembles.chunk import solve_chunk
 from pyharness.ensembles.reductions import REDUCTIONS
@@ -54,19 +56,63 @@ def test_reductions_say_what_the_motion_does(tmp_path: Path) -> None:
     assert 0.0 < found["drift"].max() < 1e-12
 
 
-def test_axis_tilts_in_space_as_the_body_turns(tmp_path: Path) -> None:
+_AXES = ("least", "middle", "largest")
+_START = [0.5, -0.1, 0.7, 0.3]
+_LAW = "[torque]\nconstant = [0.1, 0.0, -0.2]\nsines = [{amplitude = [0.3, 0, 0], frequency = 2.0}]"
+_WITH_DAMPING = "[torque]\nexpression = ['-0.1*w1', '-0.3*w2', '0.2*cos(t)']"
+_IN_SPACE = "[torque]\nexpression = ['0.2*q1', '-0.1*w2', '0.3*q0*q3']"
+
+
+@pytest.mark.parametrize("torque", ["", _LAW, _WITH_DAMPING, _IN_SPACE])
+def test_attitudes_are_those_of_single_scenes(tmp_path: Path, torque: str) -> None:
+    towards = np.array([0.3, -2.0, 1.0])
     asked = ", ".join(
-        f'{{name = "axis-tilt", of = "{axis}", samples = 50, as = "{axis}"}}'
-        for axis in ("least", "middle", "largest")
+        f'{{name = "axis-tilt", of = "{axis}", samples = 50, as = "{axis}"}}, '
+        f'{{name = "axis-flips", of = "{axis}", samples = 50, as = "flips-{axis}"}}, '
+        f'{{name = "tilted-time", of = "{axis}", samples = 50, above = 1.0, as = "time-{axis}"}}, '
+        f'{{name = "pointing-error", of = "{axis}", as = "error-{axis}"}}, '
+        f'{{name = "pointing-error", of = "{axis}", towards = [0.3, -2.0, 1.0], as = "to-{axis}"}}'
+        for axis in _AXES
     )
-    sweep, found = _found(tmp_path, text(TILT, top=f"reductions = [{asked}]"))
+    scene = f"{BASE.replace('omega =', f'attitude = {_START}{chr(10)}omega =')}{torque}"
+    content = text(TILT, top=f'reductions = ["attitude", "end", {asked}]', scene=scene)
+    sweep, found = _found(tmp_path, content.replace("[torque]", "[scene.torque]"))
     times = [10.0 * (i + 1) / 50 for i in range(50)]
-    for i, scene in enumerate(_tilted(sweep)):
-        matrices = solve(scene, times, attitude=True).rotation().as_matrix()
-        for axis, name in enumerate(("least", "middle", "largest")):
-            expected = np.arccos(np.clip(matrices[:, axis, axis], -1.0, 1.0)).max()
-            assert found[name][i] == pytest.approx(expected, abs=1e-6)
-    assert found["middle"].max() > 3.0
+    for i, tilt in enumerate(sweep.axes[0].coordinates()):
+        alone = replace(sweep.scene, omega=(np.sin(tilt), np.cos(tilt), 0.0))
+        rows = solve(alone, times, attitude=True)
+        assert rows.attitude is not None
+        assert np.abs(found["attitude"][i] - rows.attitude[-1]).max() < 1e-9
+        assert np.abs(found["end"][i] - rows.omega[-1]).max() < 1e-9
+        matrices = rows.rotation().as_matrix()
+        first = Rotation.from_quat(_START, scalar_first=True).as_matrix()
+        for axis, name in enumerate(_AXES):
+            cosines = matrices[:, :, axis] @ first[:, axis]
+            tilts = np.arccos(np.clip(cosines, -1.0, 1.0))
+            assert found[name][i] == pytest.approx(tilts.max(), abs=1e-6)
+            assert found[f"error-{name}"][i] == pytest.approx(tilts[-1], abs=1e-6)
+            passed = np.diff(np.concatenate([[1.0], np.sign(cosines)])) != 0
+            assert found[f"flips-{name}"][i] == passed.sum()
+            assert found[f"time-{name}"][i] == pytest.approx(10.0 * (tilts > 1.0).mean())
+            cosine = matrices[-1, :, axis] @ towards / np.linalg.norm(towards)
+            assert found[f"to-{name}"][i] == pytest.approx(np.arccos(cosine), abs=1e-6)
+    assert found["middle"].max() > 1.5
+    assert found["flips-middle"].max() > 0
+    assert 0.0 < found["time-middle"].max() < 10.0
+
+
+def test_initial_attitudes_may_vary_where_a_quantity_needs_them(tmp_path: Path) -> None:
+    axis = '[[axis]]\nfield = "attitude.1"\nvalues = [0.0, 0.5, 2.0]'
+    top = 'reductions = ["attitude", {name = "pointing-error", towards = [0, 0, 1]}, "status"]'
+    sweep, found = _found(tmp_path, text(axis, top=top))
+    for i, x in enumerate((0.0, 0.5, 2.0)):
+        rows = solve(replace(sweep.scene, attitude=(1.0, x, 0.0, 0.0)), 10.0, attitude=True)
+        assert rows.attitude is not None
+        assert np.abs(found["attitude"][i] - rows.attitude[-1]).max() < 1e-11
+        axis3 = rows.rotation().as_matrix()[-1, 2, 2]
+        assert found["pointing-error"][i] == pytest.approx(np.arccos(axis3), abs=1e-7)
+    with pytest.raises(InputError, match="neither the torque nor a reduction"):
+        read_sweep(written(tmp_path, text(axis, top='reductions = ["end"]')))
 
 
 def test_error_and_drift_are_those_of_the_method(tmp_path: Path) -> None:

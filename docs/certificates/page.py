@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from docs.article.build import rendered, wrapped
+from docs.certificates.limits import counts_table, limits_table
 from docs.certificates.write import DIGITS, HERE, TIMES, file_name, planned
 from pyharness.edition.made_pages import table
 from pyharness.history.claims.laboratory import starts
@@ -64,6 +65,8 @@ def proofs_page() -> str:
             "original_end": _end_table(True),
             "corrected_end": _end_table(False),
             "files": _files_table(),
+            "limit_counts": counts_table(),
+            "check_limits": limits_table(),
         },
     )
     source = Path(certificate_checker.__file__).read_text(encoding="utf-8")

@@ -5,9 +5,11 @@ module: a certificate has the steps and their balls, and the checker verifies ea
 """
 
 import math
+from bisect import bisect
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 from pyharness.model.effort import advice, checked_effort
@@ -15,7 +17,13 @@ from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
-from pyharness.truth.certificate_checker import FORMAT, SCALE_BITS, NotProvedError, System
+from pyharness.truth.certificate_checker import (
+    FORMAT,
+    SCALE_BITS,
+    Expansion,
+    NotProvedError,
+    System,
+)
 from pyharness.truth.enclosed import Balls, Enclosure, largest_radius, row_of
 from pyharness.truth.scales import scales_of
 from pyharness.truth.times import check_order
@@ -23,11 +31,13 @@ from pyharness.truth.times import check_order
 _TUBE_BITS = 30  # a tube is at least 2**-30 of the solution thick
 _GUARD_BITS = 16
 _LENGTH_BITS = 20
-_MOST_STEPS = 20_000  # some twenty seconds
+_SHARE_BITS = 20  # the last terms are at most 2**-20 of the radius, or less than the digits need
+_TOLERATED = 3  # bits by which the last terms may exceed their limit
+_MOST_STEPS = 20_000  # some five to thirty seconds
 _MOST_ATTEMPTS = 6
-# After this share of the time, the growth of the radius is extrapolated; the digits that it takes
-# may be exceeded by some more.
-_EARLY, _MORE = 0.05, 4.0
+# After this share of the time, the growth of the radius is extrapolated. If it needs more digits,
+# they are exceeded by some more.
+_EARLY, _MORE = 0.05, 1.5
 _WORDS = "Taylor steps in integer arithmetic"
 
 
@@ -41,10 +51,15 @@ class _Step:
 
 @dataclass(frozen=True)
 class Proof:
-    """An enclosure at requested times, and its certificate as a dictionary for JSON."""
+    """An enclosure at requested times, and its certificate."""
 
     enclosure: Enclosure
-    certificate: dict[str, Any]
+    _run: "_Run"
+
+    @cached_property
+    def certificate(self) -> dict[str, Any]:
+        """The certificate as a dictionary for JSON."""
+        return self._run.certificate()
 
 
 class _AmplifiedError(Exception):
@@ -85,18 +100,19 @@ def prove(
     record = _scene_record(scene)
     limit = _MOST_STEPS * checked_effort(effort)
     wanted = float(digits)
-    for _ in range(_MOST_ATTEMPTS):
+    for attempt in range(_MOST_ATTEMPTS):
         run = _Run(record, times, wanted, digits)
         try:
-            steps = run.steps(limit, effort, progress)
+            # The last attempt shows how far a proof leads, for example to a singularity.
+            last = attempt == _MOST_ATTEMPTS - 1
+            run.prove(limit, effort, progress, 1.0 if last else _EARLY)
         except _AmplifiedError as error:
             wanted += error.digits
             continue
-        omega = run.balls(steps)
-        excess = largest_radius(omega, digits)
+        excess = largest_radius(run.omega, digits)
         if excess <= 1:
-            found = Enclosure(tuple(times), tuple(omega), _WORDS, len(steps))
-            return Proof(found, run.certificate(steps, omega))
+            found = Enclosure(tuple(times), tuple(run.omega), _WORDS, len(run.steps))
+            return Proof(found, run)
         wanted += _decades(excess) + 1.0
     raise InputError(f"prove: the motion amplifies errors too much for {digits} digits; use fewer")
 
@@ -136,96 +152,110 @@ class _Run:
         self, record: dict[str, Any], times: Sequence[float], digits: float, goal: int
     ) -> None:
         self._record, self._times = record, [Fraction(t) for t in times]
-        self._digits, self._goal = digits, goal
+        self._goal = goal
         # More terms make fewer steps and a smaller certificate; too many cost time.
         self._order = max(16, round(min(1.6 * digits, digits + 40.0)))
-        self._clock = max(_LENGTH_BITS + 12, *(t.denominator.bit_length() for t in self._times))
+        self._clock = max(_LENGTH_BITS + 12, self._times[-1].denominator.bit_length())
         needed = math.ceil(digits / math.log10(2.0)) + _GUARD_BITS
-        self._fine = needed + _GUARD_BITS + self._order.bit_length()
-        self._bits = max(self._clock, self._fine)
+        self._bits = max(self._clock, needed + _GUARD_BITS + self._order.bit_length())
         self._most = self._bits - needed  # bits of the last terms
-        self._system = System(record, self._bits, self._clock, [1, 1, 1])
-        coefficients = [Fraction(terms[0], common) for common, terms in self._system.rows]
-        self._system.scales = [round(x * (1 << SCALE_BITS)) for x in scales_of(coefficients)]
+        rows = System(record, self._bits, self._clock, [1, 1, 1]).rows
+        scales = scales_of([Fraction(terms[0], common) for common, terms in rows])
+        whole = [round(x * (1 << SCALE_BITS)) for x in scales]
+        self._system = System(record, self._bits, self._clock, whole)
+        # For each step, the share of the last time and the logarithm of the amplification so far.
+        self._amplified: list[tuple[float, float]] = [(0.0, 0.0)]
+        self.steps: list[_Step] = []
+        self.omega: list[Balls] = []
 
-    @property
-    def _start(self) -> list[int]:
-        return [int(Fraction(x) * (1 << self._bits)) for x in self._record["omega"]]
+    def prove(self, limit: float, effort: float, progress: Progress, early: float) -> None:
+        """Find the steps from time 0 to the last requested time, and the balls of omega.
 
-    def steps(self, limit: float, effort: float, progress: Progress) -> list[_Step]:
-        """Return the steps from time 0 to the last requested time."""
+        Raise _AmplifiedError if the radius grows too fast after the share `early` of the time.
+        """
         system, clock = self._system, self._clock
-        middle, waves = self._start, [0, 1 << self._bits] * len(system.frequencies)
+        middle = [int(Fraction(x) * (1 << self._bits)) for x in self._record["omega"]]
+        waves = [0, 1 << self._bits] * len(system.frequencies)
         radius, wave_radius, time = system.norm([1, 1, 1]), 0, 0
-        found: list[_Step] = []
-        ends = [int(t * (1 << clock)) for t in self._times]
-        length, side = 1 << clock, -1 if ends[-1] < 0 else 1
-        for end in ends:
-            while time != end:
-                if len(found) >= limit:
-                    share = max(abs(time / ends[-1]), 1e-3)
-                    instead = advice("use a shorter time", effort, effort / share)
-                    raise InputError(f"prove: more than {limit:.0f} steps; {instead}")
-                h = side * min(length, abs(end - time))
-                while True:
-                    expansion = system.expand([*middle, *waves], time, h, self._order)
-                    last = max(abs(x) for each in expansion[0] for x in each[-2:])
-                    excess = (last.bit_length() - self._most) / self._order
-                    if excess <= 0.0:
-                        tube = self._tube(radius, expansion, h)
-                        try:
-                            radii = system.radii(radius, wave_radius, expansion, tube, h)
-                            break
-                        except NotProvedError:
-                            h = int(h / 2)
-                    else:
-                        h = int(h * 2.0 ** (-excess - 0.05))
-                    if abs(h) <= 1:
-                        at = time / 2.0**clock
-                        raise InputError(f"prove: no proof is found beyond t = {at:.6g} s")
-                after = [sum(each) for each in expansion[0]]
-                middle, waves, time = after[:3], after[3:], time + h
-                # The checker adds the distance from the stated middle, which is 0, rounded up.
-                radius, wave_radius = radii[0] + system.norm([0, 0, 0]), radii[1]
-                found.append(_Step(h, tube, radius, middle))
-                length = max(1, int(abs(h) * 2.0 ** min(1.0, -excess - 0.02)))
-                self._check_growth(radius, abs(time / ends[-1]))
-                progress(abs(time * 100 // ends[-1]), 100, f"t = {time / 2.0**clock:.4g} s")
-        return found
+        self._add_balls([[x] for x in middle], radius, 0, 0)
+        end = int(self._times[-1] * (1 << clock))
+        length, side = 1 << clock, -1 if end < 0 else 1
+        while time != end:
+            if len(self.steps) >= limit:
+                share = max(abs(time / end), 1e-3)
+                instead = advice("use a shorter time", effort, effort / share)
+                raise InputError(f"prove: more than {limit:.0f} steps; {instead}")
+            h = side * min(length, abs(end - time))
+            # Residuals that are much smaller than the present radius would cost time.
+            most, longer = max(self._most, radius.bit_length() - _SHARE_BITS), 1.0
+            while True:
+                expansion = system.expand([*middle, *waves], time, h, self._order)
+                last = max(abs(x) for each in expansion[0] for x in each[-2:])
+                excess = (last.bit_length() - most) / self._order
+                if excess <= _TOLERATED / self._order:
+                    source = self._source(radius, wave_radius, expansion, h)
+                    tube = self._tube(source, expansion)
+                    try:
+                        radii = system.radii(radius, wave_radius, expansion, tube, h)
+                        break
+                    except NotProvedError:
+                        h, longer = int(h / 2), 0.1
+                else:
+                    h = int(h * 2.0 ** (-excess - 0.05))
+                if abs(h) <= 1:
+                    at = time / 2.0**clock
+                    raise InputError(f"prove: no proof is found beyond t = {at:.6g} s")
+            self._add_balls(expansion[0], radii[0], time, h)
+            after = [sum(each) for each in expansion[0]]
+            middle, waves, time = after[:3], after[3:], time + h
+            more = self._expected_excess(radii[0], source, middle, time / end)
+            if early < time / end < 1.0 and more > 0.0:
+                raise _AmplifiedError(more + _MORE)
+            # The checker adds the distance from the stated middle, which is 0, rounded up.
+            radius, wave_radius = radii[0] + system.norm([0, 0, 0]), radii[1]
+            self.steps.append(_Step(h, tube, radius, middle))
+            length = max(1, int(abs(h) * 2.0 ** min(longer, -excess)))
+            progress(abs(time * 100 // end), 100, f"t = {time / 2.0**clock:.4g} s")
 
-    def _check_growth(self, radius: int, share: float) -> None:
-        """Raise _AmplifiedError if the radius grows too fast, after a `share` of the last time."""
-        spare = self._digits - self._goal + 3.0
-        lost = (radius.bit_length() - self._bits) * math.log10(2.0) + self._digits
-        if share > _EARLY and lost / share > spare + _MORE:
-            raise _AmplifiedError(lost / share - spare + _MORE)
+    def _expected_excess(
+        self, radius: int, source: int, middle: Sequence[int], share: float
+    ) -> float:
+        """Return by how many digits the radius will exceed its limit at the last time.
 
-    def _tube(self, radius: int, expansion: Any, h: int) -> int:
+        The logarithm of the amplification is extrapolated at its mean rate since half the time.
+        """
+        amplified = self._amplified
+        total = amplified[-1][1] + math.log10(radius) - math.log10(source)
+        amplified.append((share, total))
+        then, before = amplified[bisect(amplified, (share / 2.0, 0.0))]
+        rate = (total - before) / (share - then) if share > then else 0.0
+        unit = max(1 << self._bits, *map(abs, middle))
+        return math.log10(radius) - math.log10(unit) + self._goal + rate * (1.0 - share)
+
+    def _source(self, radius: int, wave_radius: int, expansion: Expansion, h: int) -> int:
+        """Return a bound of the error at the end of a step without amplification."""
+        _, residuals, wave_residual = expansion
+        forced = self._system.forced(h) * (wave_radius + wave_residual) >> 64
+        return radius + self._system.norm(residuals) + forced
+
+    def _tube(self, source: int, expansion: Expansion) -> int:
         """Return the radius of a tube that is larger than the error of an ordinary step."""
-        series, residuals, wave_residual = expansion
-        system = self._system
-        thick: int = max(max(map(abs, each)) for each in series[:3]) >> _TUBE_BITS
-        source: int = radius + system.norm(residuals) + (system.forced(h) * wave_residual >> 64)
+        thick: int = max(max(map(abs, each)) for each in expansion[0][:3]) >> _TUBE_BITS
         return 8 * source + thick + 8
 
-    def balls(self, steps: Sequence[_Step]) -> list[Balls]:
-        """Return the balls of omega at each requested time."""
+    def _add_balls(self, series: list[list[int]], radius: int, time: int, h: int) -> None:
+        """Add the balls at the requested times that are in a step, or at its begin if h is 0."""
         unit = 1 << self._bits
-        largest = max(self._system.scales)
-        states = {Fraction(0): (self._start, self._system.norm([1, 1, 1]))}
-        time = 0
-        for step in steps:
-            time += step.length
-            states[Fraction(time, 1 << self._clock)] = (step.middle, step.radius)
-        found = []
-        for middle, radius in (states[t] for t in self._times):
-            size = Fraction(radius * largest, unit << SCALE_BITS)
-            found.append(Balls(tuple(Fraction(x, unit) for x in middle), size))
-        return found
+        for t in self._times[len(self.omega) :]:
+            passed = t * (1 << self._clock) - time
+            if abs(passed) > abs(h):
+                break
+            middle, size = self._system.ball(series, passed / (h or 1), radius)
+            self.omega.append(Balls(tuple(Fraction(x, unit) for x in middle), size / unit))
 
-    def certificate(self, steps: Sequence[_Step], omega: Sequence[Balls]) -> dict[str, Any]:
+    def certificate(self) -> dict[str, Any]:
         """Return the certificate of the balls at all requested times but 0."""
-        rows = zip(self._times, omega, strict=True)
+        rows = zip(self._times, self.omega, strict=True)
         return {
             "format": FORMAT,
             "scene": self._record,
@@ -233,6 +263,6 @@ class _Run:
             "clock": self._clock,
             "order": self._order,
             "scales": list(self._system.scales),
-            "steps": [[x.length, x.tube, x.radius, x.middle] for x in steps],
+            "steps": [[x.length, x.tube, x.radius, x.middle] for x in self.steps],
             "rows": [row_of(float(t), balls) for t, balls in rows if t],
         }

@@ -112,7 +112,7 @@ def _digits(radius: Fraction) -> int:
 
 def _decimal(x: Fraction, digits: int) -> str:
     """Return a fraction as a decimal string with so many digits after the point."""
-    whole = round(abs(x) * 10**digits)
+    whole = (abs(x.numerator) * 10**digits * 2 + x.denominator) // (2 * x.denominator)
     sign = "-" if x < 0 and whole else ""
     text = str(whole).rjust(digits + 1, "0")
     return sign + (f"{text[:-digits]}.{text[-digits:]}" if digits else text)

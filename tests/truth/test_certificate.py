@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
+from itertools import pairwise
 from math import nextafter
 from pathlib import Path
 from random import Random
@@ -20,7 +21,7 @@ from pyharness.scenes.random_scenes import random_scene
 from pyharness.truth import certificate_checker
 from pyharness.truth.certificate import prove
 from pyharness.truth.certificate_checker import NotProvedError, System, check, check_file
-from pyharness.truth.enclosed import Balls, rounded_up
+from pyharness.truth.enclosed import Balls, decimals, rounded_up
 from pyharness.truth.reference import Reference, reference
 from tests import intervals, lohner
 
@@ -130,6 +131,31 @@ def test_moments_of_a_principal_scene_are_exact() -> None:
     assert tuple(map(Fraction, certificate["scene"]["moments"])) == scene.exact_moments
     assert any(isinstance(x, str) for x in certificate["scene"]["moments"])
     assert check(certificate) > 0
+
+
+def replayed(record: Record) -> tuple[System, list[tuple[int, int, list[list[int]], int]]]:
+    """Return the system, and for each step its begin, length, polynomials and radius.
+
+    The last entry has the end of the last step.
+    """
+    system = System(record["scene"], record["bits"], record["clock"], record["scales"])
+    middle = [int(Fraction(x) * 2 ** record["bits"]) for x in record["scene"]["omega"]]
+    waves = [0, 1 << record["bits"]] * len(system.frequencies)
+    time, found = 0, []
+    for h, _, radius, after in record["steps"]:
+        series = system.expand([*middle, *waves], time, h, record["order"])[0]
+        found.append((time, h, series, radius))
+        middle, waves, time = after, [sum(each) for each in series[3:]], time + h
+    return system, [*found, (time, 0, [], 0)]
+
+
+def stated(
+    system: System, series: list[list[int]], step: tuple[int, int], radius: int, seconds: float
+) -> tuple[list[str], float]:
+    """Return the omega and radius of a row, from a step that may not contain its time."""
+    middle, size = system.ball(series, system.place(seconds, *step), radius)
+    unit = 1 << system.bits
+    return decimals(Balls(tuple(Fraction(x, unit) for x in middle), size / unit))
 
 
 def _digit(source: Random, text: str, first: int, last: int) -> str:
@@ -244,6 +270,36 @@ def _row_time(source: Random, record: Record) -> None:
     row["time"] = source.choice((nextafter(row["time"], 9.0), 2 * row["time"], 0.0))
 
 
+def _row_outside(source: Random, record: Record) -> None:
+    """Move a row to a time in a step before or after its own, or in no step."""
+    row = source.choice(record["rows"])
+    clock = 1 << record["clock"]
+    ends = [0.0]
+    for h, *_ in record["steps"]:
+        ends.append(ends[-1] + h / clock)
+    inside = [abs(a) <= abs(row["time"]) <= abs(b) for a, b in pairwise(ends)]
+    middles = [(a + b) / 2 for (a, b), own in zip(pairwise(ends), inside, strict=True) if not own]
+    row["time"] = source.choice((*middles, -row["time"], 1.5 * ends[-1]))
+
+
+def _row_of_a_neighbour(source: Random, record: Record) -> None:
+    """Take the middle and the radius of a row from the step before its own."""
+    place, row = 0, record["rows"][-1]
+    system, states = replayed(record)
+    while abs(states[place + 1][0]) < abs(row["time"]) * 2 ** record["clock"]:
+        place += 1
+    time, h, series, radius = states[place - 1]
+    row["omega"], row["radius"] = stated(system, series, (time, h), radius, row["time"])
+
+
+def _row_radius_of_a_neighbour(source: Random, record: Record) -> None:
+    """Give a row the radius of the first step, with its own middle."""
+    system, states = replayed(record)
+    row = record["rows"][-1]
+    time, h, series, _ = states[-2]
+    row["omega"], row["radius"] = stated(system, series, (time, h), states[0][3], row["time"])
+
+
 def _row_order(source: Random, record: Record) -> None:
     record["rows"].reverse()
 
@@ -298,7 +354,7 @@ def _unknown(source: Random, record: Record) -> None:
 
 
 def _format(source: Random, record: Record) -> None:
-    record["format"] = source.choice(("pyharness-certificate-2", None, 1))
+    record["format"] = source.choice(("pyharness-certificate-1", None, 1))
 
 
 def _nothing(source: Random, record: Record) -> None:
@@ -339,6 +395,49 @@ def test_falsified_certificate_is_refused(kind: str, seed: int) -> None:
     FALSIFIED[kind](source, record)
     assert json.dumps(record) != before
     assert refused(record)
+
+
+def test_rows_take_no_steps() -> None:
+    """The steps and their balls do not depend on the rows within them."""
+    for name, (scene, end) in SCENES.items():
+        times = [end * n / 25 for n in range(26)]
+        proof = prove(scene, times, 20)
+        record = json.loads(json.dumps(proof.certificate))
+        assert record["steps"] == genuine(name)["steps"]
+        assert [row["time"] for row in record["rows"]] == times[1:]
+        assert check(record) == len(record["steps"])
+        assert away(proof.enclosure.omega, reference(scene, times, precise=True)) <= 0.0
+
+
+def test_row_is_the_value_of_the_polynomial() -> None:
+    """The rounding errors of the middle are in the radius, and so is the error of the step."""
+    system, states = replayed(genuine("waves"))
+    time, h, series, radius = states[1]
+    largest = Fraction(max(system.scales), 2**certificate_checker.SCALE_BITS)
+    for place in (Fraction(0), Fraction(1, 3), Fraction(123_456_789, 987_654_321), Fraction(1)):
+        middle, size = system.ball(series, place, radius)
+        exact = [sum(x * place**k for k, x in enumerate(each)) for each in series[:3]]
+        distances = [x - y for x, y in zip(exact, middle, strict=True)]
+        assert all(0 <= each <= size - radius * largest for each in distances)
+        assert system.place(float(place), time, h) * h + time == Fraction(float(place)) * (
+            1 << system.clock
+        )
+
+
+def test_row_at_the_end_of_a_step_is_in_it() -> None:
+    """The checker accepts a row at each end of a step, and refuses one beyond the last step."""
+    system, states = replayed(genuine("case 5"))
+    record = copy.deepcopy(genuine("case 5"))
+    ends = [(time + h, time, h, series, radius) for time, h, series, radius in states[:-1]]
+    record["rows"] = [
+        {"time": end / 2**system.clock, "omega": omega, "radius": size}
+        for end, time, h, series, radius in ends
+        for omega, size in [stated(system, series, (time, h), radius, end / 2**system.clock)]
+    ]
+    assert check(record) == len(ends)
+    record["rows"][-1]["time"] = nextafter(record["rows"][-1]["time"], 9.0)
+    with pytest.raises(NotProvedError, match="no step contains"):
+        check(record)
 
 
 def test_every_digit_of_a_row_counts() -> None:

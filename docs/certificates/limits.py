@@ -1,0 +1,35 @@
+"""The tables of limits in the document `docs/explanation/proofs.md`, read from the source code."""
+
+import pkgutil
+from collections import Counter
+from importlib import import_module
+
+from pyharness import checks, theory
+from pyharness.edition.made_pages import table
+from pyharness.model.basis import MARKS, Basis
+
+
+def limits() -> list[Basis]:
+    """Return each basis that a module of `pyharness.checks` or `pyharness.theory` defines, once.
+
+    They are sorted by their marks, from proved to measured, and then by the limited quantities.
+    """
+    found = set()
+    for package in (theory, checks):
+        for each in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            values = vars(import_module(each.name)).values()
+            found |= {value for value in values if isinstance(value, Basis)}
+    order = list(MARKS)
+    return sorted(found, key=lambda each: (order.index(each.mark), each.limit))
+
+
+def counts_table() -> str:
+    """Return a table in Markdown with the meaning of each mark, and the number of its limits."""
+    counts = Counter(each.mark for each in limits())
+    rows = [[mark, meaning, str(counts[mark])] for mark, meaning in MARKS.items()]
+    return table("mark | basis of the limit | limits", rows)
+
+
+def limits_table() -> str:
+    """Return a table in Markdown of all limits, with their marks and sources."""
+    return table("mark | limit | source", [[x.mark, x.limit, x.source] for x in limits()])

@@ -1,0 +1,340 @@
+"""The error of the reference: a proved bound where a proof is possible and cheap, or the estimate.
+
+A proof encloses the true solution in balls. The distance of the reference's values from the
+farthest points of the balls is then a bound of their error. The values themselves, and the estimate
+of their error, do not depend on whether a proof is found.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from decimal import ROUND_CEILING, Decimal, localcontext
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pyharness.model.errors import InputError
+from pyharness.model.report import short
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import ROUNDING, Array
+from pyharness.truth.enclosed import Balls, Enclosure
+from pyharness.truth.reference import Reference
+
+PROVED, ESTIMATED = "proved", "estimated"
+# Factors on the work limits of the two provers that take steps. Each limit is about half a second.
+_INTEGER_WORK, _BALL_WORK = 0.01, 0.0075
+_MOST_TIMES = 30  # for the prover in ball arithmetic, which needs a step for each time
+# A ball is smaller than the estimated error by this number of digits.
+_SPARE_DIGITS = 2
+_DIGITS, _MOST_DIGITS = 20, 60  # without an estimate; the largest number with a proof
+_ROUNDED_UP = 1.0 + 2.0**-49  # exceeds the rounding errors of a few operations
+
+Row = Sequence[float | Fraction]
+
+
+class ErrorBound(NamedTuple):
+    """A statement on the error of the reference at all its times.
+
+    Attributes
+    ----------
+    value : float
+        Bound of the error of any component of omega, rad/s.
+    basis : {"proved", "estimated"}
+        Whether the bound is proved, or follows from an estimate.
+    angle, angle_basis : float and str, or None
+        The same for the attitude (rad); None if the reference has no attitude.
+    warning : str
+        A sentence if the estimate is wrong, because the proved error exceeds it; otherwise empty.
+    """
+
+    value: float
+    basis: str
+    angle: float | None = None
+    angle_basis: str | None = None
+    warning: str = ""
+
+    def text(self, unit: str = "rad/s") -> str:
+        """Return the bound of omega with its unit and its basis; two digits are rounded up."""
+        return f"{' '.join(filter(None, (at_most(self.value), unit)))} ({self.basis})"
+
+    def over(self, scale: float) -> "ErrorBound":
+        """Return the statement with the error of omega relative to `scale` (rad/s), unless it is 0.
+
+        The errors of the attitude do not change.
+        """
+        return self._replace(value=self.value / scale) if scale else self
+
+    @property
+    def larger(self) -> "ErrorBound":
+        """Return a statement on the larger of the errors of omega and of the attitude."""
+        turned = self.turned
+        return (
+            self
+            if turned is None
+            else joined([self._replace(angle=None, angle_basis=None), turned])
+        )
+
+    @property
+    def turned(self) -> "ErrorBound | None":
+        """Return the statement on the attitude alone, as its value (rad); None without attitude."""
+        if self.angle is None or self.angle_basis is None:
+            return None
+        return ErrorBound(self.angle, self.angle_basis, warning=self.warning)
+
+    def record(self) -> dict[str, Any]:
+        """Return the statement as a dictionary for JSON."""
+        turned = {"angle": self.angle, "angle_basis": self.angle_basis}
+        return {
+            "value": self.value,
+            "basis": self.basis,
+            **({} if self.angle is None else turned),
+            "warning": self.warning or None,
+        }
+
+
+def at_most(x: float) -> str:
+    """Return a positive number as text with two digits, as `short` does, but rounded up."""
+    if not math.isfinite(x):
+        return short(x)
+    with localcontext(rounding=ROUND_CEILING):
+        return short(Decimal(x))
+
+
+def bound_of(
+    scene: Scene,
+    known: Reference,
+    *,
+    before_rounding: bool = False,
+    any_torque: bool = False,
+    effort: float | None = None,
+) -> ErrorBound:
+    """Return a statement on the error of the reference `known` of a scene.
+
+    If `before_rounding` is true, the statement is on the sum of omega and its `remainder`. This is
+    the part that rounding to binary64 has removed, and is itself rounded. `any_torque` and `effort`
+    are those of `error_bound`; an effort of None means 1.
+    """
+    exact = before_rounding and known.remainder is not None
+    largest = float(np.abs(known.omega).max(initial=0.0))
+    return error_bound(
+        scene,
+        known.time,
+        known.omega,
+        known.estimate + ROUNDING**2 * largest if exact else known.error,
+        known.attitude,
+        known.angle_error,
+        remainder=known.remainder if exact else None,
+        any_torque=any_torque,
+        effort=1.0 if effort is None else effort,
+    )
+
+
+def error_bound(
+    scene: Scene,
+    times: Array,
+    omega: Array,
+    claimed: float,
+    attitude: Array | None = None,
+    claimed_angle: float = 0.0,
+    *,
+    remainder: Array | None = None,
+    any_torque: bool = False,
+    effort: float = 1.0,
+) -> ErrorBound:
+    """Return a statement on the error of values of the reference at `times` (s).
+
+    `omega` (rad/s) and `remainder`, which is added to it, have the shape (n, 3), and `attitude` has
+    the shape (n, 4). `claimed` and `claimed_angle` are the estimated errors of omega (rad/s) and of
+    the attitude (rad).
+
+    The error of omega is proved if the scene has a certificate, which needs no library. With
+    python-flint, the error of the attitude is proved in torque-free motion, and if `any_torque` is
+    true, both errors are proved under any recorded torque. The estimates are stated if a proof
+    would exceed a work limit of about half a second, times `effort`.
+    """
+    rows = _exact(omega, remainder)
+    order = sorted(range(len(times)), key=lambda k: abs(times[k]))
+    found = []
+    for side in ([k for k in order if times[k] < 0.0], [k for k in order if times[k] >= 0.0]):
+        if not side:
+            continue
+        stated = _Statement(
+            scene,
+            [float(times[k]) for k in side],
+            [rows[k] for k in side],
+            claimed,
+            None if attitude is None else attitude[side].tolist(),
+            claimed_angle,
+        )
+        found.append(stated.bound(any_torque, effort))
+    angle = (None, None) if attitude is None else (claimed_angle, ESTIMATED)
+    return joined(found) if found else ErrorBound(claimed, ESTIMATED, *angle)
+
+
+def _exact(omega: Array, remainder: Array | None) -> Sequence[Row]:
+    rows: list[list[float]] = omega.tolist()
+    if remainder is None:
+        return rows
+    rests = remainder.tolist()
+    return [
+        [Fraction(x) + Fraction(rest) for x, rest in zip(row, each, strict=True)]
+        for row, each in zip(rows, rests, strict=True)
+    ]
+
+
+def joined(found: Sequence[ErrorBound]) -> ErrorBound:
+    """Return one statement that holds for all given ones; it is proved only if all are proved.
+
+    At least one must be given.
+    """
+    angles = [each.angle for each in found if each.angle is not None]
+    bases = [each.angle_basis for each in found if each.angle_basis is not None]
+    return ErrorBound(
+        max(each.value for each in found),
+        _common([each.basis for each in found]),
+        max(angles, default=None),
+        _common(bases) if bases else None,
+        next((each.warning for each in found if each.warning), ""),
+    )
+
+
+def _common(bases: Sequence[str]) -> str:
+    return PROVED if set(bases) == {PROVED} else ESTIMATED
+
+
+class _Statement(NamedTuple):
+    """Values of the reference at times on one side of 0, in order away from 0."""
+
+    scene: Scene
+    times: list[float]  # s
+    omega: Sequence[Row]  # rad/s
+    claimed: float  # estimated error of omega, rad/s
+    attitude: list[list[float]] | None
+    claimed_angle: float  # rad
+
+    def bound(self, any_torque: bool, effort: float) -> ErrorBound:
+        """Return the bound of the errors, which is proved as far as a proof is found."""
+        value, basis, warnings = self.claimed, ESTIMATED, []
+        angle = None if self.attitude is None else self.claimed_angle
+        angle_basis = None if self.attitude is None else ESTIMATED
+        omega, attitude = self._balls(any_torque, effort)
+        if omega is not None:
+            least, value = _extremes(self.omega, omega)
+            basis = PROVED
+            if least > self.claimed:
+                warnings.append(_warning(self.claimed, value, "rad/s"))
+        if attitude is not None and self.attitude is not None:
+            rows = [[Fraction(x) for x in row] for row in self.attitude]
+            least, angle = _extreme_angles(rows, attitude)
+            angle_basis = PROVED
+            if least > self.claimed_angle:
+                warnings.append(_warning(self.claimed_angle, angle, "rad"))
+        return ErrorBound(value, basis, angle, angle_basis, "; ".join(warnings))
+
+    def _balls(
+        self, any_torque: bool, effort: float
+    ) -> tuple[Sequence[Balls] | None, Sequence[Balls] | None]:
+        """Return balls of omega and of the attitude; None where there is no proof."""
+        # The provers are imported where they are used: not every program needs them.
+        from pyharness.truth.certificate import has_certificate, prove
+
+        digits = self._digits()
+        if digits is None:
+            return None, None
+        omega = attitude = None
+        if has_certificate(self.scene):
+            # This prover is also used where python-flint is installed, so that the bound of omega
+            # is the same without it.
+            bare = replace(self.scene, attitude=None)
+            found = _tried(
+                lambda: prove(bare, self.times, digits, effort * _INTEGER_WORK).enclosure
+            )
+            omega = None if found is None else found.omega
+            if self.attitude is None:
+                return omega, None
+        from pyharness.truth.enclosure import can_enclose, enclose
+
+        is_free, is_short = self.scene.torque.is_zero, len(self.times) <= _MOST_TIMES
+        if (is_free or (any_torque and is_short)) and can_enclose(self.scene):
+            found = _tried(
+                lambda: enclose(self.scene, self.times, digits, effort=effort * _BALL_WORK)
+            )
+            if found is not None:
+                omega, attitude = omega or found.omega, found.attitude
+        return omega, attitude
+
+    def _digits(self) -> int | None:
+        """Return the digits with which balls are small beside the estimate, or None if too many."""
+        largest = max(1.0, *(abs(float(x)) for row in self.omega for x in row))
+        if not (0.0 < self.claimed < math.inf):
+            # Omega is 0 at all times, or the estimate says nothing.
+            return _DIGITS
+        wanted = math.ceil(math.log10(largest) - math.log10(self.claimed)) + _SPARE_DIGITS
+        return max(1, wanted) if wanted <= _MOST_DIGITS else None
+
+
+def _tried(prove: Callable[[], Enclosure]) -> Enclosure | None:
+    try:
+        return prove()
+    except InputError:
+        return None
+
+
+def _extremes(rows: Sequence[Row], found: Sequence[Balls]) -> tuple[float, float]:
+    """Return the least and the largest error that rows of omega may have in view of the balls."""
+    least = most = 0.0
+    for row, (middle, radius) in zip(rows, found, strict=True):
+        apart = max(map(_distance, row, middle))
+        # The distance and the radius are rounded to nearest, and their sum is again.
+        around = _up(float(radius))
+        least = max(least, _down(_down(apart) - around))
+        most = max(most, _up(_up(apart) + around))
+    return least, most
+
+
+def _distance(x: float | Fraction, y: Fraction) -> float:
+    """Return abs(x - y), rounded to nearest; integers are faster here than fractions."""
+    n, d = x.as_integer_ratio()
+    m, e = y.as_integer_ratio()
+    return abs(n * e - m * d) / (d * e)
+
+
+def _extreme_angles(
+    rows: Sequence[Sequence[Fraction]], found: Sequence[Balls]
+) -> tuple[float, float]:
+    """Return the least and the largest error (rad) that quaternions may have.
+
+    The error is twice the angle between the line of a quaternion and the line of the true one. The
+    sine s of the angle between its line and the line of the middle of the ball is exact before it
+    is rounded. If s <= 1/2, arcsin(s) is less than s (1 + s**2). The norm of four radii r is 2 r.
+    The angle between the lines of the middle and of the true quaternion is thus at most
+    arcsin(2 r), which is less than 4 r.
+    """
+    least = most = 0.0
+    for row, (middle, radius) in zip(rows, found, strict=True):
+        inside = sum((x * y for x, y in zip(row, middle, strict=True)), Fraction(0))
+        norm = sum((x * x for x in middle), Fraction(0))
+        apart = [x - inside / norm * y for x, y in zip(row, middle, strict=True)]
+        size = sum((x * x for x in row), Fraction(0))
+        sine = math.sqrt(sum((x * x for x in apart), Fraction(0)) / size)
+        around = 4.0 * float(radius) * _ROUNDED_UP
+        least = max(least, 2.0 * (sine / _ROUNDED_UP - around) / _ROUNDED_UP)
+        far = 2.0 * (sine * (1.0 + sine * sine) + around) * _ROUNDED_UP
+        most = max(most, far if sine <= 0.5 and 2.0 * radius <= 1.0 else math.pi)
+    return least, most
+
+
+def _up(x: float) -> float:
+    return math.nextafter(x, math.inf)
+
+
+def _down(x: float) -> float:
+    return math.nextafter(x, -math.inf)
+
+
+def _warning(claimed: float, proved: float, unit: str) -> str:
+    return (
+        f"the estimate of the reference ({at_most(claimed)} {unit}) is below its proved error "
+        f"({at_most(proved)} {unit})"
+    )

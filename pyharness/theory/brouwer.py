@@ -14,6 +14,7 @@ from decimal import Decimal
 import numpy as np
 
 from pyharness.methods.linearised import jacobians
+from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.truth.elliptic import torque_free
@@ -24,6 +25,19 @@ ROUNDING = 2.0**-53
 DEVIATIONS = 4.0
 LAWS = {"energy": 0.5, "momentum": 0.5, "phase": 1.5}  # powers of the number of steps
 _SAMPLES = 256
+WALK = Basis(
+    "derived",
+    "errors of energy, momentum and phase after n steps",
+    "Hoeffding 1963, if rounding errors are independent with mean 0; running error analysis of a "
+    "step at samples of the motion (`theory/brouwer.py`)",
+)
+"""Basis of the limits of `Orbit`."""
+POWER = Basis(
+    "derived",
+    "fitted power of the number of steps with which errors grow",
+    "Brouwer 1937: nearer to the expected power than to the other one (`theory/brouwer.py`)",
+)
+"""Basis of the limits of the result of `exponent`."""
 
 
 @dataclass(frozen=True)

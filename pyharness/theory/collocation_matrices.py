@@ -11,7 +11,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from pyharness.model.basis import Basis
 from pyharness.model.trajectory import Array
 from pyharness.original import collocation
 from pyharness.original.linear_solver import SINGULAR, leqt1f
@@ -29,6 +31,30 @@ PARTS = {
     "two-term": (Fraction(1, 3), Fraction(2, 3)),
     "four-term": (Fraction(1, 5), Fraction(2, 5), Fraction(3, 5), Fraction(4, 5)),
 }
+HIGHAM = Basis(
+    "proved",
+    "errors of LEQT1F: residual, solution and increment over a step",
+    "Higham 2002, theorem 9.4, in exact fractions; the factors, and that no operation underflows "
+    "or overflows, are checked (`theory/collocation_matrices.py`)",
+)
+"""Basis of the bounds of which `Solved` has the ratios `residual`, `forward` and `increment`."""
+PIVOTS = Basis(
+    "derived",
+    "choice of pivots by LEQT1F, and the step size at which its matrix is singular",
+    "rounding errors of the candidates, to first order (`theory/collocation_matrices.py`)",
+)
+"""Basis of the field `pivoting` of `Solved`, and of limits that follow from it."""
+SINGULARITY = Basis(
+    "derived",
+    "number of steps for which LEQT1F reports IER = 129",
+    "the last pivot of exact elimination, evaluated in binary64 (`theory/collocation_matrices.py`)",
+)
+"""Basis of limits that follow from `singular_below`."""
+# Within this range of nonzero elements, no operation on a system of at most four equations
+# underflows or overflows. A product of two elements is at least 2**-300, so that its rounded value
+# is a multiple of 2**-352. In forward substitution every further product costs 202 binary digits,
+# so that each unknown is 0 or at least 2**-756. It is at most 2**600.
+_RANGE = 2.0**-150, 2.0**150
 
 
 @dataclass(frozen=True)
@@ -126,6 +152,10 @@ def solved(program: str, step: float) -> Solved:
         return largest
 
     residual, forward, increment, increment_error = errors(found)
+    operands = [matrix, factors, sides, found, [step, step ** len(matrix)]]
+    holds = _theorem_holds(exact, lower, upper, order, operands)
+    if not holds:
+        residual = forward = increment = math.inf
     _, yardstick, *_ = errors(np.linalg.solve(np.array(matrix), sides.T))
     return Solved(
         ier, differing, condition, scaled_condition, growth, order,
@@ -250,8 +280,34 @@ def _errors(
     )
 
 
+def _theorem_holds(
+    matrix: Fractions,
+    lower: Fractions,
+    upper: Fractions,
+    order: Sequence[int],
+    operands: Sequence[ArrayLike],
+) -> bool:
+    """Return whether the hypotheses of Higham's theorem 9.4 hold for a solved linear system.
+
+    `lower` and `upper` must be LU factors of the rows of `matrix` in the given `order`, except for
+    the rounding errors of theorem 9.3. The nonzero elements of the `operands` must be in a range in
+    which no operation underflows or overflows.
+    """
+    sizes = np.abs(np.concatenate([np.ravel(each) for each in operands]))
+    sizes = sizes[sizes != 0.0]
+    is_safe = len(matrix) <= 4 and _RANGE[0] <= sizes.min() and sizes.max() <= _RANGE[1]
+    missed = abs(matrix[list(order)] - lower @ upper)
+    allowed = gamma(len(matrix)) * (abs(lower) @ abs(upper))
+    is_factored = sorted(order) == list(range(len(matrix))) and (missed <= allowed).all()
+    return bool(is_safe and is_factored)
+
+
 def _share(error: Fraction, bound: Fraction) -> float:
-    return 0.0 if not error else float(error / bound) if bound else math.inf
+    if not error or not bound:
+        return math.inf if error else 0.0
+    ratio = error / bound
+    # A ratio above 1 must not be rounded to 1, so that the comparison with 1 is exact.
+    return max(float(ratio), math.nextafter(1.0, 2.0)) if ratio > 1 else float(ratio)
 
 
 def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:

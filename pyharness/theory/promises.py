@@ -14,6 +14,16 @@ from functools import cache
 from numpy.polynomial import Polynomial
 
 from pyharness.methods.registry import FIXED_STEP, REGISTRY, SCIPY_METHODS
+from pyharness.model.basis import Basis
+
+STEPS = Basis(
+    "derived",
+    "error of omega, energy and momentum: promised errors of all steps, and rounding errors, with "
+    "the error amplification",
+    "the tolerance, or a majorant series for fixed steps (`theory/promises.py`); first-order "
+    "perturbations (`theory/conditioning.py`)",
+)
+"""Basis of the limits that follow from the promised errors of the steps."""
 
 
 def steps_of(name: str, run_steps: int, evaluations: int) -> float:

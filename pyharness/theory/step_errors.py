@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 
 from pyharness.methods.linearised import jacobians, propagators
+from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.theory.collocation_matrices import PARTS, singular_below, solver_roundings
@@ -25,6 +26,13 @@ _FEWEST_NODES, _MOST_NODES = 200, 20_000
 _MEAN_ROUNDING = 1.0 / 3.0
 # Largest ratio of the last term of a power series to its sum for which the sum is accepted.
 _CONVERGED = 1e-3
+FORECAST = Basis(
+    "derived",
+    "error at the end of a run with a fixed step",
+    "twice the propagated local errors, whose power series is truncated, and rounding errors "
+    "(`theory/step_errors.py`)",
+)
+"""Basis of the field `bound` of a `Forecast`."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,155 @@
+"""The verb `scene`, and the JSON Schema of scene files."""
+
+import copy
+import json
+import tomllib
+from inspect import Parameter, signature
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from pyharness import InputError, case_scene, read_scene
+from pyharness.cli.main import main
+from pyharness.dynamics.scene_reader import SCENE_TABLES as TABLES
+from pyharness.dynamics.scene_reader import scene_of
+from pyharness.dynamics.term_file import KINDS
+from pyharness.model.facts import facts_folder
+
+ROOT = Path(__file__).parent.parent.parent
+SCHEMA = json.loads((facts_folder() / "scene.schema.json").read_text())
+FILES = [
+    path
+    for path in sorted(ROOT.glob("docs/**/*.toml"))
+    if {"body", "initial"} <= tomllib.loads(path.read_text()).keys()
+]
+VALIDATOR = Draft202012Validator(SCHEMA)
+
+
+def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    assert main(["scene", *arguments]) == 0
+    return capsys.readouterr().out
+
+
+def test_a_new_scene_file_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "brick.toml"
+    printed(capsys, "new", "--out", str(path))
+    assert read_scene(path).moments == (40.0, 30.0, 20.0)
+    assert VALIDATOR.is_valid(tomllib.loads(path.read_text()))
+    # The line of comment shows an expression that may replace the law.
+    lines = path.read_text().splitlines()
+    kept = [line for line in lines if not line.startswith(("constant =", "sines ="))]
+    other = "\n".join(kept).replace("# expression", "expression")
+    assert "q0" in other
+    assert VALIDATOR.is_valid(tomllib.loads(other))
+    assert scene_of(tomllib.loads(other), "x").torque.needs_attitude
+    printed(capsys, "new", "--case", "3", "--out", str(path))
+    assert read_scene(path).omega == case_scene(3).omega
+
+
+def test_check_describes_a_scene_or_says_what_is_wrong(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = printed(capsys, "check", str(ROOT / "docs" / "satellite.toml"))
+    assert "gravity gradient + wheels + damping" in found
+    assert max(map(len, found.splitlines())) <= 100
+    record = json.loads(printed(capsys, "check", str(FILES[0]), "--format", "json"))
+    assert record["scene"]["name"] == read_scene(FILES[0]).name
+    path = tmp_path / "wrong.toml"
+    path.write_text("[body]\nmoment = [1, 2, 3]\n[initial]\nomega = [1, 2, 3]\n")
+    assert main(["scene", "check", str(path)]) == 2
+    assert "did you mean 'moments'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    {
+        "scene": "give an action; allowed: new, check, schema",
+        "scene nwe": "unknown action 'nwe'; did you mean 'new'?",
+        "scene check": "give a scene file",
+        "scene new file.toml": "scene new takes no file",
+        "scene schema --case 3": "--case has no meaning with scene schema",
+        "scene schema --format json": "--format has no meaning with scene schema",
+        "scene new --case 9": "unknown case '9'",
+    }.items(),
+)
+def test_mistakes_are_one_line(
+    command: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(command.split()) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert message in error
+
+
+def test_the_schema_is_printed_and_is_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert json.loads(printed(capsys, "schema")) == SCHEMA
+    VALIDATOR.check_schema(SCHEMA)
+
+
+def test_the_schema_has_the_keys_of_the_reader() -> None:
+    assert SCHEMA["properties"].keys() == {"schema", "name", *TABLES}
+    for table, keys in TABLES.items():
+        assert SCHEMA["properties"][table]["properties"].keys() == set(keys)
+    kinds = SCHEMA["properties"]["torque"]["properties"]["terms"]["items"]["oneOf"]
+    assert {each["properties"]["kind"]["const"] for each in kinds} == KINDS.keys()
+    for each in kinds:
+        parameters = signature(KINDS[each["properties"]["kind"]["const"]]).parameters
+        assert each["properties"].keys() == {"kind", *parameters}
+        required = {name for name, own in parameters.items() if own.default is Parameter.empty} - (
+            {"inertia"} if "inertia" in parameters else set()
+        )
+        assert set(each["required"]) == {"kind", *required}
+    documented = (ROOT / "docs" / "reference" / "scene-files.md").read_text()
+    assert all(f"`{key}`" in documented for key in KINDS)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_files_of_the_documents_have_the_schema(path: Path) -> None:
+    assert [error.message for error in VALIDATOR.iter_errors(tomllib.loads(path.read_text()))] == []
+
+
+def places(value: Any, found: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Return the paths of all values in nested dictionaries and lists."""
+    pairs = value.items() if isinstance(value, dict) else enumerate(value)
+    return [found, *(
+        place
+        for key, each in pairs
+        for place in (
+            places(each, (*found, key)) if isinstance(each, (dict, list)) else [(*found, key)]
+        )
+    )]  # fmt: skip
+
+
+WRONG: tuple[Any, ...] = (
+    *("text", "", True, 0, 1, -1.5, 1e400, [], {}, [1.0, 2.0, 3.0], [1, 2], [0.0] * 4),
+    *(["a", "b", "c"], [[1.0, 2.0]], {"x": 1}, 3),
+)
+
+
+def test_what_the_schema_refuses_the_reader_refuses() -> None:
+    source = Random("schema 2611")
+    scenes = [tomllib.loads(path.read_text()) for path in FILES]
+    refused = 0
+    for _ in range(4000):
+        data = copy.deepcopy(source.choice(scenes))
+        *above, key = source.choice(places(data)[1:])
+        parent = data
+        for each in above:
+            parent = parent[each]
+        action = source.randrange(3)
+        if action == 0:
+            del parent[key]
+        elif action == 1 or isinstance(parent, list):
+            parent[key] = copy.deepcopy(source.choice(WRONG))
+        else:
+            parent[source.choice(["moments", "attitude", "frame", "kind", "x", "sequence"])] = (
+                copy.deepcopy(source.choice(WRONG))
+            )
+        if not VALIDATOR.is_valid(data):
+            refused += 1
+            with pytest.raises(InputError):
+                scene_of(data, "name")
+    assert refused > 2000

@@ -18,6 +18,8 @@ from pyharness.model.scene_file import case_numbers
 
 ROOT = Path(__file__).parent.parent
 WEB = ROOT / "web"
+TEMPLATE = ROOT / "docs/how-to/port"
+C_FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off"]
 # Ten cells: every program, every ending, a reading, the conjecture of Case 7.
 SAMPLE = (
     "two-term/case-2/original", "two-term/case-6/original", "two-term/case-7/initial-torque",
@@ -41,6 +43,62 @@ def documented() -> str:
 def documented_command() -> str:
     """Return the command that starts the documented port."""
     return shlex.join([sys.executable, "-c", documented()])
+
+
+def answering(path: Path, change: str) -> str:
+    """Return the command of the documented port with a line of Python that changes its `rows`."""
+    before, place, after = documented().partition("    ier = ")
+    path.write_text(f"{before}    {change}\n{place}{after}")
+    return shlex.join([sys.executable, str(path)])
+
+
+def scene_port(path: Path, change: str = "pass") -> str:
+    """Return the command of a port that runs any requested scene by our compiled programs.
+
+    `change` is a line of Python that may change `omega` before the run.
+    """
+    path.write_text(
+        "import json, sys\n"
+        "from pyharness import Listing, Scene, TorqueLaw, run_program\n"
+        "for line in sys.stdin:\n"
+        "    asked = json.loads(line)\n"
+        "    given, law = asked['scene'], asked['scene']['torque']\n"
+        "    waves = {k: [(w['amplitude'], w['frequency']) for w in law[k]]\n"
+        "             for k in ('sines', 'cosines')}\n"
+        "    omega = given['initial']['omega']\n"
+        f"    {change}\n"
+        "    scene = Scene(given['name'], omega, **given['body'], **given['run'],\n"
+        "                  torque=TorqueLaw(law['constant'], law['rate'], **waves),\n"
+        "                  masses=given['masses'], forces=given['forces'],\n"
+        "                  case=given['case'] if given['initial_torque'] else None)\n"
+        "    active = [asked['listing'][k] for k in ('defects', 'readings', 'conjectures')]\n"
+        "    run = run_program(scene, Listing(asked['program'], *active),\n"
+        "                      lipschitz=asked['lipschitz'], may_stop=asked['may_stop'])\n"
+        "    columns = run.recorded_time, *run.omega.T, *run.velocity.T\n"
+        "    rows = [[x.hex() for x in row] for row in zip(*(c.tolist() for c in columns))]\n"
+        "    ier = None if run.ier is None else run.ier.tolist()\n"
+        "    answer = {'rows': rows, 'ended': run.ended, 'stop': run.stop and vars(run.stop),\n"
+        "              'ier': ier}\n"
+        "    print(json.dumps(answer), flush=True)\n"
+    )
+    return shlex.join([sys.executable, str(path)])
+
+
+def compiled_port(folder: Path, source: str | None = None) -> str:
+    """Compile the port in C, or another text of it, and return its path; skip without a compiler.
+
+    Only the text of the template is compiled with warnings as errors.
+    """
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no cc on the PATH: the port in C is not tried")
+    text = (TEMPLATE / "port.c").read_text()
+    (folder / "port.c").write_text(text if source is None else source)
+    flags = C_FLAGS if source is None else ["-std=c99", "-w", "-ffp-contract=off"]
+    command = [compiler, "-O1", *flags, "-o", "port", "port.c", "-lm"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return str(folder / "port")
 
 
 def engine() -> str:

@@ -1,76 +1,209 @@
 """Checks of a port, an implementation of the programs in any language, against the twins.
 
 The results must agree with those of the Python twins bit for bit, in all combinations of program,
-case and listing. `docs/how-to/ports.md` describes the protocol.
+case and listing, and in random scenes. `docs/how-to/ports.md` describes the protocol.
 """
 
 import math
+import re
 import shlex
+import time
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
 from pyharness.checks.cells import of_cell
-from pyharness.checks.check import Check, Name, selected
+from pyharness.checks.check import BITS, Check, Name, selected
 from pyharness.checks.port_process import PATIENCE, PortError, PortProcess
 from pyharness.checks.port_protocol import VARIABLES, Answer, read_answer, request
 from pyharness.compare.agreement import ulps
-from pyharness.model.listing import Listing
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.report import counted
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.cells import all_cells, cell_name
 from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.scenes.random_scenes import draw
 
-Cell = tuple[str, Listing, int]
+_DECK_LIPSCHITZ = 500.0  # 1/s, on the author's cards
+_DRAWN = re.compile(r"random/(\d{1,9})(?:/|$)")
+_LIBRARY = "the torque has sines or cosines, whose last bits differ between libraries"
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """A run that is requested from a port: a program with its listing, and a scene.
+
+    Attributes
+    ----------
+    name : str
+        The name of the run, as in ``two-term/case-3/original`` or ``random/7/two-term``.
+    of : Name
+        The name of the check that compares the run.
+    options : str
+        The options of ``verify --port`` that request this run alone.
+    listing : Listing
+        The program with its active defects, readings and conjectures.
+    scene : Scene
+        A case of Table 1, or a random scene.
+    lipschitz : float
+        The constant of the Runge-Kutta program's stop test (1/s).
+    may_stop : bool
+        Whether the stop test may end the run.
+    """
+
+    name: str
+    of: Name
+    options: str
+    listing: Listing
+    scene: Scene
+    lipschitz: float = _DECK_LIPSCHITZ
+    may_stop: bool = True
+
+    @property
+    def request(self) -> bytes:
+        """Return the line of JSON that requests the run from a port."""
+        return request(self.scene, self.listing, self.lipschitz, self.may_stop)
+
+    def twin(self) -> Trajectory:
+        """Return the trajectory of the Python version of the program."""
+        run = PROGRAM_REGISTRY[self.listing.program].run
+        return run(self.scene, self.listing, "python", self.lipschitz, self.may_stop)
+
+
+@dataclass(frozen=True)
+class PortCheck(Check):
+    """The result of a comparison of a port with our Python program in one run.
+
+    `seconds` is the time from the request to the port's answer, None if there was no valid answer.
+    `difference` describes the first step that differs, None if no step differs. It is a dictionary
+    with the number of the step and the value of each variable.
+    """
+
+    seconds: float | None = None
+    difference: dict[str, Any] | None = None
 
 
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
-    """Return name, listing and case number of the requested cells.
+    """Return the requested combinations of program, case and listing.
 
-    A cell is a listing with a case of Table 1 of the thesis. A listing is a program with a choice
-    of its defects, and of its readings of doubtful cards. `cells` has the leading parts of names of
-    cells, as in ``two-term/case-3``. If it is empty, all cells of the programs and cases are
-    requested.
+    A case is one of Table 1 of the thesis. A listing is a program with a choice of its defects, and
+    of its readings of doubtful cards. `cells` has the leading parts of names of combinations, as in
+    ``two-term/case-3``. If it is empty, all combinations of the programs and cases are requested.
     """
     return [
-        (cell_name(listing, case), listing, case)
+        Cell(
+            cell_name(listing, case), of_cell("port", listing, case),
+            f"--cell {cell_name(listing, case)}", listing, case_scene(case),
+        )
         for listing, case in all_cells()
         if listing.program in programs
         and case in cases
         and selected(cell_name(listing, case), cells)
-    ]
+    ]  # fmt: skip
 
 
-def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[Check]:
-    """Yield checks that a port gives the same bits as our Python programs in the given cells.
+def random_cells(
+    seed: str, draws: int, cells: Sequence[str] = (), programs: Sequence[str] = PROGRAMS
+) -> list[Cell]:
+    """Return runs in random scenes, which have names like ``random/7/two-term``.
+
+    For each draw, a body, an initial angular velocity, a torque law, a step size, a program and its
+    listing are drawn. `seed` determines them together with the number of the draw.
+
+    Parameters
+    ----------
+    seed : str
+        The text that seeds the random generator.
+    draws : int
+        The number of draws.
+    cells : sequence of str
+        Leading parts of the names of requested runs; empty for all. The draws that `cells` names by
+        their number are returned even if `draws` is smaller.
+    programs : sequence of str
+        Draws of other programs are left out.
+
+    Returns
+    -------
+    list of Cell
+        The requested runs, in the order of their numbers.
+    """
+    named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
+    found = []
+    for number in sorted(named.union(range(draws))):
+        drawn = draw(seed, number)
+        name = f"random/{number}/{drawn.listing.program}"
+        if drawn.listing.program in programs and selected(name, cells):
+            of = Name("port", "random", str(number), drawn.listing.program, scene=drawn.scene)
+            options = f"--cell {name} --seed {shlex.quote(seed)}"
+            stop_test = drawn.lipschitz, drawn.may_stop
+            found.append(Cell(name, of, options, drawn.listing, drawn.scene, *stop_test))
+    return found
+
+
+def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[PortCheck]:
+    """Yield checks that a port gives the same bits as our Python programs in the given runs.
 
     A port is an implementation of the programs of the thesis in any language, started by `command`.
-    A cell is a program, a choice of its defects, and a case. An invalid answer is a failed check
-    and ends the comparison. `patience` is the longest time to wait for an answer (s). Raise
-    InputError if `command` is empty.
+    An invalid answer is a failed check and ends the comparison. `patience` is the longest time to
+    wait for an answer (s). Raise InputError if `command` is empty.
     """
-    verb = f"python -m pyharness verify --port {shlex.quote(command)}"
-    name, again = Name("port", "start"), verb
+    name, again = Name("port", "start"), replay_command(command)
     try:
         with PortProcess(command, patience) as process:
-            for cell, listing, case in cells:
-                name, again = of_cell("port", listing, case), f"{verb} --cell {cell}"
-                yield replace(_compared(name, process, listing, case_scene(case)), again=again)
+            for cell in cells:
+                name, again = cell.of, replay_command(command, cell)
+                yield asked(process, command, cell)
     except PortError as error:
-        yield replace(name.judged(False, str(error)), again=again)
+        yield _port_check(name.judged(False, str(error)), again)
 
 
-def _compared(name: Name, process: PortProcess, listing: Listing, scene: Scene) -> Check:
-    answer = read_answer(process.ask(request(scene, listing)), scene.steps)
-    twin = PROGRAM_REGISTRY[listing.program].run(scene, listing, "python")
-    note = "; ".join(differences(twin, answer))
+def replay_command(command: str, cell: Cell | None = None) -> str:
+    """Return the command that checks a port, started by `command`, in one run or in all."""
+    verb = f"python -m pyharness verify --port {shlex.quote(command)}"
+    return verb if cell is None else f"{verb} {cell.options}"
+
+
+def asked(process: PortProcess, command: str, cell: Cell) -> PortCheck:
+    """Request a run from the process of a port, and return the check of its answer.
+
+    `command` is the command that started the process. Raise PortError if the answer is not valid.
+    """
+    begin = time.perf_counter()
+    line = process.ask(cell.request)
+    seconds = time.perf_counter() - begin
+    return compared(cell, cell.twin(), line, replay_command(command, cell), seconds)
+
+
+def compared(
+    cell: Cell, twin: Trajectory, line: bytes, again: str = "", seconds: float | None = None
+) -> PortCheck:
+    """Return the check that a port's answer agrees with our program's trajectory `twin`.
+
+    `cell` is the run that was requested, and `line` the answer. `again` is the command that repeats
+    the check, and `seconds` the time that the port took. Raise PortError if `line` is no valid
+    answer.
+    """
+    answer = read_answer(line, cell.scene.steps)
+    found = differences(twin, answer)
     wanted = _rows(twin)
+    difference, law = _difference(wanted, answer.rows), cell.scene.law
+    if difference and (law.sines or law.cosines):
+        found.append(_LIBRARY)
     same = len(wanted) == len(answer.rows)
     apart = ulps(wanted, answer.rows) if same else math.inf
-    return name.judged(not note, note, apart, 0.0)
+    check = cell.of.judged(not found, "; ".join(found), apart, 0.0, BITS)
+    return _port_check(check, again, seconds, difference)
+
+
+def _port_check(
+    check: Check, again: str, seconds: float | None = None, difference: dict[str, Any] | None = None
+) -> PortCheck:
+    given = {each.name: getattr(check, each.name) for each in fields(Check)}
+    return PortCheck(**{**given, "again": again}, seconds=seconds, difference=difference)
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
@@ -83,15 +216,15 @@ def differences(twin: Trajectory, answer: Answer) -> list[str]:
     """
     wanted, given = _rows(twin), answer.rows
     found = []
-    for step, (due, row) in enumerate(zip(wanted, given, strict=False), 1):
-        apart = [ulps(due[i : i + 1], row[i : i + 1]) for i in range(len(VARIABLES))]
-        if any(apart):
-            first = next(i for i, distance in enumerate(apart) if distance)
-            found.append(
-                f"first at step {step}, {VARIABLES[first]}: {apart[first]:.0f} ulp "
-                f"({float(row[first]).hex()}, due {float(due[first]).hex()})"
-            )
-            break
+    step = _first_step(wanted, given)
+    if step is not None:
+        due, row = wanted[step], given[step]
+        apart = _apart(due, row)
+        first = next(i for i, distance in enumerate(apart) if distance)
+        found.append(
+            f"first at step {step + 1}, {VARIABLES[first]}: {apart[first]:.0f} ulp "
+            f"({float(row[first]).hex()}, due {float(due[first]).hex()})"
+        )
     for name, value, wants in (
         ("rows", len(given), len(wanted)),
         ("ended", answer.ended, twin.ended),
@@ -101,6 +234,35 @@ def differences(twin: Trajectory, answer: Answer) -> list[str]:
             found.append(f"{name}: {value}, due {wants}")
     found += _of_ier(None if twin.ier is None else twin.ier.tolist(), answer.ier)
     return found
+
+
+_Rows = np.ndarray[tuple[int, int], np.dtype[np.float64]]
+
+
+def _first_step(wanted: _Rows, given: _Rows) -> int | None:
+    """Return the index of the first row that differs in both arrays, or None if no row differs."""
+    pairs = enumerate(zip(wanted, given, strict=False))
+    return next((step for step, (due, row) in pairs if ulps(due, row)), None)
+
+
+def _apart(due: Any, row: Any) -> list[float]:
+    return [ulps(due[i : i + 1], row[i : i + 1]) for i in range(len(VARIABLES))]
+
+
+def _difference(wanted: _Rows, given: _Rows) -> dict[str, Any] | None:
+    """Return the values of all variables in the first step that differs, as data for JSON.
+
+    The numbers are hexadecimal texts, because JSON has no infinity and no NaN.
+    """
+    step = _first_step(wanted, given)
+    if step is None:
+        return None
+    due, row = wanted[step], given[step]
+    values = [
+        {"variable": name, "ours": float(x).hex(), "theirs": float(y).hex(), "ulps": distance}
+        for name, x, y, distance in zip(VARIABLES, due, row, _apart(due, row), strict=True)
+    ]
+    return {"step": step + 1, "values": values}
 
 
 def _of_ier(wanted: list[int] | None, given: list[int] | None) -> list[str]:

@@ -24,7 +24,7 @@ from pyharness.cli.main import main
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_numbers
 from pyharness.original.cells import all_cells
-from tests.ports import SAMPLE, WEB, documented, node, sample
+from tests.ports import SAMPLE, WEB, answering, documented, node, sample
 
 ROOT = Path(__file__).parent.parent.parent
 Capture = pytest.CaptureFixture[str]
@@ -33,12 +33,6 @@ Capture = pytest.CaptureFixture[str]
 def _python(path: Path, text: str) -> str:
     path.write_text(text)
     return shlex.join([sys.executable, str(path)])
-
-
-def _answering(path: Path, change: str) -> str:
-    """Return the command of the documented port with a line of Python that changes its `rows`."""
-    before, place, after = documented().partition("    ier = ")
-    return _python(path, f"{before}    {change}\n{place}{after}")
 
 
 @pytest.fixture(params=["documented", "JavaScript"])
@@ -53,17 +47,19 @@ def test_a_right_port_has_the_twins_bits(right: str) -> None:
     cells = sample()
     assert len(cells) == len(SAMPLE)
     checks = list(port(right, cells))
-    assert [check.id for check in checks] == [f"port/{name}" for name, _, _ in cells]
+    assert [check.id for check in checks] == [
+        f"port/{name}" for name in (cell.name for cell in cells)
+    ]
     assert [check.note for check in checks if not check.passed] == []
     assert {check.value for check in checks} == {0.0}
 
 
 def test_all_cells_are_asked_for_but_where_fewer_are_named() -> None:
     assert len(port_cells(PROGRAMS, case_numbers(), ())) == len(list(all_cells()))
-    assert {(listing.program, case) for _, listing, case in port_cells(["four-term"], [3], ())} == {
-        ("four-term", 3)
-    }
-    assert [name for name, _, _ in sample(["two-term/case-2/original"])] == [
+    assert {
+        (cell.listing.program, cell.scene.case) for cell in port_cells(["four-term"], [3], ())
+    } == {("four-term", 3)}
+    assert [cell.name for cell in sample(["two-term/case-2/original"])] == [
         "two-term/case-2/original"
     ]
 
@@ -71,7 +67,7 @@ def test_all_cells_are_asked_for_but_where_fewer_are_named() -> None:
 def test_one_bit_is_found_where_it_is(tmp_path: Path, capsys: Capture) -> None:
     cell = "two-term/case-2/original"
     bit = "rows[6][2] = math.nextafter(float.fromhex(rows[6][2]), math.inf).hex()"
-    command = _answering(tmp_path / "port.py", f"import math; {bit}")
+    command = answering(tmp_path / "port.py", f"import math; {bit}")
     assert main(["verify", "--port", command, "--cell", cell, "--format", "json"]) == 1
     (check,) = json.loads(capsys.readouterr().out)["checks"]
     assert check["note"].startswith("first at step 7, U2: 1 ulp (0x")
@@ -195,11 +191,11 @@ def _answers_wrongly(command: str) -> Check:
 def test_a_port_that_does_not_answer(script: str, words: str, tmp_path: Path) -> None:
     check = _answers_wrongly(_python(tmp_path / "port.py", script))
     assert words in check.note
-    assert check.id == f"port/{sample()[0][0]}"
+    assert check.id == f"port/{sample()[0].name}"
 
 
 def test_too_few_rows_and_a_crash_later_end_the_checks(tmp_path: Path, capsys: Capture) -> None:
-    command = _answering(tmp_path / "port.py", "del rows[50:]")
+    command = answering(tmp_path / "port.py", "del rows[50:]")
     assert main(["verify", "--port", command, "--program", "two-term", "--case", "2"]) == 1
     captured = capsys.readouterr()
     assert captured.err == ""

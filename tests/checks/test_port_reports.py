@@ -1,0 +1,247 @@
+"""`verify --port`: random scenes, times, the first step that differs, and planted faults."""
+
+import json
+import math
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from pyharness import run_program
+from pyharness.checks.plants.port_plants import PLANTS, as_check, self_test
+from pyharness.checks.port import Cell, compared, port, port_cells, random_cells
+from pyharness.checks.port_protocol import VARIABLES
+from pyharness.cli.main import main
+from pyharness.model.listing import PROGRAMS
+from pyharness.model.scene_file import case_numbers
+from tests.json_reference import schema_of
+from tests.ports import answering, documented_command, scene_port
+
+Capture = pytest.CaptureFixture[str]
+CELL = "two-term/case-2/original"
+BIT = "import math; rows[6][2] = math.nextafter(float.fromhex(rows[6][2]), math.inf).hex()"
+
+
+def _json(capsys: Capture, *words: str, status: int = 0) -> Any:
+    assert main(["verify", "--port", *words, "--format", "json"]) == status
+    record = json.loads(capsys.readouterr().out)
+    Draft202012Validator(schema_of("verify")).validate(record)
+    return record
+
+
+def test_every_variable_of_the_first_different_step_is_reported(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    command = answering(tmp_path / "port.py", BIT)
+    (check,) = _json(capsys, command, "--cell", CELL, status=1)["checks"]
+    assert check["difference"]["step"] == 7
+    values = {each["variable"]: each for each in check["difference"]["values"]}
+    assert tuple(values) == VARIABLES
+    assert {name: each["ulps"] for name, each in values.items() if each["ulps"]} == {"U2": 1.0}
+    theirs, ours = (float.fromhex(values["U2"][whose]) for whose in ("theirs", "ours"))
+    assert theirs == math.nextafter(ours, math.inf)
+    assert main(["verify", "--port", command, "--cell", CELL]) == 1
+    printed = capsys.readouterr().out
+    assert f"port/{CELL}, step 7:\nvariable  unit   ours" in printed
+    (line,) = [each.split() for each in printed.splitlines() if each.startswith("U2 ")]
+    assert line == ["U2", "rad/s", repr(ours), repr(theirs), "1"]
+
+
+def test_a_nan_is_reported_in_strict_json(tmp_path: Path, capsys: Capture) -> None:
+    command = answering(tmp_path / "port.py", "rows[3][5] = 'nan'")
+    (check,) = _json(capsys, command, "--cell", CELL, status=1)["checks"]
+    (wrong,) = [each for each in check["difference"]["values"] if each["ulps"] != 0.0]
+    assert (wrong["variable"], wrong["theirs"], wrong["ulps"]) == ("V2", "nan", None)
+
+
+def test_times_are_those_of_the_answers(tmp_path: Path, capsys: Capture) -> None:
+    command = answering(tmp_path / "port.py", "import time; time.sleep(0.05)")
+    record = _json(capsys, command, "--cell", f"{CELL},two-term/case-3/original")
+    times = [check["seconds"] for check in record["checks"]]
+    assert len(times) == 2
+    assert all(0.05 <= each < 30.0 for each in times)
+    assert record["seconds"] == sum(times)
+    assert main(["verify", "--port", command, "--cell", CELL]) == 0
+    assert "longest (ms)\nport/two-term        1" in capsys.readouterr().out
+
+
+def test_random_scenes_are_repeated_by_their_command(tmp_path: Path, capsys: Capture) -> None:
+    """A port with a wrong torque passes no random scene, and the command shows the same again."""
+    right = scene_port(tmp_path / "right.py")
+    record = _json(capsys, right, "--cell", "random", "--draws", "25", "--seed", "here")
+    assert len(record["checks"]) == 25
+    assert record["seed"] == "here"
+    assert {check["id"].split("/")[3] for check in record["checks"]} == set(PROGRAMS)
+    wrong = scene_port(tmp_path / "wrong.py", "omega = [omega[1], omega[0], omega[2]]")
+    record = _json(capsys, wrong, "--cell", "random", "--draws", "9", "--seed", "a b", status=1)
+    failed = [check for check in record["checks"] if not check["passed"]]
+    assert len(failed) >= 7
+    words = shlex.split(failed[-1]["replay"])[3:]
+    assert words[-2:] == ["--seed", "a b"]
+    again = _json(capsys, *words[2:], status=1)["checks"]
+    assert [(each["id"], each["note"]) for each in again] == [
+        (failed[-1]["id"], failed[-1]["note"])
+    ]
+
+
+def test_draws_come_after_the_cells_of_the_same_programs() -> None:
+    cells = random_cells("s", 60, (), ["four-term"])
+    assert 0 < len(cells) < 60
+    assert {cell.listing.program for cell in cells} == {"four-term"}
+    assert [cell.name for cell in random_cells("s", 0, ["random/7"])] == [
+        cell.name for cell in random_cells("s", 8) if cell.name.startswith("random/7/")
+    ]
+    assert random_cells("s", 5, ["two-term"]) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--draws", "x"], "--draws: 'x' where a whole number belongs"),
+        (["--draws", "-1"], "--draws: -1"),
+        (["--only", "cells"], "--only has no meaning with --port"),
+        (["--cell", "random/x"], "--cell random/x: there is no such cell"),
+    ],
+)
+def test_mistakes_are_a_line(words: list[str], message: str, capsys: Capture) -> None:
+    assert main(["verify", "--port", "cat", *words]) == 2
+    captured = capsys.readouterr()
+    assert message in captured.err
+    assert captured.err.count("\n") == 1
+    assert captured.out == ""
+
+
+def test_every_planted_fault_is_noticed(tmp_path: Path) -> None:
+    """All faults have an effect in the cells, and their names are different."""
+    assert len(PLANTS) >= 40
+    assert len({plant.name for plant in PLANTS}) == len(PLANTS)
+    cells = port_cells(PROGRAMS, case_numbers(), ())
+    found = list(self_test(scene_port(tmp_path / "port.py"), cells))
+    assert [each.plant for each in found] == [None, *PLANTS]
+    assert [as_check(each).note for each in found if not each.passed] == []
+    assert [each.plant for each in found if not each.has_effect] == []
+    assert all(each.failed >= 4 for each in found[1:])
+
+
+def test_a_wrong_port_fails_the_control(tmp_path: Path, capsys: Capture) -> None:
+    command = answering(tmp_path / "port.py", BIT)
+    record = _json(capsys, command, "--self-test", "--cell", CELL, status=1)
+    assert [each["id"] for each in record["checks"] if not each["passed"]] == [
+        "self-test/port/none"
+    ]
+    assert main(["verify", "--port", documented_command(), "--self-test", "--cell", CELL]) == 0
+    printed = capsys.readouterr().out
+    assert printed.endswith("without effect in these runs\n")
+    assert main(["verify", "--port", "false", "--self-test", "--cell", CELL]) == 1
+    assert "FAILED none: no fault: nothing may fail" in capsys.readouterr().out
+
+
+def test_a_check_that_sees_nothing_would_fail_the_self_test(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Without the comparison of rows the planted bits pass unseen, and the self-test says so."""
+
+    def blind(cell: Cell, twin: Any, line: bytes, *rest: Any) -> Any:
+        run = run_program(cell.scene, cell.listing)
+        rows = [
+            [run.recorded_time[n], *run.omega[n], *run.velocity[n]]  # type: ignore[index]
+            for n in range(len(run.omega))
+        ]
+        right = {**json.loads(line), "rows": [[float(x).hex() for x in row] for row in rows]}
+        return compared(cell, twin, json.dumps(right).encode(), *rest)
+
+    monkeypatch.setattr("pyharness.checks.plants.port_plants.compared", blind)
+    cells = port_cells(["two-term"], [2], [CELL])
+    missed = {
+        each.plant.name for each in self_test(documented_command(), cells)
+        if each.plant and not each.passed
+    }  # fmt: skip
+    assert {"bit-U1", "bit-V3", "dropped-row", "nan"} <= missed
+    assert "ier-null" not in missed
+
+
+def test_a_port_is_asked_for_random_scenes_with_their_stop_tests() -> None:
+    cells = random_cells("stop tests", 40)
+    assert {cell.may_stop for cell in cells} == {True, False}
+    assert len({cell.lipschitz for cell in cells}) == 4
+    for cell in cells[:5]:
+        asked = json.loads(cell.request)
+        assert (asked["lipschitz"], asked["may_stop"]) == (cell.lipschitz, cell.may_stop)
+    assert [
+        check.id for check in port(documented_command(), port_cells(PROGRAMS, [2], [CELL]))
+    ] == [f"port/{CELL}"]
+
+
+def _tables(text: str) -> list[list[str]]:
+    """Return the tables of a page in Markdown as a renderer finds them, each with its first cells.
+
+    A line that follows a table without a blank line would be a row of the table.
+    """
+    from markdown_it import MarkdownIt
+
+    found: list[list[str]] = []
+    tokens = MarkdownIt("commonmark").enable("table").parse(text)
+    for token, after in zip(tokens, tokens[2:], strict=False):
+        if token.type == "table_open":
+            found.append([])
+        if token.type == "tr_open" and after.type == "inline":
+            found[-1].append(after.content)
+    return found
+
+
+def test_several_outputs_are_those_of_one_run(tmp_path: Path, capsys: Capture) -> None:
+    """The page has its tables and each failed check with its command, and no link of the port."""
+    command = answering(tmp_path / "port.py", BIT)
+    files = [tmp_path / name for name in ("summary.md", "report.xml", "report.json")]
+    words = ["--cell", f"{CELL},two-term/case-3/original", "--format", "markdown"]
+    assert main(["verify", "--port", command, *words, "--also", ",".join(map(str, files))]) == 1
+    page, junit, record = (path.read_text() for path in files)
+    assert capsys.readouterr().out == page
+    assert page.startswith("## verify --port: 2 checks, 2 failed\n")
+    assert f"--cell {CELL}`" in page
+    assert _tables(page) == [
+        ["checks", "port/two-term"], ["variable", *VARIABLES], ["variable", *VARIABLES],
+        ["runs", "port/two-term"],
+    ]  # fmt: skip
+    assert junit.count("<failure ") == 2
+    assert [each["passed"] for each in json.loads(record)["checks"]] == [False, False]
+
+
+def test_every_kind_of_check_has_a_page(capsys: Capture) -> None:
+    assert main(["verify", "--only", "orders", "--format", "markdown"]) == 0
+    page = capsys.readouterr().out
+    assert page.startswith("## verify: ")
+    assert _tables(page) == [["checks", "orders"]]
+
+
+def test_a_port_writes_no_markup_into_a_page(tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "port.py"
+    path.write_text("raise SystemExit('error: `</code> [a](b) <img>')")
+    command = shlex.join(["python3", str(path)])
+    assert main(["verify", "--port", command, "--format", "markdown"]) == 1
+    (line,) = [x for x in capsys.readouterr().out.splitlines() if x.startswith("- FAILED")]
+    assert line.rstrip().endswith("'</code> [a](b) <img>)`")
+    assert line.count("`") == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--also", "a.txt"], "--also 'a.txt': the name has no known ending; allowed: .md, .xml"),
+        (["--also", "a.md,a.md"], "--also 'a.md': the file is given twice"),
+        (["--also", "a.md", "--out", "a.md"], "--also 'a.md': the file is given twice"),
+        (["--also", "no-folder/a.md"], "--also 'no-folder/a.md': "),
+        (["--also", ""], "--also '': the name has no known ending"),
+        (["--also", "a.md", "--update"], "--also has no meaning with --update"),
+    ],
+)
+def test_wrong_files_are_refused_before_any_check(
+    words: list[str], message: str, capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    port = [] if "--update" in words else ["--port", "cat"]
+    assert main(["verify", *port, *words]) == 2
+    assert message in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

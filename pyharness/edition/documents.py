@@ -6,11 +6,14 @@ from functools import partial
 from pathlib import Path
 
 from pyharness.edition.markdown import Document, document
+from pyharness.edition.notebooks import has_examples, notebook
 from pyharness.model.errors import InputError
 from pyharness.model.facts import shipped
 
 # Suffixes of the pictures in the documents.
 _PICTURES = (".png", ".svg")
+# Folders of documents that are notebooks too, if they have Python examples.
+_NOTEBOOKS = ("gallery", "tutorials")
 # Documents to which other pages of the site link.
 _LINKED = (
     "index.md",
@@ -67,6 +70,27 @@ def files(folder: Path) -> dict[str, bytes]:
         for file in sorted(folder.rglob("*"))
         if file.suffix in _PICTURES
     }
+
+
+def with_notebooks(folder: Path) -> list[Path]:
+    """Return the files of the documents that are notebooks too: pages with Python examples."""
+    files = [path for name in _NOTEBOOKS for path in sorted((folder / name).glob("*.md"))]
+    return [path for path in files if has_examples(path.read_text(encoding="utf-8"))]
+
+
+def notebooks(folder: Path) -> dict[str, bytes]:
+    """Return the notebooks of documents by their path in the web site.
+
+    `folder` is the folder of the documents. A notebook has the outputs and the pictures that its
+    document shows.
+    """
+    found = {}
+    for path in with_notebooks(folder):
+        beside = [file for file in path.parent.iterdir() if file.suffix in _PICTURES]
+        pictures = {file.name: file.read_bytes() for file in beside}
+        name = path.relative_to(folder).with_suffix(".ipynb").as_posix()
+        found[f"docs/{name}"] = notebook(path.read_text(encoding="utf-8"), pictures)
+    return found
 
 
 def _link(folder: Path, name: str, target: str) -> str | None:

@@ -128,7 +128,7 @@ def build_site(progress: Progress = no_progress, docs: Path | None = None) -> di
     for page in _pages(drawn, docs, progress):
         content[page.path] = _rendered(page)
         places += page.found
-    content |= _assets(places) | documents.files(docs)
+    content |= _assets(places) | documents.files(docs) | documents.notebooks(docs)
     content[MARK] = json_text({"schema": SCHEMAS["edition"], **listed(content)}).encode()
     return content
 
@@ -230,11 +230,14 @@ def _listing() -> Iterator[Page]:
 
 
 def _documents(docs: Path) -> Iterator[Page]:
+    with_notebooks = documents.with_notebooks(docs)
+    notebooks = {documents.page_of(f.relative_to(docs).as_posix()): f.stem for f in with_notebooks}
     for path, each in documents.documents(docs):
         found = [
             Found(f"{path}#{part.anchor}", part.title, "document", part.text) for part in each.parts
         ]
-        yield Page(path, each.title, "document.html", {"document": each}, found,
+        context = {"document": each, "notebook": notebooks.get(path)}
+        yield Page(path, each.title, "document.html", context, found,
                    menu=path if path in _listed() else "docs/index.html")  # fmt: skip
 
 

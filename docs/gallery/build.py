@@ -1,0 +1,130 @@
+"""Builds the gallery: outputs and pictures of its pages, its index, and notebooks.
+
+The page of an example is its only source. ``python -m docs.gallery.build``, in a checkout, executes
+the examples of all pages and tutorials. It replaces the outputs that they show, draws the pictures
+of the gallery, writes the index `README.md`, and writes notebooks to the folder `build/notebooks`.
+With names, such as ``python -m docs.gallery.build wing-nut``, only these pages are executed.
+"""
+
+import re
+import sys
+from pathlib import Path
+
+from docs.gallery.execution import PICTURE, executed, picture_file, picture_of, shown_output
+from pyharness.edition import documents
+from pyharness.edition.made_pages import paragraphs, table
+from pyharness.views.pictures import saved
+
+HERE = Path(__file__).parent
+PAGE = "gallery/README.md"
+"""The path of the index in the folder `docs`."""
+
+GROUPS = {
+    "Motions of a free body": ("wing-nut", "toutatis", "geometric-phase", "lost-digits"),
+    "Satellites": (
+        "gravity-gradient",
+        "detumbling",
+        "antenna-contact",
+        "gyro-fit",
+        "boom-deployment",
+        "flat-spin",
+    ),
+    "Many bodies": ("spreading-cloud", "tumbling-sweep"),
+    "The programs of the thesis": ("figure-7", "word-of-48-bits", "fortran-python"),
+}
+"""The names of the examples, by the headings of the index."""
+
+NOTEBOOKS = HERE.parents[1] / "build" / "notebooks"
+"""The folder of the notebooks."""
+
+_HEAD = """
+Each page of this gallery has one question, a short program that uses only the public functions of
+pyharness, a picture, and the answer in numbers. The programs run as they are, in the folder of the
+checkout. They draw with matplotlib: a notebook shows the figure, and in a script
+`figure.savefig("picture.png")` writes it to a file.
+
+In a checkout, `python -m docs.gallery.build` executes all examples, and writes the outputs and
+pictures of the pages. It also writes a notebook for each page, and for each tutorial with Python,
+to the folder `build/notebooks`. The web pages of the edition have the notebooks too.
+"""
+
+
+def names() -> list[str]:
+    """Return the names of all examples, in the order of the index."""
+    return [name for group in GROUPS.values() for name in group]
+
+
+def page(name: str) -> Path:
+    """Return the file of an example's page."""
+    return HERE / f"{name}.md"
+
+
+def question(text: str) -> str:
+    """Return the title of a page."""
+    return text.partition("\n")[0].removeprefix("# ")
+
+
+def answer(text: str) -> str:
+    """Return the answer of a page, which is the paragraph that begins with the word Answer."""
+    (found,) = re.findall(r"^\*\*Answer\.\*\* (.*?)(?:\n\n|\Z)", text, re.DOTALL | re.MULTILINE)
+    return " ".join(found.split())
+
+
+def gallery_page() -> str:
+    """Return the index of the gallery as Markdown."""
+    parts = ["# Gallery: questions about rotating bodies\n", paragraphs(_HEAD.strip())]
+    for heading, group in GROUPS.items():
+        rows = []
+        for name in group:
+            text = page(name).read_text(encoding="utf-8")
+            found = PICTURE.search(text)
+            assert found is not None, name
+            picture = f"[![{_alternative(found[0])}]({found[1]})]({name}.md)"
+            rows.append([picture, f"[{question(text)}]({name}.md)", answer(text)])
+        parts += [f"## {heading}\n", table("picture | question | answer", rows)]
+    return "\n".join(parts)
+
+
+def _alternative(picture: str) -> str:
+    return " ".join(picture[2 : picture.index("]")].split())
+
+
+def rebuild(path: Path) -> None:
+    """Execute the examples of a document, and replace the outputs and pictures that it shows.
+
+    If an example of the gallery prints something, and no output is shown, it is added.
+    """
+    text = path.read_text(encoding="utf-8")
+    parts, end = [], 0
+    for step in executed(text, path.name):
+        parts.append(text[end : step.end])
+        shown = shown_output(text, step)
+        end = step.end
+        if shown is not None or (path.parent == HERE and step.printed):
+            parts.append(f"\n\n```output\n{step.printed}```")
+            end += len(f"\n\n```output\n{shown}```") if shown is not None else 0
+        file = picture_file(path, step)
+        if step.figure is not None and file is not None:
+            for name, content in saved(picture_of(step.figure), str(file)).items():
+                Path(name).write_bytes(content)
+    path.write_text("".join(parts) + text[end:], encoding="utf-8")
+
+
+def write_notebooks(folder: Path) -> None:
+    """Write a notebook for each page of the gallery, and for each tutorial with examples."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for path, content in documents.notebooks(HERE.parent).items():
+        (folder / Path(path).name).write_bytes(content)
+
+
+def main(arguments: list[str]) -> None:
+    """Execute the named pages, or all, and write everything that is made of them."""
+    for path in documents.with_notebooks(HERE.parent):
+        if not arguments or path.stem in arguments:
+            rebuild(path)
+    (HERE.parent / PAGE).write_text(gallery_page(), encoding="utf-8")
+    write_notebooks(NOTEBOOKS)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,90 @@
+"""Documents as notebooks of Jupyter, without executing them.
+
+The prose of a document becomes cells of Markdown, and its Python examples become cells of code.
+The output and the picture of an example are those that the document shows.
+"""
+
+import base64
+import hashlib
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pyharness.views.json import json_text
+
+# An example with its output, a picture in the folder of the document, or other text.
+_PART = re.compile(
+    r"```python\n(?P<code>.*?)```(?:\n*```output\n(?P<output>.*?)```)?"
+    r"|!\[[^]]*\]\((?P<picture>[^)/]+\.(?:svg|png))\)",
+    re.DOTALL,
+)
+_LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^]]*\])*)\]\([^):]*\)")
+_TYPES = {"svg": "image/svg+xml", "png": "image/png"}
+
+
+def has_examples(text: str) -> bool:
+    """Return whether a document has Python examples, so that it can be a notebook."""
+    return "```python\n" in text
+
+
+def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
+    """Return a document as a notebook, a file of JSON in version 4.5 of the format.
+
+    `text` is the document in Markdown. `pictures` has the contents of the pictures that follow
+    examples, by the names of their files in the folder of the document. Links to other documents
+    become plain text, because a notebook may be in any folder.
+    """
+    cells: list[dict[str, Any]] = []
+    for kind, source, found in _parts(text):
+        if kind == "picture" and cells and cells[-1]["cell_type"] == "code" and source in pictures:
+            cells[-1]["outputs"].append(_display(source, pictures[source]))
+        elif kind == "code":
+            printed = found["output"] if found else None
+            outputs = [_stream(printed)] if printed else []
+            cells.append(_cell("code", source, len(cells), outputs))
+        elif kind == "prose" and source.strip():
+            cells.append(_cell("markdown", _LINK.sub(r"\1", source.strip()), len(cells)))
+    metadata = {
+        "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
+        "language_info": {"name": "python"},
+    }
+    record = {"cells": cells, "metadata": metadata, "nbformat": 4, "nbformat_minor": 5}
+    return json_text(record).encode()
+
+
+def _parts(text: str) -> Iterator[tuple[str, str, "re.Match[str] | None"]]:
+    """Yield the kind (prose, code or picture), the text, and the match of each part in order."""
+    start = 0
+    for found in _PART.finditer(text):
+        yield "prose", text[start : found.start()], None
+        if found["code"] is not None:
+            yield "code", found["code"].rstrip("\n"), found
+        else:
+            yield "picture", found["picture"], found
+        start = found.end()
+    yield "prose", text[start:], None
+
+
+def _cell(
+    kind: str, source: str, number: int, outputs: list[dict[str, Any]] | None = None
+) -> dict[str, Any]:
+    identity = hashlib.sha256(f"{number} {source}".encode()).hexdigest()[:8]
+    cell: dict[str, Any] = {
+        "cell_type": kind,
+        "id": identity,
+        "metadata": {},
+        "source": source.splitlines(keepends=True),
+    }
+    if kind == "code":
+        cell |= {"execution_count": None, "outputs": outputs}
+    return cell
+
+
+def _stream(text: str) -> dict[str, Any]:
+    return {"name": "stdout", "output_type": "stream", "text": text.splitlines(keepends=True)}
+
+
+def _display(name: str, content: bytes) -> dict[str, Any]:
+    form = name.rpartition(".")[2]
+    data = content.decode() if form == "svg" else base64.b64encode(content).decode()
+    return {"data": {_TYPES[form]: data}, "metadata": {}, "output_type": "display_data"}

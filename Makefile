@@ -58,6 +58,7 @@ lint: .venv/ready-to-test
 	@$(BIN)/fprettify --diff $(WRITTEN) >build/written.diff
 	@test ! -s build/written.diff || { cat build/written.diff; exit 1; }
 	@$(BIN)/fortitude --quiet check fortran $(WRITTEN)
+	@$(BIN)/zizmor --offline --quiet .github verify-port docs/how-to/port/.github
 
 format: .venv/ready-to-test
 	@$(BIN)/ruff format --quiet

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pyharness import events as events
+    from pyharness import interchange as interchange
     from pyharness import torques as torques
     from pyharness.compare.comparison import Comparison, compare_programs
     from pyharness.compare.method_comparison import compare_methods
@@ -107,7 +108,7 @@ _SUBMODULES = {
     "methods.solve": ("solve",),
 }
 # Public modules, which are imported at their first use too.
-_MODULES = ("events", "torques")
+_MODULES = ("events", "interchange", "torques")
 
 
 # Type checkers read the imports above. This function is hidden from them, because with it they

@@ -1,7 +1,7 @@
 from collections.abc import Callable
 from typing import Any, Self
 
-from pyharness.model.attitude import Quaternion
+from pyharness.model.attitude import Quaternion, Rotation
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Number, Numbers, Triple
 
@@ -33,7 +33,7 @@ class BoundAttitudeKernel:
         attitude: Quaternion,
     ) -> Self: ...
     def __call__(
-        self, omega0: Numbers, t_end: Number, attitude0: Numbers | None = None
+        self, omega0: Numbers, t_end: Number, attitude0: Numbers | Rotation | None = None
     ) -> tuple[Array, Array]: ...
     @property
     def capsule(self) -> Any: ...

@@ -28,7 +28,8 @@ BODIES, STEPS = 64, 400_000
 ROUNDS = 41
 SOURCES = (
     "modern/two_words", "modern/torque_terms", "modern/taylor_plan", "many/many_circular",
-    "many/many_columns", "many/many_free", "many/many_fixed", "many/many_slots", "many/many_taylor",
+    "many/many_columns", "many/many_orbits", "many/many_turns", "many/many_free", "many/many_fixed",
+    "many/many_slots", "many/many_attitudes", "many/many_taylor",
 )  # fmt: skip
 COMMON = ("kinds", "interruption", "modern/problem", "modern/torque_noise", "many/bodies")
 KINDS = {

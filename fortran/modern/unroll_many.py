@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator
 
 ORDERS = (8, 12, 20, 24)
+ATTITUDE_ORDERS = (8, 12, 15, 17, 18)
 CARRIED = 7  # order of the exponential that propagates perturbations
 MOMENTS = 8  # terms that count in the mean of omega over a step
 FACTORS = (("x", "y", "z", "fa"), ("y", "x", "z", "fb"), ("z", "x", "y", "fc"))
@@ -22,8 +23,8 @@ rest = s%rest(i)
 next = h*r
 if (abs(next)*s%spin(i) > A_STEP) next = sign(A_STEP/s%spin(i), h)
 r = next
-if (abs(rest) < 2.0_dp*abs(next)) r = 0.5_dp*rest
-if (abs(rest) <= abs(next)) r = rest
+if (abs(rest) < two*abs(next)) r = share*rest
+if (abs(rest) <= one*abs(next)) r = rest
 next = r
 r = next/h"""
 # Poles of the truncation error, as in estimate_truncation of taylor_error.f90.
@@ -107,11 +108,96 @@ def many_steps() -> Iterator[str]:
         yield "  integer, intent(in) :: m"
         yield "  type(slots_t), intent(inout) :: s"
         yield from (f"  real(dp) :: {name}" for name in names)
+        yield "  real(dp) :: one, two, share"
         yield "  integer :: i"
-        yield "  do i = 1, m"
+        # In the loop, members of s that are no arrays would keep it from becoming vector code.
+        yield from ("  one = s%one", "  two = s%two", "  share = s%part")
+        yield "  do i = 1, iand(m, -8)"
         yield from (f"    {line}" for line in lines)
         yield "  end do"
         yield f"end subroutine {name}_{order}"
+
+
+def attitude_sums() -> Iterator[str]:
+    """Yield the procedures of the attitude for each number of terms, and those that call them."""
+    kinds = (
+        ("expand_attitude", "s, w0, h, u", attitude_terms, (
+            "type(slots_t), intent(in) :: s", "real(dp), intent(in) :: w0(SLOTS, 3), h(SLOTS)",
+            "real(dp), intent(inout) :: u(SLOTS, 4, MOST_TERMS)",
+        )),
+        ("sum_attitude", "now, r", attitude_sum, (
+            "type(attitudes_t), intent(in) :: now", "type(sums_t), intent(inout) :: r",
+        )),
+    )  # fmt: skip
+    for name, given, statements, declared in kinds:
+        yield f"pure subroutine {name}(order, m, {given})"
+        yield "  integer, intent(in) :: order, m"
+        yield from (f"  {line}" for line in declared)
+        yield "  select case (order)"
+        for order in ATTITUDE_ORDERS:
+            yield f"  case ({order})"
+            yield f"    call {name}_{order}(m, {given})"
+        yield "  end select"
+        yield f"end subroutine {name}"
+        for order in ATTITUDE_ORDERS:
+            lines = list(statements(order))
+            names = sorted({line.split(" = ")[0] for line in lines if _is_local(line)})
+            yield ""
+            yield f"pure subroutine {name}_{order}(m, {given})"
+            yield "  integer, intent(in) :: m"
+            yield from (f"  {line}" for line in declared)
+            yield from (f"  real(dp) :: {local}" for local in names)
+            yield "  integer :: i"
+            if "now" in given:
+                yield "  integer :: latest, previous"
+                yield from ("  latest = now%latest", "  previous = 3 - latest")
+            yield "  do i = 1, iand(m, -8)"
+            yield from (f"    {line}" for line in lines)
+            yield "  end do"
+            yield f"end subroutine {name}_{order}"
+        yield ""
+
+
+def attitude_terms(order: int) -> Iterator[str]:
+    """Yield the statements for one lane: the terms a, b, c, d of the attitude's four numbers."""
+    yield "f = 0.5_dp*h(i)"
+    for axis, x in enumerate("xyz", 1):
+        yield f"{x}0 = w0(i, {axis})"
+        yield from (f"{x}{k} = s%torque(i, {axis}, {k})" for k in range(1, order))
+    yield from ("b1 = f*x0", "c1 = f*y0", "d1 = f*z0", "u(i, 1, 1) = 0.0_dp")
+    yield from (f"u(i, {place}, 1) = {u}1" for place, u in enumerate("bcd", 2))
+    for k in range(2, order + 1):
+        for place, (u, x, products) in enumerate((
+            ("a", "", "-bx -cy -dz"), ("b", "x", "+ax +cz -dy"),
+            ("c", "y", "+ay +dx -bz"), ("d", "z", "+az +by -cx"),
+        ), 1):  # fmt: skip
+            total = f"{x}{k - 1}" if x else "0.0_dp"
+            for j in range(1, k):
+                for product in products.split():
+                    sign, first, second = tuple(product)
+                    if first == "a" and j == 1:
+                        continue  # a1 is 0
+                    yield f"p = {total} {sign} {first}{j}*{second}{k - 1 - j}"
+                    total = "p"
+            yield f"{u}{k} = (f*(1.0_dp/{k}.0_dp))*p"
+            yield f"u(i, {place}, {k}) = {u}{k}"
+
+
+def attitude_sum(order: int) -> Iterator[str]:
+    """Yield the statements for one lane: the sums of two series, and powers of the distances."""
+    for place, step, at, power in (
+        ("from", "previous", "ahead", "old"), ("to", "latest", "back", "new"),
+    ):  # fmt: skip
+        yield f"t = r%{at}(i)"
+        for axis in range(1, 5):
+            yield f"p = now%u(i, {axis}, {order}, {step})*t"
+            for k in range(order - 1, 0, -1):
+                yield f"p = (p + now%u(i, {axis}, {k}, {step}))*t"
+            yield f"r%{place}(i, {axis}) = " + ("1.0_dp + p" if axis == 1 else "p")
+        yield "t = abs(t)"
+        yield "p = t"
+        yield from ("p = p*t" for _ in range(order - 1))
+        yield f"r%{power}(i) = p"
 
 
 def _is_local(line: str) -> bool:
@@ -197,6 +283,8 @@ def term(k: int, waves: bool) -> Iterator[str]:
         more = f" + {steady.format(axis=axis)}" if steady else ""
         more += f" + s%torque(i, {axis}, {k})" if waves else ""
         yield f"{x}{k} = ({factor}*(1.0_dp/{k}.0_dp))*p{more}"
+        if waves:  # the attitude needs the terms
+            yield f"s%torque(i, {axis}, {k}) = {x}{k}"
 
 
 def mean_weight(k: int) -> str:

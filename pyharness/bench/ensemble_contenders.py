@@ -1,7 +1,8 @@
 """The problem that all solvers of `bench --ensemble` solve, and our own of these solvers."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -40,6 +41,8 @@ class EnsembleLoad:
     name: str
     omega0: Array  # (n, 3), rad/s
     torque: Array | None  # (n, 3), N m about the body's axes
+    # (n, 4), unit quaternions; None if attitudes are not requested
+    attitude0: Array | None = field(default=None, kw_only=True)
 
     @property
     def n(self) -> int:
@@ -70,26 +73,38 @@ class EnsembleLoad:
 
     def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
         """Return a load (a set of bodies) with only those bodies whose indices are in `rows`."""
-        torque = None if self.torque is None else np.ascontiguousarray(self.torque[rows])
-        return replace(self, omega0=np.ascontiguousarray(self.omega0[rows]), torque=torque)
+        names = ("omega0", "torque", "attitude0")
+        given = {name: getattr(self, name) for name in names}
+        own: dict[str, Any] = {
+            name: None if array is None else np.ascontiguousarray(array[rows])
+            for name, array in given.items()
+        }
+        return replace(self, **own)
 
     def ends(self) -> Array:
         """Return reference values of omega for all bodies at the end time, in rad/s, shape (n, 3).
 
         The end time is `HORIZON`. Our function `solve` computes the values for one body after
-        another, with the tolerance 1e-15.
+        another, with the tolerance 1e-15. If attitudes are requested, they are returned instead of
+        omega, as quaternions, shape (n, 4).
         """
-        found = np.empty_like(self.omega0)
+        found = np.empty_like(self.omega0 if self.attitude0 is None else self.attitude0)
         for i, start in enumerate(self.omega0.tolist()):
             law = TorqueLaw() if self.torque is None else TorqueLaw(self.torque[i].tolist())
             scene = Scene(self.name, start, MOMENTS, torque=law)
-            found[i] = solve(scene, [HORIZON], tolerance=1e-15).omega[0]
+            if self.attitude0 is None:
+                found[i] = solve(scene, [HORIZON], tolerance=1e-15).omega[0]
+            else:
+                turned = replace(scene, attitude=self.attitude0[i].tolist())
+                attitude = solve(turned, [HORIZON], tolerance=1e-15, attitude=True).attitude
+                assert attitude is not None
+                found[i] = attitude[0]
         return found
 
 
 # A function that takes the bodies, the setting (a tolerance or a number of steps) and the number of
 # threads. It returns a function that integrates the bodies and returns omega at `HORIZON`, shape
-# (n, 3).
+# (n, 3), or the attitudes, shape (n, 4), of a load that requests them.
 EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 
 
@@ -104,6 +119,7 @@ class EnsembleContender(Contender):
     # Numbers of threads to measure with; 0 means as many as the package uses.
     threads: tuple[int, ...] = (1, 2)
     torque_free: bool = False  # whether the contender solves only bodies without torque
+    attitude: bool = False  # whether the contender can compute attitudes
 
 
 def draw(seed: str, n: int) -> list[EnsembleLoad]:
@@ -121,14 +137,27 @@ def draw(seed: str, n: int) -> list[EnsembleLoad]:
     ]
 
 
+def with_attitudes(loads: list[EnsembleLoad], seed: str) -> list[EnsembleLoad]:
+    """Return loads with the same bodies, whose random attitudes are computed together with omega.
+
+    The text `seed` determines the random numbers.
+    """
+    source = text_generator(f"ensemble attitudes/{seed}")
+    turned = source.standard_normal((loads[0].n, 4))
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    return [replace(each, name=f"{each.name}, attitude", attitude0=turned) for each in loads]
+
+
 def own_ensembles() -> list[EnsembleContender]:
     """Return our own contenders (solvers) in the benchmark `bench --ensemble`.
 
     They are the closed form, the Taylor method and RK4.
     """
     return [
-        EnsembleContender("closed-form", "none", _own("closed-form"), torque_free=True),
-        EnsembleContender("taylor", "tolerance", _own("taylor")),
+        EnsembleContender(
+            "closed-form", "none", _own("closed-form"), torque_free=True, attitude=True
+        ),
+        EnsembleContender("taylor", "tolerance", _own("taylor"), attitude=True),
         EnsembleContender("rk4", "steps", _own("rk4")),
     ]
 
@@ -144,9 +173,13 @@ def _own(method: str) -> EnsembleMaker:
             nonlocal kept
             kept = solve_many(
                 load.scene, load.horizon, omega0=load.omega0, torque_constant=load.torque,
-                method=method, tolerance=tolerance, step=step, threads=threads, out=kept,
+                attitude0=load.attitude0, method=method, tolerance=tolerance, step=step,
+                threads=threads, out=kept,
             )  # fmt: skip
-            return kept.omega
+            if load.attitude0 is None:
+                return kept.omega
+            assert kept.attitude is not None
+            return kept.attitude
 
         return run
 

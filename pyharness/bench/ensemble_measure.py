@@ -23,6 +23,7 @@ from pyharness.bench.ensemble_contenders import (
 from pyharness.bench.loop import Call, Say, timed
 from pyharness.compare.timing import Clock, batch_seconds, silenced
 from pyharness.methods.plan import FINEST
+from pyharness.model.attitude import angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.trajectory import Array
@@ -93,7 +94,7 @@ class _Task:
     load: EnsembleLoad
     target: float | None
     sample: EnsembleLoad
-    ends: Array  # omega of the sample at the horizon, (n, 3)
+    ends: Array  # omega of the sample at the horizon, (n, 3), or the attitude, (n, 4)
 
     @property
     def place(self) -> str:
@@ -108,20 +109,27 @@ class _Task:
         """Return whether the contender (solver) `each` can do the task.
 
         It must be able to solve bodies with the torques of the load, which is the task's set of
-        bodies. Without a target error, it must also be an RK4 solver, whose setting is the number
-        of steps.
+        bodies, and to compute their attitudes if the load requests them. Without a target error, it
+        must also be an RK4 solver, whose setting is the number of steps.
         """
         torque = self.load.torque is not None and each.torque_free
-        return not torque and (self.target is not None or each.setting == "steps")
+        if torque or (self.load.attitude0 is not None and not each.attitude):
+            return False
+        return self.target is not None or each.setting == "steps"
 
     def error(self, omega: Array) -> float:
         """Return the largest relative error of `omega`, the computed result for a sample of bodies.
+
+        If the load requests attitudes, `omega` contains them, and the error is an angle (rad).
 
         The error of a body is divided by the largest magnitude of a component of its omega, at the
         start or at the end. If a component of `omega` is not finite, the result is infinite.
         """
         n = min(len(omega), len(self.ends))
         ends, starts = self.ends[:n], self.sample.omega0[:n]
+        if self.load.attitude0 is not None:
+            angles = angle_between(omega[:n], ends)
+            return float(np.where(np.isfinite(angles), angles, np.inf).max())
         sizes = np.maximum(np.abs(ends).max(axis=1), np.abs(starts).max(axis=1))
         errors = np.abs(omega[:n] - ends).max(axis=1) / sizes
         return float(np.where(np.isfinite(errors), errors, np.inf).max())

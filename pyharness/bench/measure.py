@@ -26,6 +26,7 @@ from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
+from pyharness.truth.bounded import ErrorBound, bound_of, joined
 from pyharness.truth.reference import Reference, reference
 
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
@@ -43,6 +44,8 @@ _LONGEST_FIRST = 30.0
 _BUDGET = {"tolerance": 1.0, "steps": 0.15, "none": 1.0}
 _LARGEST_STEPS = 1 << 22  # largest number of steps of a call
 _FAILURES = 12  # number of successive settings without result after which finer ones are left out
+# Factor on the work limit of a proof of the reference, which is short beside the measurement.
+_PROOF_EFFORT = 10.0
 _ROUNDS = 9  # number of rounds in which calls are timed
 _BATCH = 1e-3  # s; calls faster than this are batched
 
@@ -131,6 +134,8 @@ class Finding:
     # Error estimate of the reference solution, in the measure of `Row.error`, by label of the
     # workload.
     doubt: dict[str, float]
+    # The same error as a bound, which is proved if possible.
+    bounds: dict[str, ErrorBound] = field(default_factory=dict)
 
     @property
     def attitude(self) -> bool:
@@ -183,6 +188,10 @@ def measure(
         size = float(np.abs(truth.omega).max(initial=0.0)) or 1.0
         doubt = max(truth.estimate / size, truth.angle_estimate)
         found.doubt[load.label] = max(doubt, found.doubt.get(load.label, 0.0))
+        bound = bound_of(load.scene, truth, before_rounding=True, effort=_PROOF_EFFORT)
+        bound = bound.over(size).larger
+        before = found.bounds.get(load.label)
+        found.bounds[load.label] = bound if before is None else joined([before, bound])
         place = load.scene.case or load.label
         if load.kinds and not any(known == place for known, _ in makers):
             makers.clear()  # the scenes before do not occur again

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from pyharness.bench.growth import Growth
-from pyharness.bench.measure import TARGETS, Finding, Refusal, Row
+from pyharness.bench.measure import TARGETS, Finding, Refusal, Row, Workload
 from pyharness.bench.page import grouped, measured_report
 from pyharness.bench.pictures import bench_picture, growth_picture
 from pyharness.bench.random_loads import KINDS
@@ -157,6 +157,7 @@ def _record(finding: Finding) -> dict[str, Any]:
             for (place, method), seconds in finding.preparation.items()
         ],
         "reference_error": finding.doubt,
+        "reference_bound": {label: each.record() for label, each in finding.bounds.items()},
         "attitude": finding.attitude,
     }
     if drawn:
@@ -216,11 +217,8 @@ def _parts(finding: Finding) -> list[tuple[str, Table]]:
             pairs = zip(score.seconds, score.ratios, strict=True)
             rows.append([score.method, *(x for pair in pairs for x in pair), score.best])
         if rows:
-            doubt = short(finding.doubt.get(load.label))
-            title = f"Case {load.label}: {load.scene.name}, T = {load.horizon:g} s "
-            title += f"(reference good to {doubt}"
-            title += ")" if finding.attitude else " of the largest omega)"
-            parts.append((title, Table(columns, rows)))
+            title = f"Case {load.label}: {load.scene.name}, T = {load.horizon:g} s"
+            parts.append((title + _of_the_reference(finding, load), Table(columns, rows)))
     columns = [Column("ratio at", left=True), *(Column(name, ratio) for name in targets)]
     for group, loads in groups(finding).items():
         if len(loads) > 1:
@@ -232,6 +230,15 @@ def _parts(finding: Finding) -> list[tuple[str, Table]]:
             if rows:
                 parts.append((title, Table(columns, rows)))
     return parts
+
+
+def _of_the_reference(finding: Finding, load: Workload) -> str:
+    bound = finding.bounds.get(load.label)
+    if bound is None:
+        return ""
+    text = bound.text("" if finding.attitude else "of the largest omega")
+    warning = f"; WARNING: {bound.warning}" if bound.warning else ""
+    return f", error of the reference at most {text}{warning}"
 
 
 def _power(target: float) -> str:

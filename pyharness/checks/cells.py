@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.check import BITS, Attempt, Check, Name
 from pyharness.checks.selection import Selection
 from pyharness.compare.agreement import differences, distance
 from pyharness.model.facts import facts
@@ -93,8 +93,8 @@ def _agreement(name: Name, listing: Listing, scene: Scene, is_listed: bool, *opt
     note = ", ".join(found)
     if is_listed:
         note = f"listed: {note}" if found else "a listed divergence that no longer occurs"
-    limit = None if is_listed else 0.0
-    return name.judged(bool(found) == is_listed, note, distance(compiled, twin), limit)
+    limit, basis = (None, None) if is_listed else (0.0, BITS)
+    return name.judged(bool(found) == is_listed, note, distance(compiled, twin), limit, basis)
 
 
 def _is_thin(listing: Listing, case: int) -> bool:

@@ -5,14 +5,24 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
+from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
+from pyharness.truth.bounded import ErrorBound
 
 # Beginning of the note of a check if a method could not solve the problem, or if it refused to
 # exceed its work limit.
 REFUSED = "refused: "
 # Suites whose ids name the problem before the method that solves it.
 _CIRCUMSTANCE_FIRST = ("random", "external")
+
+BITS = Basis(
+    "derived",
+    "no bit or count may differ",
+    "IEEE 754 determines the result of each operation; assumes that both sides perform the same "
+    "operations in the same order (`checks/check.py`)",
+)
+"""Basis of the limit 0 of differences between results that must agree bit for bit."""
 
 
 @dataclass(frozen=True)
@@ -75,27 +85,34 @@ class Name:
         """Return this name with another `quantity`, the quantity that the check compares."""
         return replace(self, quantity=quantity)
 
-    def bounded(self, value: float, limit: float, note: str = "") -> "Check":
+    def bounded(self, value: float, limit: float, basis: Basis, note: str = "") -> "Check":
         """Return the check that `value` does not exceed `limit`; a value of NaN fails.
 
-        `note` describes the fault or the observation in a few words, for reports.
+        `basis` is the reason for the limit. `note` describes the fault or the observation in a few
+        words, for reports.
         """
         # Values of NumPy's types occur here and can't be written as JSON.
         found, allowed = float(value), float(limit)
-        return Check(self, not math.isnan(found) and found <= allowed, found, allowed, note)
+        return Check(self, not math.isnan(found) and found <= allowed, found, allowed, basis, note)
 
     def judged(
-        self, passed: bool, note: str, value: float | None = None, limit: float | None = None
+        self,
+        passed: bool,
+        note: str,
+        value: float | None = None,
+        limit: float | None = None,
+        basis: Basis | None = None,
     ) -> "Check":
         """Return a check whose result `passed` the caller has decided; `note` gives the reason.
 
-        `value` and `limit` do not affect the result and are only shown in reports.
+        `value` and `limit` do not affect the result and are only shown in reports. A limit requires
+        its `basis`.
         """
-        return Check(self, bool(passed), value, limit, note)
+        return Check(self, bool(passed), value, limit, basis, note)
 
     def described(self, value: float | None, note: str = "") -> "Check":
         """Return a check without a limit: it only reports `value`, and can't fail."""
-        return Check(self, True, None if value is None else float(value), None, note)
+        return Check(self, True, None if value is None else float(value), None, None, note)
 
 
 @dataclass(frozen=True)
@@ -106,8 +123,19 @@ class Check:
     passed: bool
     value: float | None  # None if there is no single number
     limit: float | None  # limit of `value`; None if `value` is not compared with a limit
+    basis: Basis | None  # reason for the limit; None if there is no limit
     note: str = ""  # the fault or the observation, in a few words
     again: str = ""  # the command that repeats the check, if the name's command does not
+    # Returns the bound of the error of the reference to which the value refers, in the unit of the
+    # value, if the reference was used. It is computed when it is first reported.
+    reference_bound: Callable[[], ErrorBound | None] | None = field(
+        default=None, compare=False, repr=False
+    )
+
+    def __post_init__(self) -> None:
+        """Raise ValueError if there is a limit without a basis, or a basis without a limit."""
+        if (self.limit is None) != (self.basis is None):
+            raise ValueError(f"{self.id}: a limit has a basis, and a basis has a limit")
 
     @property
     def id(self) -> str:
@@ -123,6 +151,11 @@ class Check:
         return self.name.suite
 
     @property
+    def mark(self) -> str:
+        """Return the mark of the limit: proved, derived or measured; empty without a limit."""
+        return self.basis.mark if self.basis else ""
+
+    @property
     def replay(self) -> str:
         """Return the shell command that repeats this check alone."""
         return self.again or self.name.replay
@@ -131,7 +164,10 @@ class Check:
         """Return the check as a dictionary for JSON, with the fields that a subclass adds."""
         head = {"id": self.id, "passed": self.passed, "value": self.value, "limit": self.limit}
         more = {each.name: getattr(self, each.name) for each in fields(self)[_OF_ANY:]}
-        return {**head, "replay": self.replay, "note": self.note, **more}
+        bound = None if self.reference_bound is None else self.reference_bound()
+        known = {} if bound is None else {"reference_bound": bound.record()}
+        tail = {"basis": self.mark or None, "replay": self.replay, "note": self.note}
+        return {**head, **tail, **known, **more}
 
 
 _OF_ANY = len(fields(Check))

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from pyharness.checks.cells import of_cell
-from pyharness.checks.check import Check, Name
+from pyharness.checks.check import BITS, Check, Name
 from pyharness.checks.selection import Selection
 from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
 from pyharness.model.scene_file import case_numbers, case_scene
@@ -87,7 +87,7 @@ def _compared(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
     faults += _after(deck, port.steps, overflowed)
     with np.errstate(all="ignore"):
         apart = float(np.abs(found - wanted[: len(found)]).max(initial=0.0))
-    return name.judged(not faults, ", ".join(faults), apart, 0.0)
+    return name.judged(not faults, ", ".join(faults), apart, 0.0, BITS)
 
 
 def _after(deck: Run, steps: int, overflowed: bool) -> list[str]:

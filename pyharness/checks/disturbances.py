@@ -10,6 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from pyharness.model.basis import Basis
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
@@ -35,6 +36,13 @@ _GROWTH_STEPS = 64
 # They are largest where rates at points far beyond the step are extrapolated to its beginning, with
 # the weights 2, -1 or 4, -6, 4, -1.
 _WEIGHTS = {"two-term": 3.0, "four-term": 15.0}
+
+ROUNDED = Basis(
+    "derived",
+    "difference of a measured amplification from the exact one",
+    "rounding errors of a step, to first order, with all signs positive (`checks/disturbances.py`)",
+)
+"""Basis of the limit of a `Probe`."""
 
 
 @dataclass(frozen=True)

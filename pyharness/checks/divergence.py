@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pyharness.methods.solve import solve
+from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.theory.amplification import Amplification
@@ -14,6 +15,13 @@ from pyharness.theory.amplification import Amplification
 Runner = Callable[[Scene], Trajectory]
 
 _SAMPLES = 20_000
+DOUBLING = Basis(
+    "derived",
+    "smallest step size with which a run diverges",
+    "linear stability, with the change of the spin until the wobble doubles "
+    "(`checks/divergence.py`)",
+)
+"""Basis of the field `limit` of a `Divergence`."""
 
 
 @dataclass(frozen=True)

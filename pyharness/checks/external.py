@@ -22,6 +22,7 @@ from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, REGISTRY
 from pyharness.methods.solve import finest
 from pyharness.model.attitude import angle_between
+from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
@@ -45,6 +46,13 @@ _STEP_ASIDE = 2.0**-30
 # Methods that must solve every problem that any method solves: `auto` chooses a suitable method,
 # and `closed-form` evaluates a formula.
 _MAY_NOT_REFUSE = ("auto", "closed-form")
+
+_PUBLISHED = Basis(
+    "derived",
+    "difference from a published result: its accuracy, the method's error, and rounded data",
+    "first-order effects of rounding each number; for programs, twice the error that the last "
+    "halving of the step shows (`checks/external.py`)",
+)
 
 _Row = TypeVar("_Row")
 
@@ -138,7 +146,7 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
             wanted = np.array([pointing.attitude])
             error = float(angle_between(found[row : row + 1], wanted)[0])
             limit = pointing.accuracy + tolerance + float(rounding[row])
-            yield name.bounded(error, limit, "angle, rad")
+            yield name.bounded(error, limit, _PUBLISHED, "angle, rad")
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
@@ -304,7 +312,7 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
     # A difference of NaN counts as the worst, although every comparison with NaN is false.
     worst = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
     distance, limit, note = worst
-    return name.bounded(distance, limit, note)
+    return name.bounded(distance, limit, _PUBLISHED, note)
 
 
 def _scale(scene: Scene, omega: Array) -> float:

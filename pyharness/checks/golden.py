@@ -24,6 +24,7 @@ from pyharness.compare.agreement import ulps
 from pyharness.compare.candidates import method_candidate, program_candidate
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
+from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.pipes import read_input
@@ -31,13 +32,23 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene, toml_of
 from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.theory.conditioning import conditioning
+from pyharness.theory.conditioning import FLOW, conditioning
 
 _ANEW = "verify --update writes it anew"
 _STEPS = (1, 10)
 _RECORDED_METHODS = ("taylor", "closed-form", "gauss-4", "rk4", *SCIPY_METHODS)
 _TOLERANCE = 1e-9
 _LARGEST = 1 << 24  # bytes of a file
+_RECORD = Basis(
+    "measured",
+    "no bit of a recorded result may differ",
+    "the run of an earlier version, by `pyharness verify --update`",
+)
+_TWICE = Basis(
+    "derived",
+    "difference of two results with a tolerance: twice the tolerance",
+    "each result differs from the solution by at most its tolerance (`checks/golden.py`)",
+)
 _KEYS = ("command", "ended", "steps", "evaluations", "stop", "digest")
 
 
@@ -124,15 +135,15 @@ def _compared(
     run = each.run()
     now = _entry(each, run)
     if now == entry:
-        return name.judged(True, "", 0.0, 0.0)
+        return name.judged(True, "", 0.0, 0.0, _RECORD)
     moved = _moved(entry, now)
     waves = each.scene.law.sines + each.scene.law.cosines
     if each.tolerance is not None:
-        limit = 2.0 * each.tolerance
+        limit, basis = 2.0 * each.tolerance, _TWICE
     elif waves and not same_library:
-        limit = conditioning(each.scene, each.scene.times()[-1]).rounding
+        limit, basis = conditioning(each.scene, each.scene.times()[-1]).rounding, FLOW
     else:
-        return name.judged(False, moved, limit=0.0)
+        return name.judged(False, moved, limit=0.0, basis=_RECORD)
     old, new = _rows(entry), _rows(now)
     away = math.inf
     # Step, time and TIME must be equal, since no tolerance applies to them.
@@ -140,7 +151,7 @@ def _compared(
     if same_times and entry["ended"] == now["ended"]:
         scale = float(np.abs(run.omega).max(initial=0.0)) or 1.0
         away = float(np.abs(old[:, 3:6] - new[:, 3:6]).max(initial=0.0)) / scale
-    return name.bounded(away, limit, f"within its error: {moved}")
+    return name.bounded(away, limit, basis, f"within its error: {moved}")
 
 
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:

@@ -192,7 +192,7 @@ def _derived(truth: Truth, tried: MethodRun) -> float | None:
     return linear(allowed(truth, made, growth, steps=steps))
 
 
-DERIVED = Policy(_derived, refusable)
+DERIVED = Policy(_derived, promises.STEPS, refusable)
 """Policy whose limit is the promised error of a method plus rounding, amplified by the flow."""
 
 
@@ -226,7 +226,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
         limit = DERIVED.limit(truth, tried)
         most = min(math.inf if limit is None else limit, total + total * total)
         found = conserved(scene, answer.omega[-1], truth.flow.largest)
-        yield name.of("drift").bounded(found, most)
+        yield name.of("drift").bounded(found, most, DERIVED.basis)
 
 
 def scene_of(name: Name) -> Scene:

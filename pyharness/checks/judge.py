@@ -11,12 +11,14 @@ from pyharness.checks.check import REFUSED, Check, Name
 from pyharness.compare.candidates import Candidate, End, method_candidate
 from pyharness.methods.problem import closed_form
 from pyharness.model.attitude import angle_between
+from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
-from pyharness.theory.conditioning import LIVELY, Conditioning
+from pyharness.theory.conditioning import FLOW, LIVELY, Conditioning
 from pyharness.theory.state_conditioning import conditioning_at
-from pyharness.truth.reference import reference
+from pyharness.truth.bounded import ErrorBound, bound_of
+from pyharness.truth.reference import Reference, reference
 
 # Relative error beyond which the linearised flow no longer predicts the error.
 LINEAR = 0.01
@@ -137,6 +139,9 @@ class Truth:
     exact : bool
         Whether the solution is a closed form without torque. Then `data` is known, and energy and
         momentum are conserved.
+    scene, reference, effort : Scene, Reference and float, or None
+        The scene, its reference solution and the factor on the work limit, if the solution is by
+        the reference.
     """
 
     time: Array
@@ -148,6 +153,25 @@ class Truth:
     is_signed: bool = False
     data: float = 0.0
     exact: bool = False
+    scene: Scene | None = None
+    reference: Reference | None = None
+    effort: float | None = None
+
+    @cached_property
+    def bound(self) -> ErrorBound | None:
+        """Return the proved or estimated bound of the error of the reference, else None.
+
+        It is relative to the largest omega, or an angle (rad) if attitudes are compared. The limits
+        of checks do not depend on it.
+        """
+        if self.scene is None or self.reference is None:
+            return None
+        bound = bound_of(self.scene, self.reference, any_torque=True, effort=self.effort)
+        return bound.turned or bound.over(self.flow.largest)
+
+    def get_bound(self) -> ErrorBound | None:
+        """Return `bound`."""
+        return self.bound
 
     @property
     def end(self) -> float:
@@ -205,19 +229,24 @@ def reference_truth(
     known = reference(scene, times, precise=flow.amplification > 1e3, effort=effort)
     if len(known.time) < len(times):
         raise InputError("the solution grows without bound")
-    return Truth(known.time, known.omega, known.error, flow, known.attitude, known.angle_error)
+    return Truth(
+        known.time, known.omega, known.error, flow, known.attitude, known.angle_error,
+        scene=scene, reference=known, effort=effort,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Policy:
     """A rule for judging methods: the limit of the error, and the scenes that a method may refuse.
 
-    The function `limit` takes the true solution and the run of the method. The function
+    The function `limit` takes the true solution and the run of the method, and `basis` is the
+    reason for its limits. The function
     `may_refuse` takes the run, the true solution and the message with which the method refused. A
     method refuses a scene if it gives a message instead of a result.
     """
 
     limit: Callable[[Truth, MethodRun], float | None]
+    basis: Basis
     may_refuse: Callable[[MethodRun, Truth, str], bool] = lambda *_: False
 
 
@@ -282,14 +311,14 @@ def _granting(factor: Callable[[float], float]) -> Callable[[Truth, MethodRun], 
     )
 
 
-AS_STATED = Policy(_granting(lambda growth: 1.0), has_no_form)
+AS_STATED = Policy(_granting(lambda growth: 1.0), FLOW, has_no_form)
 """Policy whose limit is the tolerance itself, plus rounding amplified by the flow."""
-IF_CALM = Policy(_granting(lively))
+IF_CALM = Policy(_granting(lively), FLOW)
 """Policy whose limit is the tolerance, plus rounding amplified by the flow.
 
 The tolerance is multiplied by the error amplification only if this exceeds `LIVELY`.
 """
-AMPLIFIED = Policy(_granting(lambda growth: growth))
+AMPLIFIED = Policy(_granting(lambda growth: growth), FLOW)
 """Policy whose limit is the tolerance plus rounding, both amplified by the flow."""
 
 
@@ -312,5 +341,7 @@ def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
     note = "" if answer.is_whole else answer.ended
     bound = None if limit is None or math.isinf(limit) else limit
     if bound is None and math.isfinite(error):
-        return name.described(error, "" if limit is None else "the flow leaves no two digits")
-    return name.bounded(error, MOST if bound is None else bound, note)
+        check = name.described(error, "" if limit is None else "the flow leaves no two digits")
+    else:
+        check = name.bounded(error, MOST if bound is None else bound, policy.basis, note)
+    return replace(check, reference_bound=truth.get_bound)

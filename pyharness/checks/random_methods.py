@@ -34,6 +34,7 @@ from pyharness.compare.candidates import prepared_candidate
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, REGISTRY, SCIPY_METHODS
 from pyharness.methods.solve import finest
+from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.scenes.random_scenes import Draw, draw
 from pyharness.theory.conditioning import along
@@ -46,6 +47,12 @@ from pyharness.truth.integer_series import integer_series
 _EVERY, _EVERY_SLOW, _EVERY_ATTITUDE = 4, 60, 20
 _EFFORT = 0.05  # factor on the work limit of the reference, for an attitude
 ROUNDING = 2e-15  # relative, for an error amplification of 1
+CAMPAIGN = Basis(
+    "measured",
+    "error in random scenes: tolerance plus 2e-15 K, where K is the error amplification",
+    "`pyharness verify --only random --draws 12000 --seed campaign-1`, and seeds of each week",
+)
+"""Basis of the limits in random scenes."""
 _CALM = 10.0  # error amplification below which the series has no reason to refuse
 # Kinds of random scenes that may diverge, or be too fast for any true solution and any series.
 _MAY_REFUSE = ("extreme", "coefficients", "violent torque")
@@ -104,7 +111,7 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
     return tolerance_of(tried) * lively(growth) + ROUNDING * growth
 
 
-POLICY = Policy(_limit, may_refuse)
+POLICY = Policy(_limit, CAMPAIGN, may_refuse)
 """Policy whose limit is the tolerance plus `ROUNDING` times the error amplification.
 
 The tolerance is multiplied by the error amplification only if this exceeds `LIVELY`.
@@ -228,6 +235,7 @@ def sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: N
     told = f"{one.scene.name}, tolerance {tolerance:.2g}, growth {growth:.3g}"
     note = f"{told}: {found.note}" if found.note else told
     return Sample(
-        name, found.passed, found.value, found.limit, note,
+        name, found.passed, found.value, found.limit, found.basis, note,
+        reference_bound=found.reference_bound,
         entrance=name.subject, tolerance=tolerance, growth=growth,
     )  # fmt: skip

@@ -23,7 +23,7 @@ from pyharness.checks.judge import (
 )
 from pyharness.checks.methods import run_of_call
 from pyharness.checks.orders import in_few_steps, order_if_seen
-from pyharness.checks.random_methods import ROUNDING, sample
+from pyharness.checks.random_methods import CAMPAIGN, ROUNDING, sample
 from pyharness.checks.selection import Selection
 from pyharness.methods.many import solve_many
 from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, PREPARED_FOR_STATE, SCIPY_METHODS
@@ -140,7 +140,7 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
     return tolerance_of(tried) * lively(growth) + ROUNDING * growth + own
 
 
-POLICY = Policy(_limit, _may_refuse)
+POLICY = Policy(_limit, CAMPAIGN, _may_refuse)
 """Policy whose limit is the tolerance plus `ROUNDING` times the error amplification.
 
 The tolerance is multiplied by the error amplification only if this exceeds `LIVELY`. The limit also

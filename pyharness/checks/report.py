@@ -1,27 +1,37 @@
 """The report of checks: each failure, a summary by kind, the JSON record, the JUnit cases."""
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
 from pyharness.checks.check import Check, Sample, severity
+from pyharness.model.basis import MARKS
 from pyharness.model.records import build_record
 from pyharness.model.report import Column, Line, Report, Section, Table, counted, short, words
+from pyharness.truth.bounded import ESTIMATED, PROVED, joined
 
 _MOST_FAILURES = 50
+_MOST_ON_PAGE = 10
 _FEW = 10  # up to this number of checks, passed checks are shown too
 _GROUPS = (
     *words("checks"), Column("made"), Column("failed"), Column("worst/limit", short),
+    *words("basis"),
 )  # fmt: skip
 
 
 def checks_report(
-    verb: str, checks: Sequence[Check], text: Sequence[Section], **extra: Any
+    verb: str,
+    checks: Sequence[Check],
+    text: Sequence[Section],
+    page: Sequence[Section] | None = None,
+    **extra: Any,
 ) -> Report:
     """Return the report of the checks that a command made, for the screen and for files.
 
     `verb` is the name of the command, and `text` has the sections for the screen. For files there
-    are a JSON record, which also has the fields `extra`, and JUnit test cases.
+    are a JSON record, which also has the fields `extra`, JUnit test cases, and a page for Markdown,
+    by default that of `summary_page`.
     """
     return Report(
         verb,
@@ -32,15 +42,88 @@ def checks_report(
             **extra,
             "build": build_record(),
         },
+        page=summary_page(verb, checks) if page is None else page,
         cases=[(each.suite, each.id, _failure(each), each.replay) for each in checks],
     )
+
+
+def summary_page(
+    verb: str,
+    checks: Sequence[Check],
+    title: Sequence[str] = (),
+    depth: int = 1,
+    more: Sequence[Section] = (),
+) -> list[Section]:
+    """Return a short page for the summary of a job of continuous integration.
+
+    The page has the verdict as its head, a table of groups of checks, and the failed checks, each
+    with the command that repeats it.
+
+    Parameters
+    ----------
+    verb : str
+        The name of the command that made the checks.
+    checks : sequence of Check
+        The checks.
+    title : sequence of str
+        Lines under the head, which are shown as code.
+    depth : int
+        A group consists of the checks whose ids have so many parts in common.
+    more : sequence of Section
+        Sections at the end of the page.
+
+    Returns
+    -------
+    list of Section
+        The sections of the page.
+    """
+    failed = [check for check in checks if not check.passed]
+    lines: list[str] = []
+    for check in failed[:_MOST_ON_PAGE]:
+        seen = f"{check.id}{_seen(check, ' > ')}"
+        lines += [Line(f"- FAILED {_code(seen)}  "), Line(f"  {_code(check.replay)}")]
+    if len(failed) > _MOST_ON_PAGE:
+        lines.append(f"- ... and {len(failed) - _MOST_ON_PAGE} more")
+    head = [Line(f"## {verb}: {verdict(checks)}")]
+    told: Section = [Line(f"{_code(line)}  ") for line in title]
+    sections: list[Section] = [head, told, [_groups(checks, depth)], lines, *more]
+    return [section for section in sections if section]
+
+
+def _code(text: str) -> str:
+    """Return a text as code in Markdown, in which a port can't write links or tags."""
+    return f"`{text.replace('`', chr(39))}`"
 
 
 def _failure(check: Check) -> str:
     if check.passed:
         return ""
     note = f": {check.note}" if check.note else ""
-    return f"{short(check.value)}, limit {short(check.limit)}{note}"
+    mark = f" ({check.mark})" if check.mark else ""
+    return f"{short(check.value)}, limit {short(check.limit)}{mark}{note}"
+
+
+def marks(checks: Sequence[Check]) -> str:
+    """Return the marks that the limits of the checks have, as in ``proved, derived``.
+
+    The result is a dash if no check has a limit.
+    """
+    found = {check.mark for check in checks}
+    return ", ".join(mark for mark in MARKS if mark in found) or "-"
+
+
+def basis_note(checks: Sequence[Check]) -> list[str]:
+    """Return a legend for the marks of limits, with the number of limits of each mark.
+
+    The list is empty if no check has a limit.
+    """
+    counts = Counter(check.mark for check in checks if check.mark)
+    told = ", ".join(f"{counts[mark]} {mark}" for mark in MARKS)
+    legend = (
+        "basis: how a limit was set: proved by a theorem, derived by a formula with assumptions, "
+        f"or measured in runs. Limits here: {told}."
+    )
+    return [legend] if counts else []
 
 
 def summary(
@@ -52,14 +135,20 @@ def summary(
     `more` is printed between the table and the verdict. The verdict is a line with the numbers of
     all checks and of the failed ones.
     """
+    table: Section = [*basis_note(checks), _groups(checks, depth)]
+    return [title, listed_singly(checks), table, more, [verdict(checks)]]
+
+
+def _groups(checks: Sequence[Check], depth: int) -> Table:
     groups: dict[str, list[Check]] = {}
     for check in checks:
         groups.setdefault("/".join(check.id.split("/")[:depth]), []).append(check)
     rows = []
     for name, members in groups.items():
         worst = max((severity(check)[1] for check in members if check.limit), default=None)
-        rows.append([name, len(members), sum(not check.passed for check in members), worst])
-    return [title, listed_singly(checks), [Table(_GROUPS, rows)], more, [verdict(checks)]]
+        failed = sum(not check.passed for check in members)
+        rows.append([name, len(members), failed, worst, marks(members)])
+    return Table(_GROUPS, rows)
 
 
 def listed_singly(checks: Sequence[Check]) -> list[str]:
@@ -83,7 +172,8 @@ def listed_singly(checks: Sequence[Check]) -> list[str]:
 def _seen(check: Check, against: str) -> str:
     found = "" if check.value is None else f" {short(check.value)}"
     allowed = "" if check.limit is None else f"{against}{short(check.limit)}"
-    return f"{found}{allowed}" + (f" ({check.note})" if check.note else "")
+    told = "; ".join(filter(None, (check.mark, check.note)))
+    return f"{found}{allowed}" + (f" ({told})" if told else "")
 
 
 _BANDS = ((1e-6, "1e-3 to 1e-6"), (1e-9, "1e-6 to 1e-9"), (0.0, "finer"))
@@ -119,6 +209,26 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
     ]
     told = "worst: (error - 2e-15 K) / tolerance, with K the error amplification:"
     return [told, Table(_SAMPLES, rows)]
+
+
+def references(checks: Sequence[Check]) -> Section:
+    """Return lines that state the errors of the references to which values of checks refer.
+
+    A line states the largest bound of those errors that are proved, another one the largest of
+    those that are only estimated. A wrong estimate has a line of its own.
+    """
+    bounds = [each.reference_bound() for each in checks if each.reference_bound is not None]
+    known = [each for each in bounds if each is not None]
+    lines = []
+    for basis in (PROVED, ESTIMATED):
+        some = [each for each in known if each.basis == basis]
+        if some:
+            lines.append(
+                f"error of the reference, relative or in rad, at most {joined(some).text('')} in "
+                f"{counted(len(some), 'check')}"
+            )
+    warnings = dict.fromkeys(each.warning for each in known if each.warning)
+    return lines + [f"WARNING: {each}" for each in warnings]
 
 
 def verdict(checks: Sequence[Check]) -> str:

@@ -10,7 +10,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import REFUSED, Attempt, Check, Name
+from pyharness.checks.check import BITS, REFUSED, Attempt, Check, Name
 from pyharness.checks.judge import (
     MethodRun,
     Truth,
@@ -33,7 +33,7 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.scenes.rotated import axes_of, restarted_at, rotated
-from pyharness.theory.conditioning import Conditioning
+from pyharness.theory.conditioning import FLOW, Conditioning
 from pyharness.theory.state_conditioning import conditioning_at
 from pyharness.truth.reference import reference
 
@@ -173,7 +173,7 @@ def _compared(scene: Scene, tolerance: float, make: Way, name: Name) -> Check:
     apart = float(np.abs(first[0] - second[0]).max()) / scale
     if first[1] is not None and second[1] is not None:
         apart = max(apart, float(angle_between(first[1][None, :], second[1][None, :]).max()))
-    return name.bounded(apart, limit)
+    return name.bounded(apart, limit, FLOW)
 
 
 def _end(scene: Scene, time: float, method: str, tolerance: float) -> State:
@@ -251,4 +251,4 @@ def _bits(scene: Scene, method: str) -> bytes:
 
 def _same(job: Job, name: Name) -> Check:
     wrong = different([job], repeats=_REPEATS)
-    return name.bounded(len(wrong), 0.0, f"{_REPEATS} calls in {THREADS} threads")
+    return name.bounded(len(wrong), 0.0, BITS, f"{_REPEATS} calls in {THREADS} threads")

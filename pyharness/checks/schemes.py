@@ -14,6 +14,7 @@ import numpy as np
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.methods import cases
 from pyharness.checks.selection import Selection
+from pyharness.model.basis import Basis
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
@@ -24,6 +25,11 @@ from pyharness.theory.conditioning import ROUNDING, magnitudes
 
 # Roundings of a rate, including the stages that lead to it, and of the sum to which it is added.
 _ROUNDINGS = 32.0
+_ONE_STEP = Basis(
+    "derived",
+    "difference of a step from its scheme",
+    "a count of the rounding errors of one step, to first order (`checks/schemes.py`)",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +67,13 @@ def _compared(scene: Scene, name: Name) -> Check:
     program = name.subject
     run = PROGRAM_REGISTRY[program].run(scene, Listing.corrected(program), may_stop=False)
     if not is_whole(scene, run):
-        return name.judged(False, f"{run.ended}, or no velocity", limit=1.0)
+        return name.judged(False, f"{run.ended}, or no velocity", limit=1.0, basis=_ONE_STEP)
     due, rounding = _scheme(program, scene, run)
     off = np.abs(rows(run) - due)
     share = np.divide(off, rounding, out=np.zeros_like(off), where=off != 0.0)
     step, column = divmod(int(share.argmax()), 6)
     note = f"most at step {step + 1}, {'UV'[column // 3]}{column % 3 + 1}"
-    return name.bounded(float(share.max()), 1.0, note)
+    return name.bounded(float(share.max()), 1.0, _ONE_STEP, note)
 
 
 def is_whole(scene: Scene, run: Trajectory) -> bool:

@@ -16,6 +16,7 @@ from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.methods import cases
 from pyharness.checks.schemes import Stage, is_whole, rows, stages
 from pyharness.checks.selection import Selection
+from pyharness.model.basis import Basis
 from pyharness.model.listing import Listing, names_of
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
@@ -25,6 +26,11 @@ from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.theory.conditioning import ROUNDING
 
 _PROGRAM = "runge-kutta"
+_QUOTIENT = Basis(
+    "derived",
+    "difference of a quotient of the stop test from equation 19",
+    "rounding errors of one step, propagated to first order (`checks/stops.py`)",
+)
 
 Stages = tuple[Stage, Stage, Stage, Stage]
 
@@ -78,7 +84,7 @@ def _compared(
 ) -> Check:
     run, kutta = known()
     if kutta is None:
-        return name.judged(False, f"{run.ended}, or no velocity", limit=1.0)
+        return name.judged(False, f"{run.ended}, or no velocity", limit=1.0, basis=_QUOTIENT)
     quotients = _quotients(scene, run, kutta, listing)
     largest = 0.0
     constants = _constants(quotients)
@@ -88,11 +94,11 @@ def _compared(
         seen = found.stop and (found.steps, found.stop.step, found.stop.variable)
         if seen != (due and (due.step, due.step, due.variable)):
             note = f"with {constant!r}: {found.stop or found.ended}, due {due or 'complete'}"
-            return name.judged(False, note, limit=1.0)
+            return name.judged(False, note, limit=1.0, basis=_QUOTIENT)
         if found.stop and due:
             granted = quotients.rounding[due.step - 1, quotients.names.index(due.variable)]
             largest = max(largest, abs(found.stop.quotient - due.quotient) / granted)
-    return name.bounded(largest, 1.0, f"{len(constants)} constants")
+    return name.bounded(largest, 1.0, _QUOTIENT, f"{len(constants)} constants")
 
 
 def _quotients(scene: Scene, run: Trajectory, kutta: Stages, listing: Listing) -> Quotients:

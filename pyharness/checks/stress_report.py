@@ -4,18 +4,18 @@ from collections.abc import Sequence
 from functools import partial
 
 from pyharness.checks.check import Check, severity
-from pyharness.checks.report import checks_report, listed_singly, verdict
+from pyharness.checks.report import basis_note, checks_report, listed_singly, marks, verdict
 from pyharness.checks.stress import Trial
 from pyharness.model.report import Column, Picture, Report, Section, Table, short, words
 
 _COLUMNS = (
     *words("method"), Column("checks"), Column("failed"), Column("bounded"),
     Column("ratio", short, name="share"), Column("value", short), Column("limit", short),
-    Column("worst at", left=True, fit="cut"),
+    *words("basis"), Column("worst at", left=True, fit="cut"),
 )  # fmt: skip
 _NOTE = (
     "bounded: number of checks with a bound; the others only describe. ratio: value over limit of "
-    "the worst check, with its value and limit (without a bound: the largest value)."
+    "the worst check, with its value, limit and basis (without a bound: the largest value)."
 )
 
 
@@ -24,7 +24,7 @@ def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
 
     A trial is a group of checks under one kind of extreme conditions.
     """
-    text: list[Section] = [listed_singly(checks), [_NOTE]]
+    text: list[Section] = [listed_singly(checks), [_NOTE, *basis_note(checks)]]
     for each in trials:
         own = [check for check in checks if check.suite == each.name]
         if own:
@@ -46,9 +46,8 @@ def _table(checks: Sequence[Check]) -> Table:
         worst = max(judged, key=severity) if judged else max(members, key=_size)
         share = severity(worst)[1] if judged else None
         where = worst.name.place or None
-        rows.append(
-            [name, len(members), failed, len(judged), share, worst.value, worst.limit, where]
-        )
+        numbers = [len(members), failed, len(judged), share, worst.value, worst.limit]
+        rows.append([name, *numbers, marks([worst]), where])
     return Table(_COLUMNS, rows)
 
 

@@ -55,6 +55,11 @@ STRICT = {
     "--strict": "Exit with status 1 if the motion amplifies rounding errors so much that they "
     "exceed the tolerance."
 }
+ALSO = {
+    "--also FILE,...": "Write the result to these files too, each in the format of its name: .md "
+    "(Markdown), .xml (JUnit) or .json."
+}
+_BY_SUFFIX = {".md": "markdown", ".xml": "junit", ".json": "json"}
 
 
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict[str, str]:
@@ -295,11 +300,35 @@ def warn(message: str) -> None:
     say(f"pyharness: warning: {message}\n")
 
 
+def also_files(options: argparse.Namespace) -> dict[str, str]:
+    """Return the files that --also names, each with its output format; empty without the option.
+
+    Raise InputError if the end of a name is no known format, or if a file is named twice.
+    """
+    found: dict[str, str] = {}
+    for path in names(getattr(options, "also", None)):
+        suffix = path[path.rfind(".") :] if "." in path else ""
+        if suffix not in _BY_SUFFIX:
+            raise InputError(
+                f"--also '{path}': the name has no known ending; allowed: {', '.join(_BY_SUFFIX)}"
+            )
+        if path in found or path == options.out:
+            raise InputError(f"--also '{path}': the file is given twice; give another name")
+        found[path] = _BY_SUFFIX[suffix]
+    return found
+
+
 def check_outputs(options: argparse.Namespace) -> None:
-    """Raise InputError if a file that --out or --plot names can't be written.
+    """Raise InputError if a file that --out, --plot or --also names can't be written.
 
     Commands call this function before any computation, so that no computation is lost.
     """
+    more = also_files(options)
+    if more:
+        from pyharness.model.output_files import check_writable
+
+        for path in more:
+            check_writable(path, "--also")
     picture = getattr(options, "plot", None)
     if picture is None and options.out is None:
         return
@@ -340,6 +369,12 @@ def show(
         assert report.pictures is not None
         (draw,) = report.pictures.values()
         write_files(saved(draw(), options.plot), "--plot")
+    more = also_files(options)
+    if more:
+        from pyharness.model.output_files import write_files
+
+        texts = {path: shown(render(report, kind)) for path, kind in more.items()}
+        write_files({path: text.encode() for path, text in texts.items()}, "--also")
     emit(content, options.out)
 
 

@@ -11,7 +11,7 @@ from pyharness.model.errors import InputError, unknown
 
 _NEGATIVE = re.compile(r"-[.\d]")
 _GROUPS = {**dict.fromkeys(SCENE, "scene"), **dict.fromkeys(LISTING, "listing")}
-_OUTPUTS = ("--format", "--plot", "--out", "--strict")
+_OUTPUTS = ("--format", "--plot", "--out", "--also", "--strict")
 _NARROWEST, _WIDEST = 80, 100  # columns
 
 

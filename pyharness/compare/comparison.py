@@ -42,6 +42,7 @@ from pyharness.original.programs import (
     work_of,
 )
 from pyharness.theory.conditioning import LIVELY
+from pyharness.truth.bounded import ErrorBound, bound_of
 from pyharness.truth.reference import Reference, reference
 
 # Largest relative error that rounding causes in any method, divided by the error amplification.
@@ -102,7 +103,10 @@ class Comparison:
     lipschitz : float or None
         The Lipschitz constant of the Runge-Kutta program's stop test, 1/s; None without programs.
     reference : Reference
-        The reference solution and its error bound.
+        The reference solution and the estimate of its error.
+    bound : ErrorBound
+        The error of the reference: proved where a proof is found, otherwise estimated. No other
+        result depends on it.
     programs : tuple of ProgramFinding
         The results of the programs, one for each listing; empty if only methods are compared.
     methods : tuple of MethodFinding
@@ -117,6 +121,7 @@ class Comparison:
     scene: Scene
     lipschitz: float | None
     reference: Reference
+    bound: ErrorBound
     programs: tuple[ProgramFinding, ...]
     methods: tuple[MethodFinding, ...]
     growth: float | None
@@ -293,7 +298,8 @@ def compare_programs(
     ]
     growth = motion_growth(scene, scene.times()[-1])
     judged_programs, judged_methods = tuple(programs), tuple(methods)
-    return Comparison(scene, lipschitz, truth, judged_programs, judged_methods, growth, word)
+    bound = bound_of(scene, truth, effort=effort)
+    return Comparison(scene, lipschitz, truth, bound, judged_programs, judged_methods, growth, word)
 
 
 def listings_for(

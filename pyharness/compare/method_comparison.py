@@ -15,6 +15,7 @@ from pyharness.methods.sensitivity import motion_growth
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene import Scene, checked_scene
+from pyharness.truth.bounded import bound_of
 from pyharness.truth.reference import reference
 
 
@@ -77,7 +78,9 @@ def compare_methods(
     import scipy.integrate  # noqa: F401  (not to be timed with the first method)
 
     found = tuple(method_finding(scene, *each, effort, truth) for each in tolerances.items())
-    return Comparison(scene, None, truth, (), found, motion_growth(scene, scene.times()[-1]))
+    growth = motion_growth(scene, scene.times()[-1])
+    bound = bound_of(scene, truth, effort=effort)
+    return Comparison(scene, None, truth, bound, (), found, growth)
 
 
 def _tolerance_of_method(name: str, tolerance: float | None) -> float:

@@ -50,10 +50,9 @@ def comparison_report(comparison: Comparison) -> Report:
     """
     in_floats = comparison.word == BINARY64
     scene, truth = heading(comparison.scene), comparison.reference
-    reference = (
-        f"reference: {truth.source}, error of any w below {short(truth.error)} rad/s "
-        f"(estimated {short(truth.estimate)} before rounding to binary64)"
-    )
+    bound = comparison.bound
+    reference = [f"reference: {truth.source}, error of any w at most {bound.text()}"]
+    reference += [f"WARNING: {bound.warning}"] if bound.warning else []
     legend = _PROGRAMS_LEGEND if comparison.programs else _METHODS_LEGEND
     if comparison.programs:
         timed = "Fortran, with the call" if in_floats else _in_word(comparison)
@@ -83,7 +82,7 @@ def comparison_report(comparison: Comparison) -> Report:
     return Report(
         "compare",
         text=[
-            [*scene, reference, *motion],
+            [*scene, *reference, *motion],
             [legend],
             *tables,
             *attitudes,
@@ -251,6 +250,7 @@ def _record(comparison: Comparison) -> dict[str, Any]:
         "word": comparison.word,
         "reference": {name: getattr(truth, name) for name in _OF_THE_TRUTH}
         | ({} if truth.attitude is None else {"angle_error": truth.angle_error}),
+        "reference_bound": comparison.bound.record(),
         "programs": list(map(_program, comparison.programs)),
         "methods": list(map(_method, comparison.methods)),
         "growth": comparison.growth,

@@ -24,7 +24,7 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 
 _TEXTS = ("expression", "constants")
-_TABLES = {
+SCENE_TABLES = {
     "body": ("moments", "coefficients", "inertia"),
     "initial": ("omega", "attitude", "angles_deg", "sequence"),
     "torque": ("constant", "rate", "sines", "cosines", "frame", *_TEXTS, "terms"),
@@ -84,9 +84,9 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
     the data are invalid.
     """
     check_written_schema(data, "scene file")
-    check_keys(data, ("schema", "name", *_TABLES), "top level")
+    check_keys(data, ("schema", "name", *SCENE_TABLES), "top level")
     tables: dict[str, dict[str, Any]] = {}
-    for table, keys in _TABLES.items():
+    for table, keys in SCENE_TABLES.items():
         tables[table] = data.get(table, {})
         if not isinstance(tables[table], dict):
             raise InputError(f"{table} is {kind_of(tables[table])}; it must be a table [{table}]")
@@ -135,7 +135,7 @@ def _attitude(initial: dict[str, Any]) -> Any:
 
 def _torque(table: dict[str, Any], body: dict[str, Any]) -> TorqueLaw | StateTorque:
     """Return the torque of a scene file from its tables [torque] and [body]."""
-    check_keys(table, _TABLES["torque"], "[torque]")
+    check_keys(table, SCENE_TABLES["torque"], "[torque]")
     given = {key: value for key, value in table.items() if key != "terms"}
     first = _expressions(given) if any(key in given for key in _TEXTS) else law_of_table(given)
     if "terms" not in table:

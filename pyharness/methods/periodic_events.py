@@ -17,6 +17,8 @@ _BLOCK = 100_000  # events that are improved together
 # Half the distance at which the slope of a function is measured, in periods. It is the largest
 # correction of a time too.
 _PROBE = 1e-5
+# Largest error of the time of an event, in periods, before the time is improved.
+_MARGIN = 1e-6
 
 
 def are_of_omega(functions: Sequence[EventFunction]) -> bool:
@@ -45,13 +47,16 @@ def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array
     The times (s) are those in the first PERIODS periods, in ascending order. Raise InputError, with
     `where` in front of the message, if there are too many events.
     """
-    inner = times[(times > period) & (times <= 2.0 * period)]
+    # An event at the end of a period may be found on either side of it, and is not lost here.
+    margin = _MARGIN * period
+    inner = times[(times > period - margin) & (times <= 2.0 * period + margin)]
     if not inner.size:
         # There may be an event at time 0 alone.
         return times[times < period], len(times[times < period])
     # No event is near the beginning of the period that is repeated.
-    gaps = np.diff(inner, append=inner[0] + period)
-    begin = inner[gaps.argmax()] + 0.5 * gaps.max()
+    phases = np.sort(inner % period)
+    gaps = np.diff(phases, append=phases[0] + period)
+    begin = period + phases[gaps.argmax()] + 0.5 * gaps.max()
     begin -= period if begin > 2.0 * period else 0.0
     first = times[times <= begin]
     one = times[(times > begin) & (times <= begin + period)]

@@ -6,6 +6,7 @@ from functools import cached_property
 
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import REGISTRY, check_torque, requested_tolerance
+from pyharness.model.effort import waves
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.state_torque import StateTorque
@@ -15,8 +16,9 @@ FINEST = REGISTRY["auto"].finest
 # For large tolerances Runge-Kutta may take fewer operations than a Taylor series. The kernel
 # chooses between the two.
 RK4_OR_TAYLOR = "quick or taylor"
-# Smallest tolerances at which Runge-Kutta may be faster than the Taylor series. The first applies
-# to a constant torque, and the second to a torque that varies with time.
+# Smallest tolerances at which Runge-Kutta is so often faster than the Taylor series that the kernel
+# forecasts the time of both. The second applies to a torque with waves, which may be so fast that
+# only Runge-Kutta, which averages them, can solve the scene.
 FEW_DIGITS = 1e-7
 _WAVES_DIGITS = 1e-9
 
@@ -94,7 +96,7 @@ def plan(
             isinstance(scene.torque, TorqueLaw)
             and scene.changing is None
             and not scene.torque.in_space
-            and tolerance >= (_WAVES_DIGITS if scene.torque.varies else FEW_DIGITS)
+            and tolerance >= (_WAVES_DIGITS if waves(scene) else FEW_DIGITS)
         )
         # Runge-Kutta has no intermediate output.
         method = "closed-form" if form else RK4_OR_TAYLOR if few_digits and not rows else "taylor"
@@ -156,9 +158,9 @@ def _of_torque(torque: TorqueLaw | StateTorque) -> Iterator[Decision]:
         yield Decision("torque", True, f"depends on the state: {count}")
         return
     yield Decision("torque", not torque.is_zero, "zero" if torque.is_zero else "acts")
-    for name, waves in (("sines", torque.sines), ("cosines", torque.cosines)):
-        acts = any(any(amplitude) for amplitude, _ in waves)
-        yield Decision(name, acts, f"{len(waves)} in the law" if acts else "none act")
+    for name, terms in (("sines", torque.sines), ("cosines", torque.cosines)):
+        acts = any(any(amplitude) for amplitude, _ in terms)
+        yield Decision(name, acts, f"{len(terms)} in the law" if acts else "none act")
     varies = "the law varies" if torque.varies else "constant: read once"
     yield Decision("torque of time", torque.varies, varies)
 

@@ -5,11 +5,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from pyharness.dynamics.system import is_recorded
 from pyharness.methods.problem import rows_trajectory
 from pyharness.methods.scipy_ivp import FINEST, scipy_method
 from pyharness.model.effort import Integrator
 from pyharness.model.errors import InputError
+from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Trajectory
@@ -51,6 +54,8 @@ class Method:
     space_torque: bool = False  # takes a torque about the axes of space, together with attitude
     # Takes a torque that depends on omega or attitude, and propagates the attitude under it.
     state_torque: bool = False
+    # Takes weak torques alone, also a recorded one that depends on omega; computes no attitude.
+    weak_torque: bool = False
     scipy: str = ""  # SciPy's name of the method; empty for our own methods
 
     @property
@@ -66,9 +71,16 @@ def _reference(
 
     result = reference(scene, times, effort=effort)
     ended = "complete" if len(result.time) == len(times) else "overflow"
+    largest = max(*map(abs, scene.omega), float(np.abs(result.omega).max(initial=0.0)))
+    # An estimate of 0 would be a promise that nothing has tested. If the scene was transformed to
+    # principal axes, the rounding errors of the transformation are not estimated.
+    error = result.error / largest if largest and not isinstance(scene, PrincipalScene) else None
+    if error is not None and result.attitude is not None:
+        error = max(error, result.angle_error)
     return rows_trajectory(
-        result.time.tolist(), result.omega, 0, len(times), ended, attitude=result.attitude
-    )
+        result.time.tolist(), result.omega, 0, len(times), ended, attitude=result.attitude,
+        error=error,
+    )  # fmt: skip
 
 
 def _no_rows(*given: object) -> Trajectory:
@@ -180,6 +192,15 @@ REGISTRY = {
             any_scale=True,
             attitude=True,
         ),
+        Method(
+            "averaged",
+            "two-scale averaging, for weak torques over very many revolutions",
+            "ours; Calvo, Chartier, Murua and Sanz-Serna 2011, Applied Numerical Mathematics 61",
+            1e-13,
+            _DEFAULT,
+            _from("averaged", "averaged"),
+            weak_torque=True,
+        ),
         *map(_gauss, range(1, 9)),
         _fixed_step("improved-euler", "improved Euler", "Jacobs 1982, eq. 29", 2, 2),
         _fixed_step("taylor-3", "three terms of the Taylor series", "Jacobs 1982, eq. 30", 2, 2),
@@ -257,7 +278,10 @@ def check_torque(scene: Scene, method: str, attitude: bool) -> None:
         kind += "the attitude" if torque.needs_attitude else "omega"
         if torque.tape is None and not chosen.scipy:
             kind, able = "an opaque torque", list(SCIPY_METHODS)
-        elif not chosen.state_torque:
+        elif chosen.weak_torque and scene.changing is not None:
+            kind = "an inertia that changes with time"
+            able = [each.name for each in REGISTRY.values() if each.state_torque]
+        elif not (chosen.state_torque or (chosen.weak_torque and not torque.needs_attitude)):
             able = [each.name for each in REGISTRY.values() if each.state_torque]
     elif scene.changing is not None and not chosen.state_torque:
         kind = "an inertia that changes with time"

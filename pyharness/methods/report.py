@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from pyharness.methods.plan import Plan
+    from pyharness.truth.bounded import ErrorBound
 
 _NUMBER = digits(".6g")
 _TIMES = (
@@ -44,13 +45,15 @@ def trajectory_report(
     trajectory: Trajectory,
     form: str = "quaternion",
     word: str | None = None,
+    bound: "ErrorBound | None" = None,
 ) -> Report:
     """Return the report of one trajectory of a scene, with a table of its rows and a picture.
 
     `method` is the name of the method or program, and `title` is the line under the scene's
     heading. `listing` is the program with a choice of its defects, or None for a method. `word` is
     the name of the arithmetic of a program that did not run in binary64, else None. `form` is the
-    form in which an attitude is shown: ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``.
+    form in which an attitude is shown: ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `bound`
+    is the bound of the error of the method `reference`, else None.
     """
     columns = [*_TIMES, *_OMEGA]
     parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]
@@ -89,17 +92,32 @@ def trajectory_report(
                 "tolerance": trajectory.tolerance,
                 **records.estimate_record(trajectory),
             },
+            **({} if bound is None else {"reference_bound": bound.record()}),
             **records.ending_record(trajectory),
             "build": records.build_record(),
         }
 
     return Report(
         "run",
-        text=[[*heading(scene), title], [counted], [ending(trajectory), *estimates(trajectory)]],
+        text=[
+            [*heading(scene), title],
+            [counted],
+            [ending(trajectory), *estimates(trajectory), *_bounds(bound)],
+        ],
         record=record,
         data=numbers,
         pictures={"omega": lambda: _picture(f"{scene.name}: {title}", trajectory, numbers)},
     )
+
+
+def _bounds(bound: "ErrorBound | None") -> list[str]:
+    """Return lines that state the error of the reference and, if it has one, of its attitude."""
+    if bound is None:
+        return []
+    lines = [f"reference: error of any omega at most {bound.text()}"]
+    if bound.turned is not None:
+        lines.append(f"reference: error of any attitude at most {bound.turned.text('rad')}")
+    return lines + ([f"WARNING: {bound.warning}"] if bound.warning else [])
 
 
 def _shown(attitude: Array, form: str) -> Array:

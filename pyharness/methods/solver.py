@@ -85,7 +85,7 @@ class Solver(LastCall, BoundKernel):
     'complete'
     """
 
-    _packed: Array
+    packed: Array
     _packed_with_gil: Array | None
 
     # The base class binds a kernel to its data in C. A call goes from the interpreter into the
@@ -107,7 +107,7 @@ class Solver(LastCall, BoundKernel):
             packed_with_gil[Places.METHOD] = CODES.get(chosen.closed_form, Methods.CLOSED_FORM)
         solver = super().__new__(cls, kernel, packed, _check, packed_with_gil)
         solver.plan = chosen
-        solver._packed, solver._packed_with_gil = packed, packed_with_gil
+        solver.packed, solver._packed_with_gil = packed, packed_with_gil
         solver._given = tolerance, asked, effort
         return solver
 
@@ -126,10 +126,8 @@ class Solver(LastCall, BoundKernel):
         """
         from pyharness._many import ManyStarts
 
-        slowly = partial(many_starts, self._packed)
-        return ManyStarts(
-            extension().solve_packed_many, self._packed, self._packed_with_gil, slowly
-        )
+        slowly = partial(many_starts, self.packed)
+        return ManyStarts(extension().solve_packed_many, self.packed, self._packed_with_gil, slowly)
 
     @property
     def method(self) -> str:

@@ -34,6 +34,8 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
     InputError, with `where` in front of the message, for another shape, an element that is not a
     real number, or a number that fails the test.
     """
+    if type(values) is float and not shape and rule is None:
+        return np.array([values])
     found = numbers_of(where, values)
     own = found.shape[-len(shape) :] if shape else ()
     spare = found.ndim - len(shape)
@@ -43,6 +45,8 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
         raise InputError(f"{where}: shape {found.shape}; allowed: {allowed}")
     if rule is not None:
         _check_rule(where, found, rule)
+    if spare and found.flags.c_contiguous:
+        return found
     return np.ascontiguousarray(found.reshape(-1, *own))
 
 
@@ -147,6 +151,17 @@ def spread(rows: Array, n: int) -> Array:
     if len(rows) == n:
         return rows
     return np.ascontiguousarray(np.broadcast_to(rows, (n, *rows.shape[1:])))
+
+
+def unit_quaternions(rows: Array) -> Array:
+    """Return quaternions, shape (n, 4), divided by their norms.
+
+    A quaternion that can't be normalised, such as four zeros, becomes NaN.
+    """
+    with np.errstate(all="ignore"):
+        found = rows / np.abs(rows).max(axis=1, keepdims=True)
+        units: Array = found / np.sqrt((found * found).sum(axis=1, keepdims=True))
+    return units
 
 
 def _fits(own: tuple[int, ...], shape: tuple[int | str, ...]) -> bool:

@@ -8,7 +8,7 @@ q' = q (0, omega)/2, and is integrated. Angles and matrices are only other forms
 
 import math
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -18,6 +18,14 @@ from pyharness.model.values import finite, number_list, three
 
 Quaternion = tuple[float, float, float, float]
 
+
+class Rotation(Protocol):
+    """A rotation from body to space that has a quaternion, such as SciPy's `Rotation`."""
+
+    def as_quat(self) -> Any:
+        """Return the quaternion, scalar last."""
+
+
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 SEQUENCES = ("3-1-3", "3-2-1")
 FORMS = ("quaternion", *SEQUENCES, "matrix")
@@ -25,14 +33,23 @@ NEAR_ONE = 1e-12  # a norm that differs from 1 by at most this was intended to b
 _ROUNDED = 2.0**-51  # deviation of a norm from 1 that normalisation cannot reduce
 
 
+def scalar_first(values: object) -> Any:
+    """Return the quaternions, scalar first, of a SciPy `Rotation`, and anything else as it is.
+
+    A `Rotation` is recognised by its method `as_quat`, so that SciPy is not imported.
+    """
+    as_quat = getattr(values, "as_quat", None)
+    return values if as_quat is None else np.asarray(as_quat())[..., [3, 0, 1, 2]]
+
+
 def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
     """Return four numbers as a normalised quaternion, and their norm before normalisation.
 
-    Raise InputError, with `where` in front of the message, unless `values` are four finite numbers,
-    not all 0.
+    `values` may also be a SciPy `Rotation` from body to space. Raise InputError, with `where` in
+    front of the message, unless `values` are four finite numbers, not all 0.
     """
     allowed = "allowed: four finite numbers, scalar first, not all 0"
-    given = [finite(where, each) for each in number_list(where, values, allowed)]
+    given = [finite(where, each) for each in number_list(where, scalar_first(values), allowed)]
     if len(given) != 4:
         raise InputError(f"{where}: {len(given)} numbers; {allowed}")
     largest = max(map(abs, given))

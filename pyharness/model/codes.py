@@ -67,6 +67,9 @@ class Series:
     MOST_ORDER = 24
     LEAST_LOCAL_TOLERANCE = 1e-19  # relative to omega: size of the last Taylor terms of a step
     SLACK = 16.0  # a step is shortened if its last Taylor terms exceed this many local tolerances
+    # Radians of the fastest perturbation. In a longer motion, variations that are not precise lose
+    # their phase, and their growth, the error amplification, is too small.
+    LONG = 5000.0
 
 
 class Waves:

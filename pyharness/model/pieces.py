@@ -63,5 +63,5 @@ def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, thr
         expect_bodies(n)
         count = max(count, min(_REPORTS, n))
     ends = [n * piece // count for piece in range(count + 1)]
-    pieces = [slice(*each) for each in itertools.pairwise(ends)]
+    pieces = [slice(first, last) for first, last in itertools.pairwise(ends)]
     share(lambda piece: work(piece, given_up), pieces, threads, given_up)

@@ -1,7 +1,7 @@
 """Reports of the progress of a long computation, and a bar that shows it to users of Python."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from typing import Any
 
@@ -26,15 +26,16 @@ def no_progress(done: int, total: int, what: str) -> None:
     """
 
 
-@contextmanager
-def bar_of_bodies(is_shown: bool) -> Iterator[None]:
+def bar_of_bodies(is_shown: bool) -> AbstractContextManager[None]:
     """Show a progress bar of the bodies that are computed in this context, if `is_shown`.
 
     The bar is that of tqdm, in a terminal or in a notebook.
     """
-    if not is_shown:
-        yield
-        return
+    return _shown_bar() if is_shown else nullcontext()
+
+
+@contextmanager
+def _shown_bar() -> Iterator[None]:
     from tqdm.auto import tqdm
 
     with tqdm(unit=" bodies", unit_scale=True) as bar:

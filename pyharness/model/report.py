@@ -9,6 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
+    from decimal import Decimal
+
     from matplotlib.figure import Figure
 
     from pyharness.model.trajectory import Array
@@ -31,7 +33,7 @@ def plain(value: Any) -> str:
     return "-" if value is None else str(value)
 
 
-def short(x: float | None) -> str:
+def short(x: "float | Decimal | None") -> str:
     """Return the number x as text with two digits, as in 1.2e-3; None becomes a dash."""
     if x is None:
         return "-"

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
-from pyharness.model.attitude import Quaternion, unit_quaternion
+from pyharness.model.attitude import Quaternion, Rotation, unit_quaternion
 from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
@@ -88,7 +88,7 @@ class Scene:
         programs integrate too. The defaults are the numbers in the printed programs.
     case : int, optional
         The number of the case in Table 1 of the thesis, if the scene is one of these cases.
-    attitude : four numbers, optional
+    attitude : four numbers or scipy.spatial.transform.Rotation, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
     inertia : three rows of three numbers, or ChangingInertia, optional
         A full symmetric inertia matrix about the body axes (kg m2), constant or as a polynomial of
@@ -139,7 +139,7 @@ class Scene:
             masses: Numbers = ...,
             forces: Numbers = ...,
             case: SupportsIndex | None = None,
-            attitude: Numbers | None = None,
+            attitude: Numbers | Rotation | None = None,
             inertia: Iterable[Numbers] | ChangingInertia | None = None,
             changing: ChangingMoments | None = None,
         ) -> None: ...

@@ -128,6 +128,8 @@ def integer(where: str, value: object) -> int:
     Raise InputError, with `where` in front of the message, if `value` is no integer. A float is no
     integer, even if it is whole.
     """
+    if type(value) is int:
+        return value
     if not is_no_number(value):
         try:
             return operator.index(value)  # type: ignore[arg-type]

@@ -13,7 +13,12 @@ import pytest
 from pyharness.bench import ensemble_growth
 from pyharness.bench import ensemble_measure as measuring
 from pyharness.bench.contenders import Contender
-from pyharness.bench.ensemble_contenders import EnsembleContender, draw, own_ensembles
+from pyharness.bench.ensemble_contenders import (
+    EnsembleContender,
+    draw,
+    own_ensembles,
+    with_attitudes,
+)
 from pyharness.bench.ensemble_growth import memory
 from pyharness.bench.ensemble_measure import Rate
 from pyharness.bench.ensemble_peers import ensemble_peers
@@ -54,6 +59,16 @@ def test_contender_comes_to_the_truth(contender: EnsembleContender) -> None:
             run = contender.prepare(load, SETTINGS[contender.setting], threads)
             run()  # the second call must start from the initial conditions again
             np.testing.assert_allclose(run()[rows], wanted, rtol=0.0, atol=2e-8)
+
+
+@pytest.mark.parametrize("contender", own_ensembles(), ids=lambda each: each.name)
+def test_contender_comes_to_the_true_attitudes(contender: EnsembleContender) -> None:
+    for load in with_attitudes(draw("truth", BODIES), "truth"):
+        if not contender.attitude or (contender.torque_free and load.torque is not None):
+            continue
+        wanted = load.part([0, 1, 69]).ends()
+        run = contender.prepare(load, SETTINGS[contender.setting], 1)
+        np.testing.assert_allclose(run()[[0, 1, 69]], wanted, rtol=0.0, atol=2e-8)
 
 
 def test_a_seed_says_which_bodies() -> None:
@@ -112,7 +127,7 @@ def test_json_csv_and_picture(tmp_path: Path, capsys: Capture) -> None:
     assert {each["method"] for each in record["memory"]} == {"closed-form", "taylor", "rk4"}
     assert main([*one, "--format", "csv"]) == 0
     rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
-    assert len(rows) == 8
+    assert len(rows) == 16
     assert {"load", "target", "method", "cores", "error", "bodies_a_second"} <= set(rows[0])
 
 

@@ -2,7 +2,14 @@
 
 from collections.abc import Iterator
 
-from pyharness.checks.check import Attempt, Check, Name, made
+import pytest
+
+from docs.certificates.limits import counts_table, limits
+from pyharness.checks.check import BITS, Attempt, Check, Name, made
+from pyharness.checks.report import basis_note, marks
+from pyharness.model.basis import MARKS, Basis
+
+_MEASURED = Basis("measured", "a value", "a run")
 
 
 def test_an_id_is_made_of_the_parts_of_a_name() -> None:
@@ -29,7 +36,7 @@ def test_only_what_is_requested_is_computed() -> None:
 
     def both(name: Name) -> list[Check]:
         computed.append(name.id)
-        return [name.of("error").bounded(1.0, 2.0), name.of("drift").bounded(3.0, 2.0)]
+        return [name.of("error").bounded(1.0, 2.0, BITS), name.of("drift").bounded(3.0, 2.0, BITS)]
 
     attempts = [Attempt(Name("a", "b"), parts), Attempt(Name("a", "c"), both)]
     found = list(made(attempts, ["a/b/coarse/drift"]))
@@ -41,8 +48,43 @@ def test_only_what_is_requested_is_computed() -> None:
 
 
 def test_a_record_tells_id_and_replay_and_what_a_number_is_compared_with() -> None:
-    record = Name("a", "b").bounded(1.0, 2.0, "seen").record()
+    record = Name("a", "b").bounded(1.0, 2.0, _MEASURED, "seen").record()
     assert record == {
-        "id": "a/b", "passed": True, "value": 1.0, "limit": 2.0,
+        "id": "a/b", "passed": True, "value": 1.0, "limit": 2.0, "basis": "measured",
         "replay": "python -m pyharness verify --only a/b", "note": "seen",
     }  # fmt: skip
+    assert Name("a", "b").described(1.0).record()["basis"] is None
+
+
+@pytest.mark.parametrize(
+    ("limit", "basis"), [(1.0, None), (0.0, None), (None, BITS)], ids=["limit", "zero", "basis"]
+)
+def test_no_limit_is_without_a_basis(limit: float | None, basis: Basis | None) -> None:
+    with pytest.raises(ValueError, match=r"a/b: a limit has a basis"):
+        Name("a", "b").judged(True, "", 1.0, limit, basis)
+
+
+@pytest.mark.parametrize(
+    "parts", [("certain", "a value", "a run"), ("proved", "a value", ""), ("proved", "", "a book")]
+)
+def test_a_basis_has_a_known_mark_and_a_source(parts: tuple[str, str, str]) -> None:
+    with pytest.raises(ValueError, match="not a basis"):
+        Basis(*parts)
+
+
+def test_reports_count_the_limits_by_mark() -> None:
+    name = Name("a")
+    checks = [name.bounded(1.0, 2.0, each) for each in (_MEASURED, BITS, BITS)]
+    assert marks([*checks, name.described(1.0)]) == "derived, measured"
+    (legend,) = basis_note(checks)
+    assert legend.endswith("0 proved, 2 derived, 1 measured.")
+    assert (marks([name.described(1.0)]), basis_note([name.described(1.0)])) == ("-", [])
+
+
+def test_the_document_counts_every_basis_in_the_source() -> None:
+    found = limits()
+    assert {each.mark for each in found} == MARKS.keys()
+    assert BITS in found
+    for mark in MARKS:
+        count = sum(each.mark == mark for each in found)
+        assert f"| {mark} | {MARKS[mark]} | {count} |" in counts_table()

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from pyharness.checks import cells as verify_programs
-from pyharness.checks.check import Check, Name, selected
+from pyharness.checks.check import BITS, Check, Name, selected
 from pyharness.checks.golden import mathematics, read_record, recorded, update
 from pyharness.checks.judge import Answer, MethodRun
 from pyharness.checks.kinds import KINDS, verify
@@ -60,7 +60,8 @@ def test_checks_have_names_of_their_own_and_all_pass() -> None:
 
 def test_limit_is_not_passed_by_nan() -> None:
     passed = [
-        Name("").bounded(*pair).passed for pair in ((math.nan, math.inf), (2.0, 1.0), (1.0, 1.0))
+        Name("").bounded(*pair, BITS).passed
+        for pair in ((math.nan, math.inf), (2.0, 1.0), (1.0, 1.0))
     ]
     assert passed == [False, False, True]
 
@@ -76,7 +77,7 @@ def test_json_is_as_agreed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify", "--format", "json", "--only", only]) == 0
     record = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
     assert (record["schema"], record["passed"], record["seed"]) == (1, True, weekly_seed())
-    assert {"id", "passed", "value", "limit", "replay"} <= set(record["checks"][0])
+    assert {"id", "passed", "value", "limit", "basis", "replay"} <= set(record["checks"][0])
     assert len(record["checks"]) == 32 + 7
 
 

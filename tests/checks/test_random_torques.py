@@ -6,6 +6,7 @@ from functools import cache, partial
 from typing import Any
 from unittest.mock import patch
 
+import numpy as np
 import pytest
 
 from pyharness.checks import judge
@@ -15,7 +16,7 @@ from pyharness.checks.random_torques import random_torques
 from pyharness.checks.selection import Selection
 from pyharness.compare import candidates
 from pyharness.dynamics import system
-from pyharness.methods import many_space, recorded, solve
+from pyharness.methods import many_recorded, recorded, solve
 from pyharness.methods.registry import FIXED_STEP, METHODS
 from pyharness.model import arrays
 from pyharness.model.tape import Linear, Tape
@@ -81,8 +82,8 @@ FAULTS: dict[str, tuple[Any, str, Any, str]] = {
     "many": (recorded, "system_of", _off, "torque-solve-many"),
     "solve": (candidates, "solve", partial(_moved, solve.solve), "torque-solve-auto"),
     "initial attitude": (
-        many_space, "row_of", lambda rows, i, real=arrays.row_of:
-            real(rows, i) * (1.0 + 1e-6) if rows.shape[1:] == (3,) else real(rows, i),
+        many_recorded, "unit_quaternions",
+        lambda rows, real=arrays.unit_quaternions: real(rows + 1e-3 * np.eye(4)[0]),
         "torque-solve-many",
     ),
 }  # fmt: skip

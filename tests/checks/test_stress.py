@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from pyharness.checks import hold as truth
-from pyharness.checks.check import Check, Name
+from pyharness.checks.check import BITS, Check, Name
 from pyharness.checks.stress import named, stress, worst
 from pyharness.cli.main import main
 from pyharness.compare.candidates import End
@@ -90,7 +90,7 @@ def test_what_is_conserved_is_read_as_an_error_of_omega() -> None:
 def test_the_worst_is_the_nearest_to_its_limit_or_failed() -> None:
     scene = Scene("", (1.0,) * 3, (1.0,) * 3)
     found = worst(
-        Check(Name(*id.split("/"), scene=scene), passed, value, limit)
+        Check(Name(*id.split("/"), scene=scene), passed, value, limit, BITS if limit else None)
         for id, value, limit, passed in (
             ("a/b/1", 1e-3, 1.0, True),
             ("a/b/2", 1e-9, 1e-9, True),
@@ -125,7 +125,7 @@ def test_table_is_narrow_and_json_tells_all(
     record = json.loads(text)
     assert (code, record["schema"], record["passed"]) == (0, 1, True)
     for check in record["checks"]:
-        assert {"id", "passed", "value", "limit", "replay"} <= set(check)
+        assert {"id", "passed", "value", "limit", "basis", "replay"} <= set(check)
 
 
 def test_a_failure_is_told_in_every_form(
@@ -174,8 +174,8 @@ def test_only_what_failed_is_saved_unless_a_folder_is_given(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     scene = Scene("", (1.0, 2.0, 3.0), (3.0, 2.0, 1.5))
-    good = named("separatrix", "taylor", "a", scene=scene).bounded(1.0, 2.0)
-    bad = named("separatrix", "quick", "b", scene=scene).bounded(3.0, 2.0)
+    good = named("separatrix", "taylor", "a", scene=scene).bounded(1.0, 2.0, BITS)
+    bad = named("separatrix", "quick", "b", scene=scene).bounded(3.0, 2.0, BITS)
     for checks, code, names in (
         ([good], 0, None),
         ([good, bad], 1, ["separatrix-quick.toml"]),

@@ -184,7 +184,7 @@ def _checked(build: Build, twin: dict[str, str]) -> Iterator[Check]:
     try:
         tree = make(build, FOLDER)
     except RuntimeError as error:
-        yield Check(Name("build", name), False, None, None, str(error), replay)
+        yield Check(Name("build", name), False, None, None, None, str(error), replay)
         return
     built = time.monotonic()
     if build.faulty:
@@ -194,17 +194,17 @@ def _checked(build: Build, twin: dict[str, str]) -> Iterator[Check]:
     arguments = ["-m", "tests.cross.digests", "fortran", "digests.json"]
     done = _run(tree, arguments, traps=build.checked)
     if done.returncode:
-        yield Check(Name("build", name), False, None, None, done.stdout[-1000:], replay)
+        yield Check(Name("build", name), False, None, None, None, done.stdout[-1000:], replay)
         return
     record = json.loads((tree / "digests.json").read_text())
     wrong = false_claims(build, tree, record)
-    yield Check(Name("build", name), not wrong, None, None, "; ".join(wrong), replay)
+    yield Check(Name("build", name), not wrong, None, None, None, "; ".join(wrong), replay)
     due = _due(twin, record["words"])
     bits = list(compared(name, record["digests"], due, _listed()))
     if build.contract != "off":
         seen = sum(not check.passed for check in bits)
         note = f"{seen} of {len(bits)} cells differ" if seen else "the comparison sees no fault"
-        yield Check(Name("fault", "contraction"), seen > 0, None, None, note, replay)
+        yield Check(Name("fault", "contraction"), seen > 0, None, None, None, note, replay)
     else:
         yield from bits
     compared_at = time.monotonic()
@@ -239,7 +239,7 @@ def _suite(build: Build, tree: Path) -> Check:
         died = [line for line in lines if "Fortran runtime error" in line or ", untold" in line]
         words = [*failed, *died] or lines[-3:]
         note = "; ".join([*(each[:300] for each in words), f"see {log.relative_to(ROOT)}"])
-    return Check(Name("tests", name), done.returncode == 0, None, None, note, replay)
+    return Check(Name("tests", name), done.returncode == 0, None, None, None, note, replay)
 
 
 def _faults(tree: Path) -> Iterator[Check]:
@@ -253,7 +253,7 @@ def _faults(tree: Path) -> Iterator[Check]:
         seen = done.returncode != 0 and words in done.stdout
         note = "" if seen else f"not seen: {words}\n{done.stdout[-2000:]}"
         replay = "make cross-check ARGS=faulty"
-        yield Check(Name("fault", name), seen, None, None, note, replay)
+        yield Check(Name("fault", name), seen, None, None, None, note, replay)
 
 
 def _run(tree: Path, arguments: list[str], traps: bool = False) -> subprocess.CompletedProcess[str]:

@@ -31,7 +31,7 @@ def compared(
         again = f"{variables}python -m {replay(cell)}"
         if build != CHECKOUT:
             again = inside(build, replay(cell), variables)
-        yield Check(Name("bits", build, cell), differs == known, None, None, note, again)
+        yield Check(Name("bits", build, cell), differs == known, None, None, None, note, again)
 
 
 def inside(build: str, module: str, variables: str = "") -> str:

@@ -146,3 +146,19 @@ def test_the_period_that_is_repeated_begins_between_events() -> None:
     np.testing.assert_allclose(found, some, rtol=0, atol=1e-12)
     found, kept = repeated(np.array([0.0]), 1.0, 37.5, "")
     assert (found.tolist(), kept) == ([0.0], 1)
+
+
+def test_an_event_on_both_sides_of_the_ends_of_periods_is_found() -> None:
+    """The first event is just before the end of a period, and the second just after its end."""
+    once = np.array([1.0 - 1e-12, 2.0 + 1e-12])
+    found, _ = repeated(once, 1.0, 37.5, "")
+    np.testing.assert_allclose(found, np.arange(1.0, 38.0), rtol=0, atol=1e-9)
+    found, _ = repeated(np.sort([*once, 0.5, 1.5, 2.5]), 1.0, 37.5, "")
+    np.testing.assert_allclose(found, np.arange(1, 76) / 2.0, rtol=0, atol=1e-9)
+    tilt = 0.47137931034482766
+    omega = 2.0 * np.array([np.cos(tilt), 0.0, np.sin(tilt)])
+    scene = Scene("", omega, moments=(1.0, 2.0, 3.0))
+    rising = solve(scene, 300.0, events=events.flip(2, direction=1)).t_events
+    assert rising is not None
+    period = period_of(scene)
+    np.testing.assert_allclose(rising[0], period * np.arange(1, 35), rtol=1e-12)

@@ -9,7 +9,16 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from pyharness import InputError, Scene, TorqueLaw, principal, read_scene, solve
+from pyharness import (
+    InputError,
+    Scene,
+    TorqueLaw,
+    prepare,
+    principal,
+    read_scene,
+    solve,
+    solve_many,
+)
 from pyharness.model.attitude import angles, matrices, of_angles, product
 from pyharness.model.scene_file import scene_text
 from pyharness.model.trajectory import Array
@@ -175,3 +184,27 @@ def test_principal_axes_are_a_right_handed_frame() -> None:
         assert np.linalg.det(axes) == pytest.approx(1.0)
         assert sorted(bare.moments or ()) == pytest.approx(sorted(moments))
         assert axes @ np.diag(np.array(bare.moments)) @ axes.T == pytest.approx(matrix)
+
+
+def test_a_rotation_of_scipy_is_an_attitude_everywhere() -> None:
+    turns = Rotation.from_euler("ZXZ", [[10.0, 20.0, 30.0], [-40.0, 50.0, 170.0]], degrees=True)
+    rows = turns.as_quat()[:, [3, 0, 1, 2]]
+    body = Scene("body", (0.1, 0.2, 0.3), moments=(3.0, 2.0, 1.0), attitude=turns[0])
+    assert body == replace(body, attitude=tuple(rows[0]))
+    found = solve(body, [1.0], attitude=True)
+    assert found.attitude is not None
+    expected = Rotation.from_quat(np.roll(found.attitude[0], -1))
+    assert (found.rotation()[0] * expected.inv()).magnitude() < 1e-15
+    starts = [[0.1, 0.2, 0.3], [0.3, 0.2, 0.1]]
+    solver = prepare(body, attitude=True)
+    for given, numbers in ((turns[1], rows[1]), (turns, rows)):
+        batch = solve_many(body, 1.0, omega0=starts, attitude0=given)
+        same = solve_many(body, 1.0, omega0=starts, attitude0=numbers)
+        np.testing.assert_array_equal(batch.attitude, same.attitude)
+        many = solver.many(starts, 1.0, given)[1]
+        np.testing.assert_array_equal(many, solver.many(starts, 1.0, numbers)[1])
+    np.testing.assert_array_equal(
+        solver(starts[0], 1.0, turns[1])[1], solver(starts[0], 1.0, rows[1])[1]
+    )
+    with pytest.raises(InputError, match=r"\[initial\] attitude"):
+        replace(body, attitude=turns)

@@ -86,7 +86,7 @@ def as_check(caught: Caught) -> Check:
     value = float(caught.failed.total() - caught.failed[_NOT_ENOUGH])
     again = "python -m pyharness verify --self-test"
     note = f"caught by {caught.counts or 'nothing'}"
-    return Check(name, caught.passed, value, None, note, again)
+    return Check(name, caught.passed, value, None, None, note, again)
 
 
 def self_test_report(title: Sequence[str], found: Sequence[Caught], seed: str) -> Report:

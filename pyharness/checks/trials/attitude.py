@@ -24,6 +24,7 @@ from pyharness.checks.judge import (
 )
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.tolerances import MIDDLING
+from pyharness.checks.trials.length import CLOSED_FORM
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.attitude import (
@@ -33,12 +34,13 @@ from pyharness.model.attitude import (
     angles,
     product,
 )
+from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array, turned_to_space
 from pyharness.scenes.extreme import EXTREMES, POINTED
 from pyharness.scenes.random_scenes import random_scene
 from pyharness.scenes.rotated import rotated
-from pyharness.theory.conditioning import ATTITUDE, ROUNDING, Conditioning, conditioning
+from pyharness.theory.conditioning import ATTITUDE, FLOW, ROUNDING, Conditioning, conditioning
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
 
@@ -50,6 +52,11 @@ _TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
 # An angle in degrees is rounded when it is formed, converted and read again. The errors of three
 # angles add up.
 _ANGLES = 64.0 * ROUNDING
+_OPERATIONS = Basis(
+    "derived",
+    "norm, angle per period and Euler angles of an attitude",
+    "a count of the rounding errors (`checks/trials/attitude.py`)",
+)
 _BODIES = 8
 
 _MOTIONS = {
@@ -110,7 +117,7 @@ def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> 
     return flow.angle_limit(tolerance * lively(flow.amplification), time)
 
 
-POLICY = Policy(_limit, refusable)
+POLICY = Policy(_limit, FLOW, refusable)
 """Policy whose limit is rounding for closed forms, and tolerance plus rounding for other methods.
 
 For the other methods, the flow amplifies the rounding errors and, if perturbations grow more than a
@@ -169,12 +176,12 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
     if answer.attitude is None:
         return
     off = abs(float(np.linalg.norm(answer.attitude)) - 1.0)
-    yield name.of("length").bounded(off, 8.0 * ROUNDING)
+    yield name.of("length").bounded(off, 8.0 * ROUNDING, _OPERATIONS)
     if name.subject in FORMS:
         # An error of the angle changes the angular momentum by at most that angle. The moments
         # multiply omega, and the rotation takes two products.
         limit = ATTITUDE + _omega_limit(scene)
-        yield name.of("momentum").bounded(_momentum_drift(scene, answer), limit)
+        yield name.of("momentum").bounded(_momentum_drift(scene, answer), limit, CLOSED_FORM)
 
 
 def _omega_limit(scene: Scene) -> float:
@@ -222,7 +229,7 @@ def _montgomery(name: Name) -> Check:
     apart = abs(math.remainder(found - wanted, 2.0 * math.pi))
     # The time is rounded, and so are the terms.
     limit = ATTITUDE + 8.0 * ROUNDING * (2.0 * energy * period / size + 2.0 * math.pi)
-    return name.bounded(apart, limit)
+    return name.bounded(apart, limit, _OPERATIONS)
 
 
 def _solid_angle(scene: Scene, period: float) -> float:
@@ -266,7 +273,7 @@ def _turned(turn: Turn, name: Name) -> Check:
     assert other is not None
     apart = 2.0 * float(np.linalg.norm(turn.back(other) - plain))
     limit = _allowed(method, tolerance, conditioning(scene, time), time)
-    return name.bounded(apart, 2.0 * limit + 8.0 * ROUNDING)
+    return name.bounded(apart, 2.0 * limit + 8.0 * ROUNDING, FLOW)
 
 
 def _back(name: Name) -> Check:
@@ -288,7 +295,8 @@ def _back(name: Name) -> Check:
     made = forth.limit(tolerance if method == "taylor" else 16.0 * ROUNDING)
     turns = made * back.amplification * math.sqrt(3.0) * back.largest * time
     limit = _allowed(method, tolerance, forth, time) + _allowed(method, tolerance, back, -time)
-    return name.bounded(float(angle_between(again, np.array([scene.attitude]))[0]), limit + turns)
+    apart = float(angle_between(again, np.array([scene.attitude]))[0])
+    return name.bounded(apart, limit + turns, FLOW if method == "taylor" else CLOSED_FORM)
 
 
 def _angles(off: float, name: Name) -> Check:
@@ -314,7 +322,7 @@ def _angles(off: float, name: Name) -> Check:
         letters = "".join(" XYZ"[int(axis)] for axis in sequence.split("-"))
         back = Rotation.from_euler(letters, told, degrees=True).as_quat(scalar_first=True)
         worst = max(worst, float(angle_between(np.array([q]), back[None, :])[0]))
-    return name.bounded(worst, _ANGLES)
+    return name.bounded(worst, _ANGLES, _OPERATIONS)
 
 
 def _product(q: Array, by: Quaternion) -> Array:

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pyharness.checks.check import REFUSED, Attempt, Check, Name
+from pyharness.checks.check import BITS, REFUSED, Attempt, Check, Name
 from pyharness.checks.hold import OURS, apart, run_method, scene_of
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest_and_middling
@@ -28,7 +28,7 @@ from pyharness.model.trajectory import Array
 from pyharness.scenes.random_scenes import random_scene
 from pyharness.scenes.rescaled import scaled
 from pyharness.scenes.rotated import restarted_at, rotated
-from pyharness.theory.conditioning import Conditioning, conditioning
+from pyharness.theory.conditioning import FLOW, Conditioning, conditioning
 
 _ADAPTIVE = (*OURS, "quick", "auto", "dop853", "rk45", "lsoda", "radau")
 _PREPARED = ("quick", "auto")
@@ -163,13 +163,13 @@ def _turned(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Ch
     except InputError as refusal:
         return name.judged(False, f"{REFUSED}{refusal}")
     if method in symmetry.bitwise:
-        return name.bounded(float(np.count_nonzero(plain != other)), 0.0, "bits")
+        return name.bounded(float(np.count_nonzero(plain != other)), 0.0, BITS, "bits")
     flow = _flow(scene.name, 0.0, time)
     difference = float(np.abs(plain - other).max()) / flow.largest
     if method in FIXED_STEP:
         return name.described(difference)
     # Each of the two results may have the error that the method is allowed.
-    return name.bounded(difference, 2.0 * flow.limit(tolerance))
+    return name.bounded(difference, 2.0 * flow.limit(tolerance), FLOW)
 
 
 def _back(time: float, tolerance: float, name: Name) -> Check:
@@ -187,7 +187,7 @@ def _back(time: float, tolerance: float, name: Name) -> Check:
         return name.described(difference, "not reversible")
     # The error of the forward run is an initial error of the backward run.
     limit = flow.limit(tolerance) * back.amplification + back.limit(coarser)
-    return name.bounded(difference, limit)
+    return name.bounded(difference, limit, FLOW)
 
 
 def _split(time: float, tolerance: float, name: Name) -> Check:
@@ -206,7 +206,7 @@ def _split(time: float, tolerance: float, name: Name) -> Check:
         limit += piece.limit(tolerance) * rest
     whole = end(scene, time, method, tolerance)
     difference = float(np.abs(omega - whole).max()) / flow.largest
-    return name.bounded(difference, limit, f"{len(cuts)} cuts")
+    return name.bounded(difference, limit, FLOW, f"{len(cuts)} cuts")
 
 
 @cache
@@ -225,7 +225,7 @@ def _program(listing: Listing, symmetry: Symmetry, name: Name) -> Check:
     other = np.array([symmetry.back(row) for row in other]).reshape(-1, 3)
     if listing.program in symmetry.bitwise:
         count = np.count_nonzero(plain[:n] != other[:n]) + 3 * abs(len(plain) - len(other))
-        return name.bounded(float(count), 0.0, "bits")
+        return name.bounded(float(count), 0.0, BITS, "bits")
     size = float(np.abs(plain[:n]).max(initial=0.0)) or 1.0
     return name.described(apart(plain, other) / size)
 

@@ -7,13 +7,14 @@ from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.check import BITS, Attempt, Check, Name
 from pyharness.checks.hold import scene_of
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest
 from pyharness.compare.candidates import method_candidate, prepared_candidate, unstopped
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import METHODS
+from pyharness.model.basis import Basis
 from pyharness.model.codes import Series
 from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, extension
@@ -22,7 +23,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.scenes.extreme import speed
 from pyharness.theory import brouwer
-from pyharness.theory.brouwer import LAWS, Noise, Orbit
+from pyharness.theory.brouwer import LAWS, POWER, WALK, Noise, Orbit
 from pyharness.truth.elliptic import torque_free
 
 # Numbers of revolutions. A revolution is the time 2 pi over the largest component of omega, as for
@@ -50,8 +51,13 @@ _LEFT_OUT = Series.SLACK * Series.LEAST_LOCAL_TOLERANCE
 # truncation is far below rounding. With 4 stages truncation dominates the phase error and must not
 # change the energy.
 _PARTS = {8: 1.0, 4: 0.25}
-# Error bound of a value of the closed form at any time: tests/methods/test_closed_form.py.
-_CLOSED_FORM = 16.0 * brouwer.ROUNDING
+_CLOSED_FORM = 16.0 * brouwer.ROUNDING  # error of a value of the closed form at any time
+CLOSED_FORM = Basis(
+    "measured",
+    "errors that follow from 16 rounding errors of omega by a closed form",
+    "`pytest tests/methods/test_closed_form.py`",
+)
+"""Basis of limits that assume that a closed form has at most 16 rounding errors."""
 
 Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
 
@@ -166,11 +172,11 @@ def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
         for k, revolutions in enumerate(horizons):
             value = float(np.nanmax(np.abs(found[:, k])))
             note = f"{steps[k]:.0f} steps, {steps[k] ** LAWS[what]:.1e} to the power {LAWS[what]}"
-            yield name.of(f"{what}/{revolutions:.0f}").bounded(value, limits[k], note)
+            yield name.of(f"{what}/{revolutions:.0f}").bounded(value, limits[k], WALK, note)
         fitted = (horizons >= 0.99 * _FIT_FROM) & ~np.isnan(found).any(axis=0)
         power = brouwer.exponent(steps[fitted], found[:, fitted])
         due = LAWS[what] + (0.5 if integrator.preference else 0.0)
-        yield name.of(f"{what}/power").bounded(power, due + _HALFWAY, f"due {due}")
+        yield name.of(f"{what}/power").bounded(power, due + _HALFWAY, POWER, f"due {due}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +274,7 @@ def _prepared(name: Name) -> Check:
     rows, _ = INTEGRATORS[method].run(scene, [time])
     stepped = replace(scene, step_size=_PARTS[8] / _rate(scene))
     found = prepared_candidate(method, METHODS[method].finest).end(stepped, time).omega
-    return name.bounded(float(np.count_nonzero(rows[-1] != found)), 0.0)
+    return name.bounded(float(np.count_nonzero(rows[-1] != found)), 0.0, BITS)
 
 
 def _closed_form(name: Name) -> Iterator[Check]:
@@ -279,7 +285,8 @@ def _closed_form(name: Name) -> Iterator[Check]:
     for what in LAWS:
         gain = body.turn if what == "phase" else body.gains[what]
         limit = _CLOSED_FORM * gain + (0.0 if what == "phase" else 4.0 * brouwer.ROUNDING)
-        yield name.of(what).bounded(max(abs(each[what]) for each in found), limit, "at any time")
+        largest = max(abs(each[what]) for each in found)
+        yield name.of(what).bounded(largest, limit, CLOSED_FORM, "at any time")
 
 
 def _scipy(name: Name) -> Iterator[Check]:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
-from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.check import BITS, Attempt, Check, Name
 from pyharness.checks.hold import scene_of
 from pyharness.checks.stress import Trial, named
 from pyharness.model.listing import Listing
@@ -13,7 +13,10 @@ from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled
 from pyharness.original.linear_solver import SINGULAR
 from pyharness.theory.collocation_matrices import (
+    HIGHAM,
     PARTS,
+    PIVOTS,
+    SINGULARITY,
     Solved,
     declared_singular_below,
     singular_below,
@@ -42,17 +45,17 @@ def _attempts() -> Iterator[Attempt]:
 def _matrix(program: str, step: float, name: Name) -> Iterator[Check]:
     found = solved(program, step)
     expected = SINGULAR if step <= singular_below(program) else 0
-    yield name.of("ier").bounded(abs(found.ier - expected), 0.0, f"IER = {found.ier}")
-    yield name.of("bits").bounded(found.differing, 0.0)
+    yield name.of("ier").bounded(abs(found.ier - expected), 0.0, SINGULARITY, f"IER = {found.ier}")
+    yield name.of("bits").bounded(found.differing, 0.0, BITS)
     yield name.of("condition").described(found.condition, _condition_note(found))
     if found.ier == SINGULAR:
         return
     rows = ", ".join(str(row + 1) for row in found.order)
-    yield name.of("pivots").bounded(*found.pivoting, f"rows {rows}")
-    yield name.of("residual").bounded(found.residual, 1.0)
-    yield name.of("forward").bounded(found.forward, 1.0)
+    yield name.of("pivots").bounded(*found.pivoting, PIVOTS, f"rows {rows}")
+    yield name.of("residual").bounded(found.residual, 1.0, HIGHAM)
+    yield name.of("forward").bounded(found.forward, 1.0, HIGHAM)
     note = f"{found.increment_error:.1e} of the step"
-    yield name.of("increment").bounded(found.increment, 1.0, note)
+    yield name.of("increment").bounded(found.increment, 1.0, HIGHAM, note)
     yield name.of("numpy").described(found.yardstick, f"ours {found.forward:.2g}")
 
 
@@ -74,7 +77,7 @@ def _threshold(name: Name) -> Check:
     # therefore divided by that power.
     _, rounding = solved(program, 1.01 * wanted).pivoting
     limit = rounding / (len(PARTS[program]) - 1)
-    return name.bounded(abs(found / wanted - 1.0), limit, f"{found:.6g} s")
+    return name.bounded(abs(found / wanted - 1.0), limit, PIVOTS, f"{found:.6g} s")
 
 
 def _counted(listing: Listing, name: Name) -> Check:
@@ -94,7 +97,7 @@ def _counted(listing: Listing, name: Name) -> Check:
     else:
         expected = scene.steps if singular >= 1.0 else 0
     note = f"IER = 129 in {count} of {scene.steps} steps"
-    return name.bounded(abs(count - expected), 0.0, note)
+    return name.bounded(abs(count - expected), 0.0, SINGULARITY, note)
 
 
 TRIAL = Trial(

@@ -11,6 +11,7 @@ import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.disturbances import (
+    ROUNDED,
     Probe,
     complex_step,
     eigenvalues,
@@ -108,7 +109,7 @@ def _probed(
     def make(name: Name) -> Check:
         found = probe()
         seen = f"{found.found.item():.6g}" if not note and found.found.size == 1 else note
-        return name.bounded(found.difference, found.limit, seen)
+        return name.bounded(found.difference, found.limit, ROUNDED, seen)
 
     return Attempt(replace(name, setting=setting, scene=scene), make)
 

@@ -7,13 +7,14 @@ from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import REFUSED, Attempt, Check, Name
+from pyharness.checks.check import BITS, REFUSED, Attempt, Check, Name
 from pyharness.checks.hold import ALL, check_all, check_methods, run_method, scene_of, truth_of
 from pyharness.checks.judge import Truth
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.compare.candidates import End, not_finite
 from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
+from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
@@ -26,6 +27,11 @@ _DRIVEN = replace(
 )
 # Squares and cubes of the factor must be in the range of binary64 too.
 _DRIVEN_TWOS = (-320, -100, 100, 320)
+_OVERFLOW = Basis(
+    "derived",
+    "no finite result if omega leaves the range of binary64",
+    "omega of a sphere is the torque times the time over the moment (`checks/trials/scales.py`)",
+)
 
 
 def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
@@ -45,7 +51,7 @@ def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) ->
             wrong = float(np.abs(run.omega / factor - first.omega).max())
         passed = run.ended == first.ended and run.has_result and wrong == 0.0
         note = "" if run.has_result else run.ended
-        return name.judged(passed, note, wrong, 0.0)
+        return name.judged(passed, note, wrong, 0.0, BITS)
 
     for power in powers:
         factor = math.ldexp(1.0, power)
@@ -61,7 +67,7 @@ def _beyond(name: Name) -> Check:
     run = _tried(name.subject, scene_of(name), 1e300)
     silent = run.has_result
     note = "a silent wrong number" if silent else run.ended
-    return name.judged(not silent, note, float(silent), 0.0)
+    return name.judged(not silent, note, float(silent), 0.0, _OVERFLOW)
 
 
 def _tried(name: str, scene: Scene, time: float) -> End:

@@ -9,10 +9,16 @@ from pyharness.checks.hold import ALL, check_all, run_method
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.methods.registry import FIXED_STEP
+from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.scenes.extreme import MIDDLE_AXIS, in_steps
 
 _STAYS = 50.0  # s
+_UNDISTURBED = Basis(
+    "derived",
+    "change of a rotation about the middle axis without a perturbation",
+    "products with a component 0 are 0, and `quick` rounds once (`checks/trials/separatrix.py`)",
+)
 
 
 def _undisturbed() -> Iterator[Attempt]:
@@ -35,7 +41,7 @@ def _undisturbed() -> Iterator[Attempt]:
         limit = 2.0**-52 if method == "quick" else 0.0
         stays = run.omega[0] == run.omega[2] == 0.0 and run.has_result
         note = "" if stays else "it left the axis"
-        return name.judged(bool(stays and wrong <= limit), note, wrong, limit)
+        return name.judged(bool(stays and wrong <= limit), note, wrong, limit, _UNDISTURBED)
 
     for method in ALL:
         yield Attempt(named("separatrix", method, "none", scene=scene), stay)

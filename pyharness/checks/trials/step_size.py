@@ -8,12 +8,13 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
-from pyharness.checks.divergence import Runner, divergence, smallest_divergent
+from pyharness.checks.divergence import DOUBLING, Runner, divergence, smallest_divergent
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.compare.candidates import unstopped
 from pyharness.methods.fixed_step import fixed_step
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import FIXED_STEP
+from pyharness.model.basis import Basis
 from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
@@ -23,7 +24,7 @@ from pyharness.original.linear_solver import SINGULAR
 from pyharness.theory.amplification import amplification
 from pyharness.theory.collocation_matrices import PARTS, singular_below
 from pyharness.theory.schemes import SCHEMES
-from pyharness.theory.step_errors import Forecaster, Path, path
+from pyharness.theory.step_errors import FORECAST, Forecaster, Path, path
 from pyharness.truth.reference import reference
 
 CASES = (2, 3, 4, 5, 6)
@@ -35,6 +36,12 @@ COUNTS = tuple(round(10.0 ** (k / 2.0)) for k in range(13))
 # should diverge.
 _LONG, _SMALLEST_LONG = 100.0, 2e-3
 _SPINNING = (2, 3, 4)
+_CROSSING = Basis(
+    "derived",
+    "step size at which truncation and rounding errors are equal",
+    "the predicted errors, if rounding is within a factor of ten of its prediction "
+    "(`checks/trials/step_size.py`)",
+)
 
 
 def _attempts() -> Iterator[Attempt]:
@@ -69,7 +76,7 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
         said = f"truncation {due.truncation:.1e}, rounding below {due.rounding:.0e}"
         note = f"{said}{', ' if note else ''}{note}"
         if math.isfinite(due.bound):
-            return name.bounded(found, due.bound, note)
+            return name.bounded(found, due.bound, FORECAST, note)
         return name.described(found, f"step too large to foretell; {note}")
 
     for count, scene in scenes.items():
@@ -111,7 +118,7 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
         f"truncation down to {found:.1e} s, predicted {predicted:.1e} s; "
         f"least error {error(best):.1e} at {TIME / best:.0e} s"
     )
-    return name.bounded(abs(math.log10(found / predicted)), limit, note)
+    return name.bounded(abs(math.log10(found / predicted)), limit, _CROSSING, note)
 
 
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
@@ -177,7 +184,8 @@ def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
     # Linear theory does not cover collocation points that move from step to step, unless the
     # equations are linear.
     if listing is None or listing.label == "corrected" or (method in PARTS and case == 2):
-        return name.bounded(abs(seen.found / seen.predicted - 1.0), seen.limit, note)
+        off = abs(seen.found / seen.predicted - 1.0)
+        return name.bounded(off, seen.limit, DOUBLING, note)
     return name.described(seen.found, note)
 
 

@@ -13,7 +13,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import Check, may_hold
+from pyharness.checks.check import BITS, Check, may_hold
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest
 from pyharness.compare.candidates import method_candidate, program_candidate
@@ -74,7 +74,7 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
         wrong = [job for job in differing if job.subject == subject]
         note = f"{_REPEATS * len(own)} calls in {THREADS} threads"
         scene = (wrong or own)[0].scene
-        yield named("threads", subject, scene=scene).bounded(len(wrong), 0.0, note)
+        yield named("threads", subject, scene=scene).bounded(len(wrong), 0.0, BITS, note)
 
 
 def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEATS) -> list[Job]:

@@ -204,7 +204,7 @@ def _growth(options: argparse.Namespace) -> int:
 
 def _ensemble(options: argparse.Namespace) -> int:
     from pyharness.bench import ensemble_report as ensembles
-    from pyharness.bench.ensemble_contenders import draw, own_ensembles
+    from pyharness.bench.ensemble_contenders import draw, own_ensembles, with_attitudes
     from pyharness.bench.ensemble_growth import memory, sizes
     from pyharness.bench.ensemble_measure import measure_ensembles
     from pyharness.bench.ensemble_peers import ensemble_peers
@@ -219,6 +219,7 @@ def _ensemble(options: argparse.Namespace) -> int:
     contenders, missing = _present(methods, others, options.peers is not None)
     shared.check_outputs(options)
     loads = draw(options.seed, n)
+    loads = [*with_attitudes(loads, options.seed), *loads]
     rates = measure_ensembles(loads, contenders, options.seed, shared.progress)
     rates.refused.extend(("", each.name, _absent()) for each in missing)
     # Run times are measured with up to 100 times as many bodies, and memory with 10 times as many.

@@ -70,10 +70,15 @@ def run(options: argparse.Namespace) -> int:
     if options.format in PROGRAM_FORMATS:
         _check_program_format(options, scene, options.format)
     listing: Listing | None = None
+    bound = None
     if options.program is not None:
         name, listing, title, trajectory = _program(options, scene)
     else:
         name, title, trajectory = _method(options, scene)
+        if name == "reference":
+            from pyharness.methods.reference_bound import trajectory_bound
+
+            bound = trajectory_bound(scene, trajectory, shared.chosen_effort(options))
 
     def page() -> str:
         from pyharness.original.printer import page
@@ -87,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
 
     form = options.attitude or FORMS[0]
     word = None if options.word == BINARY64 else options.word
-    report = trajectory_report(scene, name, listing, title, trajectory, form, word)
+    report = trajectory_report(scene, name, listing, title, trajectory, form, word, bound)
     shared.show(report, options, {"printer": page, "tape5": tape})
     return 1 if options.strict and trajectory.ended == "sensitive" else 0
 

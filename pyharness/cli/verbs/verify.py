@@ -7,7 +7,7 @@ from typing import Any
 from pyharness.checks.check import Check, requested_suites
 from pyharness.checks.kinds import KINDS, verify
 from pyharness.checks.random_methods import ROUNDING
-from pyharness.checks.report import checks_report, samples, summary
+from pyharness.checks.report import checks_report, references, samples, summary
 from pyharness.checks.selection import DRAWS, RECORD, Selection
 from pyharness.cli import options as shared
 from pyharness.cli.forecast import CHECKS, check_count
@@ -15,16 +15,17 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene_file import case_numbers
 from pyharness.original.decks import compiler
 
-FORMATS = ("table", "json", "junit")
+FORMATS = ("table", "json", "junit", "markdown")
 # Options that apply to only one kind of check, by the name of the kind.
 _OF_ONE_KIND = {"random": ("seed", "draws"), "golden": ("record",)}
-_OF_THE_CHECKS = ("only", "seed", "draws", "external", "self_test", "update", "record")
+_OF_THE_CHECKS = ("only", "seed", "draws", "external", "self_test", "update", "record", "also")
 OPTIONS = {
     "--only ID,...": f"Run only checks of these kinds: {', '.join(KINDS)}; or only those whose "
     "ids begin with this text, as in cells/two-term.",
     "--seed S": "Text that seeds the random scenes, so that a run can be repeated (default: the "
     "present year and week, as in 2026-W47).",
-    "--draws N": f"Number of random scenes in which methods are checked (default {DRAWS}).",
+    "--draws N": f"Number of random scenes in which methods are checked (default {DRAWS}), "
+    "or, with --port, in which the port is compared (default 0).",
     "--external FILE": "Check our methods only against the published results in this file "
     "(docs/how-to/external.md describes its format).",
     "--listing-output FILE": "Find the floating-point arithmetic in which a program on any machine "
@@ -36,14 +37,15 @@ OPTIONS = {
     "--case N": "Consider only this case of Table 1, 1 to 7, with --listing-output or --port "
     "(default: all cases).",
     "--cell NAME,...": "Compare the port only in these combinations of program, case and listing, "
-    "as in two-term/case-3 (default: all).",
-    "--self-test": "Introduce known faults into the software one by one, and report which checks "
-    "detect each fault.",
+    "as in two-term/case-3 (default: all), or in these random scenes, as in random/7.",
+    "--self-test": "Introduce known faults into the software, or with --port into the answers of "
+    "the port, one by one, and report which checks detect each fault.",
     "--update": "Compute and write the golden record (stored trajectories for comparison) again, "
     "and report what changed.",
     "--record DIR": "Folder of the golden record, the stored trajectories for comparison (default: "
     "tests/golden of the source checkout).",
     **shared.outputs(FORMATS, plot=""),
+    **shared.ALSO,
 }
 EXAMPLE = "verify --only cells,methods"
 
@@ -57,13 +59,15 @@ def run(options: argparse.Namespace) -> int:
     if options.listing_output is not None:
         return _listing_output(options)
     if options.port is not None:
-        return _port(options)
+        from pyharness.cli.port_checks import check_port
+
+        return check_port(options, *_programs_and_cases(options))
     shared.refuse(options, "the checks; give --listing-output or --port", ("program", "case"))
     shared.refuse(options, "the checks; give --port", ("cell",))
     chosen = _selection(options)
     shared.check_outputs(options)
     if options.update:
-        refused = ("self_test", "only", "seed", "draws", "external", "format", "out")
+        refused = ("self_test", "only", "seed", "draws", "external", "format", "out", "also")
         shared.refuse(options, "--update", refused)
         return _update(chosen.record)
     if options.self_test:
@@ -84,7 +88,10 @@ def run(options: argparse.Namespace) -> int:
             raise InputError("there is no golden record here; give --record DIR, or a checkout")
         asked = f"--only {options.only}" if options.only else "--draws 0"
         raise InputError(f"{asked}: there is no such check; allowed: {', '.join(KINDS)}")
-    more = samples(checks, ROUNDING) if options.draws is not None else []
+    more = [
+        *(samples(checks, ROUNDING) if options.draws is not None else []),
+        *references(checks),
+    ]
     text = summary([*_title(chosen), *_unjudged(chosen, checks)], checks, more=more)
     shared.show(checks_report("verify", checks, text, seed=chosen.seed), options)
     return 0 if all(check.passed for check in checks) else 1
@@ -101,28 +108,6 @@ def _listing_output(options: argparse.Namespace) -> int:
     found = fits(lines, programs, cases, shared.progress)
     shared.show(listing_output_report(options.listing_output, found), options)
     return 0 if found[0].is_whole else 1
-
-
-def _port(options: argparse.Namespace) -> int:
-    from pyharness.checks.port import port, port_cells
-
-    shared.refuse(options, "--port", _OF_THE_CHECKS)
-    asked = port_cells(*_programs_and_cases(options), shared.names(options.cell))
-    if not asked:
-        raise InputError(
-            f"--cell {options.cell}: there is no such cell; give one as in two-term/case-3"
-        )
-    shared.check_outputs(options)
-    checks = []
-    for check in port(options.port, asked):
-        checks.append(check)
-        shared.progress(len(checks), len(asked), check.id)
-    title = [f"{options.port}: against the twins, bit for bit"]
-    if checks[-1].value is None:
-        title.append(f"ended at the first of {len(asked)} cells that it did not answer")
-    text = summary(title, checks, depth=2)
-    shared.show(checks_report("verify", checks, text, port=options.port), options)
-    return 0 if all(check.passed for check in checks) else 1
 
 
 def _programs_and_cases(options: argparse.Namespace) -> tuple[tuple[str, ...], list[int]]:

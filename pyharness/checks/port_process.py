@@ -1,6 +1,6 @@
 """The process of a port, an implementation of the programs that answers requests line by line.
 
-The port must answer within a time limit. In any case the port is ended, together with all processes
+An integrator that `verify --integrator` judges is such a process too. The port must answer within a time limit. In any case the port is ended, together with all processes
 that it started.
 """
 
@@ -24,6 +24,8 @@ _TO_END = 1.0  # s that a port may take to end after it has closed its input or 
 # Limit on the rounds of searching for processes that a port has started, and of reading its last
 # output.
 _ROUNDS = 100
+# An example of a command, for each option that has one.
+_EXAMPLES = {"--port": "node web/port.js", "--integrator": "python3 mine.py"}
 _MARK = "PYHARNESS_PORT"  # environment variable that marks each process of a port
 
 
@@ -34,17 +36,18 @@ class PortError(Exception):
     """
 
 
-def split_command(command: str) -> list[str]:
+def split_command(command: str, option: str = "--port") -> list[str]:
     """Return the program and the arguments of a command line, split as by a shell.
 
-    Raise InputError if the command is empty or can't be split.
+    Raise InputError, which names the option `option`, if the command is empty or can't be split.
     """
     try:
         words = shlex.split(command)
     except ValueError as error:
-        raise InputError(f"--port {command}: {error}") from None
+        raise InputError(f"{option} {command}: {error}") from None
     if not words or not words[0] or "\0" in command:
-        raise InputError("--port: no command is given; give one, as in --port 'node web/port.js'")
+        example = _EXAMPLES[option]
+        raise InputError(f"{option}: no command is given; give one, as in {option} '{example}'")
     return words
 
 
@@ -70,12 +73,13 @@ class PortProcess:
     raises PortError if the port can't start.
     """
 
-    def __init__(self, command: str, patience: float = PATIENCE) -> None:
+    def __init__(self, command: str, patience: float = PATIENCE, option: str = "--port") -> None:
         """Store the command to start the port, and the longest time to wait for an answer (s).
 
         A port is an implementation of the programs of the thesis, which runs as another process.
+        `option` is the option that gave the command.
         """
-        self._words = split_command(command)
+        self._words = split_command(command, option)
         self._patience = patience
 
     def __enter__(self) -> Self:

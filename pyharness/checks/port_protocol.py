@@ -84,20 +84,14 @@ def read_answer(line: bytes, steps: int) -> Answer:
     A port is an implementation of the programs in any language. `line` is the answer as JSON,
     without a line feed.
     """
-    try:
-        given = json.loads(line)
-    except (ValueError, RecursionError) as error:
-        shown = repr(line[:60].decode(errors="replace"))
-        raise PortError(f"no JSON: {shown} ({error})") from None
-    if not isinstance(given, dict):
-        raise PortError(f"{kind_of(given)} where an object belongs")
+    given = read_object(line)
     for name in ("rows", "ended", "stop", "ier"):
         if name not in given:
             raise PortError(f"no '{name}'; an answer has rows, ended, stop and ier")
     ended = given["ended"]
     if ended not in ENDINGS:
         raise PortError(f"ended is {json.dumps(ended)[:60]}; allowed: {', '.join(ENDINGS)}")
-    rows = [_row(n, row) for n, row in enumerate(_list("rows", given["rows"]), 1)]
+    rows = [_row(n, row) for n, row in enumerate(read_list("rows", given["rows"]), 1)]
     if len(rows) > steps or (ended == "complete" and len(rows) < steps):
         raise PortError(f"{len(rows)} rows of a run of {steps} steps that ended '{ended}'")
     stop = None if given["stop"] is None else _stop(given["stop"])
@@ -105,19 +99,31 @@ def read_answer(line: bytes, steps: int) -> Answer:
         raise PortError(f"ended '{ended}' with {'no' if stop is None else 'a'} stop")
     ier = given["ier"]
     if ier is not None:
-        ier = [_whole("ier", value) for value in _list("ier", ier)]
+        ier = [read_whole("ier", value) for value in read_list("ier", ier)]
         if len(ier) != len(rows):
             raise PortError(f"{len(ier)} values of ier with {len(rows)} rows")
     return Answer(np.array(rows).reshape(-1, len(VARIABLES)), ended, stop, ier)
 
 
+def read_object(line: bytes) -> dict[str, Any]:
+    """Return the JSON object in a line that another process wrote; raise PortError otherwise."""
+    try:
+        given = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        shown = repr(line[:60].decode(errors="replace"))
+        raise PortError(f"no JSON: {shown} ({error})") from None
+    if not isinstance(given, dict):
+        raise PortError(f"{kind_of(given)} where an object belongs")
+    return given
+
+
 def _row(number: int, row: object) -> list[float]:
     where = f"row {number}"
-    values = _list(where, row)
+    values = read_list(where, row)
     if len(values) != len(VARIABLES):
         count = f"{len(values)} numbers"
         raise PortError(f"{where} has {count}; it takes {len(VARIABLES)}: {' '.join(VARIABLES)}")
-    return [_number(where, value) for value in values]
+    return [read_number(where, value) for value in values]
 
 
 def _stop(stop: object) -> Stop:
@@ -126,23 +132,25 @@ def _stop(stop: object) -> Stop:
     if stop["variable"] not in STOP_VARIABLES:
         allowed = ", ".join(STOP_VARIABLES)
         raise PortError(f"stop variable {json.dumps(stop['variable'])[:60]}; allowed: {allowed}")
-    step = _whole("stop step", stop["step"])
-    return Stop(step, stop["variable"], _number("stop quotient", stop["quotient"]))
+    step = read_whole("stop step", stop["step"])
+    return Stop(step, stop["variable"], read_number("stop quotient", stop["quotient"]))
 
 
-def _list(where: str, value: object) -> list[Any]:
+def read_list(where: str, value: object) -> list[Any]:
+    """Return a JSON list; raise PortError, with `where` in front, for any other value."""
     if not isinstance(value, list):
         raise PortError(f"{where}: {kind_of(value)} where a list belongs")
     return value
 
 
-def _whole(where: str, value: object) -> int:
+def read_whole(where: str, value: object) -> int:
+    """Return a whole number; raise PortError, with `where` in front, for any other value."""
     if type(value) is not int:
         raise PortError(f"{where}: {kind_of(value)} where a whole number belongs")
     return value
 
 
-def _number(where: str, value: object) -> float:
+def read_number(where: str, value: object) -> float:
     """Return the value of a JSON number, or of a number written as JSON text.
 
     The text may be hexadecimal, decimal, inf or nan. Raise PortError, with `where` in front of its

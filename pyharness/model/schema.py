@@ -17,6 +17,7 @@ SCHEMAS = {
     "edition": 1,
     "data package": 1,
     "port request": 1,
+    "integrator request": 1,
 }
 """The schema number that this version of the package writes and reads, for each kind of file.
 

@@ -25,26 +25,31 @@ OPTIONS = {
     "--seed S": "Text that seeds the random scenes, so that a run can be repeated (default: the "
     "present year and week, as in 2026-W47).",
     "--draws N": f"Number of random scenes in which methods are checked (default {DRAWS}), "
-    "or, with --port, in which the port is compared (default 0).",
+    "or, with --port, in which the port is compared (default 0), or of each kind with --integrator "
+    "(default 2).",
     "--external FILE": "Check our methods only against the published results in this file "
     "(docs/how-to/external.md describes its format).",
     "--listing-output FILE": "Find the floating-point arithmetic in which a program on any machine "
     "printed the page in this file.",
     "--port COMMAND": "Compare a port of the programs to another language, started by this "
     "command, bit for bit with our Python versions (docs/how-to/ports.md).",
+    "--integrator COMMAND": "Compare an integrator of rigid bodies, started by this command, with "
+    "the true solution of random scenes, and name its faults (docs/how-to/integrators.md).",
+    "--order P": "Order of convergence that the integrator must have at least (default 1).",
     "--program P": "Consider only this program, two-term, four-term or runge-kutta, with "
     "--listing-output or --port (default: all three).",
     "--case N": "Consider only this case of Table 1, 1 to 7, with --listing-output or --port "
     "(default: all cases).",
     "--cell NAME,...": "Compare the port only in these combinations of program, case and listing, "
-    "as in two-term/case-3 (default: all), or in these random scenes, as in random/7.",
-    "--self-test": "Introduce known faults into the software, or with --port into the answers of "
-    "the port, one by one, and report which checks detect each fault.",
+    "as in two-term/case-3 (default: all), or in these random scenes, as in random/7; the "
+    "integrator only in these, as in wave or wave-1.",
+    "--self-test": "Introduce known faults into the software, or with --port or --integrator into "
+    "its answers, one by one, and report which checks detect each fault.",
     "--update": "Compute and write the golden record (stored trajectories for comparison) again, "
     "and report what changed.",
     "--record DIR": "Folder of the golden record, the stored trajectories for comparison (default: "
     "tests/golden of the source checkout).",
-    **shared.outputs(FORMATS, plot=""),
+    **shared.outputs(FORMATS, plot="the errors of the integrator of --integrator"),
     **shared.ALSO,
 }
 EXAMPLE = "verify --only cells,methods"
@@ -53,17 +58,22 @@ EXAMPLE = "verify --only cells,methods"
 def run(options: argparse.Namespace) -> int:
     """Run checks of the thesis's programs and of our methods, and print the results.
 
-    The options --listing-output, --port, --self-test and --update request other computations
-    instead. Return exit status 1 if a check fails, otherwise 0.
+    The options --listing-output, --port, --integrator, --self-test and --update request other
+    computations instead. Return exit status 1 if a check fails, otherwise 0.
     """
     if options.listing_output is not None:
         return _listing_output(options)
+    if options.integrator is not None:
+        from pyharness.cli.integrator_checks import check_integrator
+
+        return check_integrator(options)
+    shared.refuse(options, "the checks; give --integrator", ("order", "plot"))
     if options.port is not None:
         from pyharness.cli.port_checks import check_port
 
         return check_port(options, *_programs_and_cases(options))
     shared.refuse(options, "the checks; give --listing-output or --port", ("program", "case"))
-    shared.refuse(options, "the checks; give --port", ("cell",))
+    shared.refuse(options, "the checks; give --port or --integrator", ("cell",))
     chosen = _selection(options)
     shared.check_outputs(options)
     if options.update:
@@ -100,7 +110,7 @@ def run(options: argparse.Namespace) -> int:
 def _listing_output(options: argparse.Namespace) -> int:
     from pyharness.history.listing_output import fits, listing_output_report, read_page
 
-    shared.refuse(options, "--listing-output", (*_OF_THE_CHECKS, "port", "cell"))
+    shared.refuse(options, "--listing-output", (*_OF_THE_CHECKS, "port", "integrator", "cell"))
     shared.check_known("format", options.format, ("table", "json"))
     programs, cases = _programs_and_cases(options)
     shared.check_outputs(options)

@@ -1,0 +1,273 @@
+"""Known faults of integrators: the motions that a faulty integrator computes instead of the true one.
+
+If the answer of an integrator converges to one of these motions, the fault is named. Each motion is
+a solution of our own, of another scene or in other conventions.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pyharness.methods.solve import solve
+from pyharness.model.attitude import product
+from pyharness.model.scene import Scene
+from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.trajectory import Array
+
+_TOLERANCE = 1e-11
+_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+_DEGREES = 180.0 / math.pi
+
+
+class State(NamedTuple):
+    """Angular velocities (rad/s), shape (n, 3), and attitudes, shape (n, 4)."""
+
+    omega: Array
+    attitude: Array
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault of an integrator: its name, a sentence that says what is wrong, and its motion.
+
+    The function `motion` takes the scene, the requested times (s) and the step size (s), and
+    returns the states of a faulty integrator, or None if the fault has no effect in the scene.
+    """
+
+    name: str
+    says: str
+    motion: Callable[[Scene, Array, float], State | None]
+
+
+def true_motion(scene: Scene, times: Array) -> State:
+    """Return the states of a scene at times in ascending order (s)."""
+    run = solve(scene, times.tolist(), tolerance=_TOLERANCE, attitude=True)
+    if run.attitude is None or len(run.omega) < len(times):
+        raise ArithmeticError("the motion does not reach the last time")
+    return State(run.omega, run.attitude)
+
+
+def _cross(a: Any, b: Any) -> list[Any]:
+    return [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+
+
+def _under(scene: Scene, torque: Callable[..., Any], **changes: Any) -> Scene:
+    return replace(scene, torque=torque, **changes)
+
+
+def _law(scene: Scene, t: Any) -> list[Any]:
+    """Return the torque of the scene's law at the symbolic time t."""
+    law = scene.law
+    found = []
+    for axis in range(3):
+        value = law.constant[axis] + law.rate[axis] * t
+        for amplitude, frequency in law.sines:
+            value = value + amplitude[axis] * np.sin(frequency * t)
+        for amplitude, frequency in law.cosines:
+            value = value + amplitude[axis] * np.cos(frequency * t)
+        found.append(value)
+    return found
+
+
+def _with_gyroscopic(factor: float) -> Callable[[Scene, Array, float], State]:
+    """Return the motion with `factor` times the gyroscopic term -omega x (I omega)."""
+
+    def motion(scene: Scene, times: Array, step: float) -> State:
+        moments = scene.moments
+        assert moments is not None
+
+        def torque(t: Any, omega: Any) -> list[Any]:
+            term = _cross(omega, [m * w for m, w in zip(moments, omega, strict=True)])
+            pairs = zip(_law(scene, t), term, strict=True)
+            return [n + (1.0 - factor) * each for n, each in pairs]
+
+        return true_motion(_under(scene, torque), times)
+
+    return motion
+
+
+def _with_law(change: Callable[[Scene], Any]) -> Callable[[Scene, Array, float], State | None]:
+    """Return the motion under another torque; None without a torque."""
+
+    def motion(scene: Scene, times: Array, step: float) -> State | None:
+        if scene.torque.is_zero:
+            return None
+        return true_motion(replace(scene, torque=change(scene)), times)
+
+    return motion
+
+
+def _frozen(scene: Scene) -> TorqueLaw:
+    law = scene.law
+    values = np.array(law.constant) + sum(np.array(amplitude) for amplitude, _ in law.cosines)
+    return TorqueLaw(constant=tuple(np.broadcast_to(values, 3).tolist()))
+
+
+def _undivided(scene: Scene) -> Callable[[Any, Any], list[Any]]:
+    moments = scene.moments
+    assert moments is not None
+    return lambda t, omega: [m * n for m, n in zip(moments, _law(scene, t), strict=True)]
+
+
+def _in_order(order: tuple[int, int, int]) -> Callable[[Scene, Array, float], State]:
+    def motion(scene: Scene, times: Array, step: float) -> State:
+        assert scene.moments is not None
+        a, b, c = (scene.moments[axis] for axis in order)
+        return true_motion(replace(scene, moments=(a, b, c)), times)
+
+    return motion
+
+
+def _at_times(change: Callable[[Array, float], Array]) -> Callable[[Scene, Array, float], State]:
+    def motion(scene: Scene, times: Array, step: float) -> State:
+        return true_motion(scene, change(times, step))
+
+    return motion
+
+
+def _of_state(change: Callable[[State, Scene], State]) -> Callable[[Scene, Array, float], State]:
+    def motion(scene: Scene, times: Array, step: float) -> State:
+        return change(true_motion(scene, times), scene)
+
+    return motion
+
+
+def space_omega(state: State, scene: Scene) -> State:
+    """Return states with omega about the axes of space in place of those of the body."""
+    q = state.attitude.T
+    zeros = np.zeros(len(state.omega))
+    turned = product(product(q, (zeros, *state.omega.T)), _conjugate(q))
+    return State(np.array(turned[1:]).T, state.attitude)
+
+
+def _conjugate(q: Any) -> Any:
+    return q[0], -q[1], -q[2], -q[3]
+
+
+def _of_output(name: str) -> Callable[[Scene, Array, float], State]:
+    return _of_state(
+        lambda state, scene: State(state.omega, as_output(name, state.attitude, scene))
+    )
+
+
+def as_output(name: str, attitude: Array, scene: Scene) -> Array:
+    """Return attitudes as an integrator with the fault `name`, a member of `OUTPUTS`, gives them."""
+    if name == "attitude-from-identity":
+        assert scene.attitude is not None
+        return np.array(product(_conjugate(scene.attitude), attitude.T)).T
+    return attitude * _CONJUGATE if name == "quaternion-transposed" else attitude[:, [1, 2, 3, 0]]
+
+
+def _space_rates(scene: Scene, times: Array, step: float) -> State:
+    """Return the motion with q' = (0, omega) q/2 in place of q' = q (0, omega)/2.
+
+    The conjugate p of q then satisfies p' = p (0, -omega)/2, and -omega the equations with the
+    opposite gyroscopic term and torque.
+    """
+    moments = scene.moments
+    assert moments is not None
+    assert scene.attitude is not None
+
+    def torque(t: Any, omega: Any) -> list[Any]:
+        term = _cross(omega, [m * w for m, w in zip(moments, omega, strict=True)])
+        return [2.0 * each - n for each, n in zip(term, _law(scene, t), strict=True)]
+
+    x, y, z = scene.omega
+    other = _under(scene, torque, omega=(-x, -y, -z), attitude=_conjugate(scene.attitude))
+    found = true_motion(other, times)
+    return State(-found.omega, found.attitude * _CONJUGATE)
+
+
+def _doubled_rates(scene: Scene, times: Array, step: float) -> State:
+    """Return the motion with q' = q (0, omega): that of a body with twice the omega."""
+    moments = scene.moments
+    assert moments is not None
+
+    def torque(t: Any, omega: Any) -> list[Any]:
+        term = _cross(omega, [m * w for m, w in zip(moments, omega, strict=True)])
+        return [2.0 * n + 0.5 * each for n, each in zip(_law(scene, t), term, strict=True)]
+
+    x, y, z = scene.omega
+    found = true_motion(_under(scene, torque, omega=(2.0 * x, 2.0 * y, 2.0 * z)), times)
+    return State(0.5 * found.omega, found.attitude)
+
+
+def _shift(steps: float) -> Callable[[Array, float], Array]:
+    return lambda times, step: times + steps * step
+
+
+_ORDERS = [order for order in itertools.permutations(range(3)) if order != (0, 1, 2)]
+
+FAULTS = (
+    Fault("gyroscopic-missing", "the gyroscopic term omega x (I omega) is missing",
+          _with_gyroscopic(0.0)),
+    Fault("gyroscopic-sign", "the gyroscopic term has the opposite sign", _with_gyroscopic(-1.0)),
+    Fault("gyroscopic-half", "half of the gyroscopic term is missing", _with_gyroscopic(0.5)),
+    Fault("omega-in-space", "omega is given about the axes of space, not of the body",
+          _of_state(space_omega)),
+    Fault("omega-in-degrees", "omega is given in degrees per second",
+          _of_state(lambda state, scene: State(_DEGREES * state.omega, state.attitude))),
+    Fault("torque-missing", "the torque is ignored", _with_law(lambda scene: TorqueLaw())),
+    Fault("torque-frozen", "the torque keeps its value at time 0", _with_law(_frozen)),
+    Fault("torque-in-space", "the torque acts about the axes of space, not of the body",
+          _with_law(lambda scene: replace(scene.law, frame="space"))),
+    Fault("torque-undivided", "the torque is not divided by the moments", _with_law(_undivided)),
+    Fault("torque-sign", "the torque has the opposite sign",
+          _with_law(lambda scene: lambda t, omega: [-n for n in _law(scene, t)])),
+    *(
+        Fault(f"moments-{''.join(str(axis + 1) for axis in order)}",
+              f"the moments are used in the order {', '.join(str(axis + 1) for axis in order)}",
+              _in_order(order))
+        for order in _ORDERS
+    ),
+    Fault("half-speed", "time passes at half speed: the state is that of half the time",
+          _at_times(lambda times, step: 0.5 * times)),
+    Fault("double-speed", "time passes at double speed: the state is that of twice the time",
+          _at_times(lambda times, step: 2.0 * times)),
+    Fault("step-late", "the state is that of one step before the requested time",
+          _at_times(_shift(-1.0))),
+    Fault("step-early", "the state is that of one step after the requested time",
+          _at_times(_shift(1.0))),
+    Fault("half-step-late", "the state is that of half a step before the requested time",
+          _at_times(_shift(-0.5))),
+    Fault("half-step-early", "the state is that of half a step after the requested time",
+          _at_times(_shift(0.5))),
+    Fault("quaternion-transposed", "the quaternion is the conjugate, from space to body",
+          _of_output("quaternion-transposed")),
+    Fault("scalar-last", "the scalar of the quaternion is last, not first",
+          _of_output("scalar-last")),
+    Fault("attitude-from-identity", "the initial attitude is ignored",
+          _of_output("attitude-from-identity")),
+    Fault("attitude-frame", "the quaternion advances as if omega were about the axes of space",
+          _space_rates),
+    Fault("attitude-rate", "the quaternion rotates at twice the rate, without the factor 1/2",
+          _doubled_rates),
+)  # fmt: skip
+"""The known faults; those of the omega are first."""
+
+OUTPUTS = ("quaternion-transposed", "scalar-last", "attitude-from-identity")
+"""The faults of the attitude alone, whose motion follows from any state by `as_output`."""
+
+
+
+def motions(scene: Scene, times: Array, step: float) -> Iterator[tuple[Fault, State]]:
+    """Yield each known fault that has an effect in the scene, with the states of its motion.
+
+    `times` (s) are ascending and above 0, and `step` is the step size of the integrator (s).
+    """
+    for fault in FAULTS:
+        with np.errstate(all="ignore"):
+            try:
+                found = fault.motion(scene, times, step)
+            except ArithmeticError:
+                continue
+        if found is not None:
+            yield fault, found

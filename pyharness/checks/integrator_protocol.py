@@ -1,0 +1,118 @@
+"""The lines that an integrator reads and writes; docs/how-to/integrators.md describes the fields."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pyharness.checks.port_process import PortError
+from pyharness.checks.port_protocol import read_list, read_number, read_object
+from pyharness.model.records import scene_record
+from pyharness.model.scene import Scene
+from pyharness.model.schema import SCHEMAS
+from pyharness.model.trajectory import Array
+
+CONTROLS = ("step_size", "tolerance")
+"""The field of a request that determines the accuracy of an integrator."""
+ROUNDINGS = {"binary64": 2.0**-53, "binary32": 2.0**-24}
+"""The relative rounding error of a number, for each arithmetic that an answer may name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The answer of an integrator to a request: the states at the requested times.
+
+    Attributes
+    ----------
+    omega : ndarray, shape (n, 3)
+        Angular velocity about the body axes, rad/s.
+    attitude : ndarray, shape (n, 4), or None
+        Quaternions from body to space, scalar first, divided by their norms; None if the integrator
+        computes no attitude.
+    norm : float
+        Largest difference of the norm of a quaternion from 1.
+    control : str
+        The field of the request that determines the accuracy, a member of `CONTROLS`.
+    rounding : float
+        Relative rounding error of the integrator's arithmetic.
+    refusal : str
+        The reason for which the integrator refuses the request; empty if it does not.
+    """
+
+    omega: Array
+    attitude: Array | None = None
+    norm: float = 0.0
+    control: str = CONTROLS[0]
+    rounding: float = ROUNDINGS["binary64"]
+    refusal: str = ""
+
+
+def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: float) -> bytes:
+    """Return the line of JSON that requests the states of a scene at `times` (s).
+
+    An integrator with a fixed step uses `step_size` (s), of which all times are multiples. Any
+    other integrator uses `tolerance`, an error relative to the largest omega.
+    """
+    record = scene_record(scene)
+    asked = {
+        "schema": SCHEMAS["integrator request"],
+        "moments": list(scene.moments or ()),
+        "omega": list(scene.omega),
+        "attitude": list(scene.attitude or ()),
+        "torque": record["torque"],
+        "times": list(times),
+        "step_size": step_size,
+        "tolerance": tolerance,
+    }
+    return json.dumps(asked, allow_nan=False).encode()
+
+
+def read_motion(line: bytes, rows: int) -> Motion:
+    """Return an integrator's answer to a request of `rows` times; raise PortError if it is invalid.
+
+    `line` is the answer as JSON, without a line feed.
+    """
+    given = read_object(line)
+    if "refused" in given:
+        if not isinstance(given["refused"], str) or not given["refused"].strip():
+            raise PortError("refused is no text; give the reason in a few words")
+        return Motion(np.empty((0, 3)), refusal=given["refused"].strip())
+    if "omega" not in given:
+        raise PortError("no 'omega'; an answer has omega and attitude, or refused")
+    control = _named(given, "control", CONTROLS)
+    rounding = ROUNDINGS[_named(given, "precision", tuple(ROUNDINGS))]
+    omega = _rows("omega", given["omega"], rows, 3)
+    if given.get("attitude") is None:
+        return Motion(omega, control=control, rounding=rounding)
+    attitude = _rows("attitude", given["attitude"], rows, 4)
+    norms = np.linalg.norm(attitude, axis=1)
+    if not norms.all():
+        raise PortError(f"attitude, row {int(norms.argmin()) + 1}: all four numbers are 0")
+    off = float(np.abs(norms - 1.0).max())
+    with np.errstate(invalid="ignore"):
+        unit = attitude / norms[:, None]
+    return Motion(omega, unit, off if math.isfinite(off) else math.inf, control, rounding)
+
+
+def _named(given: dict[str, Any], field: str, allowed: tuple[str, ...]) -> str:
+    name = given.get(field, allowed[0])
+    if name not in allowed:
+        raise PortError(f"{field} is {json.dumps(name)[:60]}; allowed: {', '.join(allowed)}")
+    return str(name)
+
+
+def _rows(what: str, value: object, rows: int, width: int) -> Array:
+    found = read_list(what, value)
+    if len(found) != rows:
+        raise PortError(f"{what} has {len(found)} rows; {rows} times were requested")
+    numbers = []
+    for number, row in enumerate(found, 1):
+        where = f"{what}, row {number}"
+        values = read_list(where, row)
+        if len(values) != width:
+            raise PortError(f"{where} has {len(values)} numbers; allowed: {width}")
+        numbers.append([read_number(where, each) for each in values])
+    return np.array(numbers, dtype=float).reshape(-1, width)

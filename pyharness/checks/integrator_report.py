@@ -1,0 +1,172 @@
+"""The report of `verify --integrator`: orders and errors, drifts, recognised faults, and a picture."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pyharness.checks.check import Check
+from pyharness.checks.integrator import PARTS, Convergence, Verdict, growth_power
+from pyharness.checks.report import checks_report, listed_singly, references, summary_page, verdict
+from pyharness.model.report import (
+    Column,
+    Line,
+    Picture,
+    Report,
+    Section,
+    Table,
+    digits,
+    numbers,
+    short,
+    words,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_ORDERS = (
+    *words("problem"), Column("order of omega", digits(".2f")), Column("error", short),
+    Column("order of attitude", digits(".2f")), Column("error (rad)", short),
+)  # fmt: skip
+_DRIFTS = (
+    *words("quantity"), Column("largest drift", short), Column("power of time", digits(".1f")),
+)  # fmt: skip
+_MEANINGS = {
+    "energy": "energy, relative",
+    "momentum": "|L|, relative",
+    "direction": "direction of L in space, rad",
+}
+_STYLES: dict[str, dict[str, Any]] = {
+    "free": {"color": "#1040a0", "linestyle": "-"},
+    "constant": {"color": "#c02020", "linestyle": (0, (5, 2))},
+    "wave": {"color": "#107040", "linestyle": (0, (1, 1.2))},
+}
+_FLOOR = 1e-17  # smaller errors, and 0, are drawn here
+
+
+def integrator_report(found: Verdict, seed: str) -> Report:
+    """Return the report of the checks of an integrator, with a picture.
+
+    `seed` is the seed of the random scenes.
+    """
+    title = [
+        f"{found.command}: against the true solution of random scenes (seed: {seed})",
+        *references(found.checks),
+    ]
+    tables = [_orders(found), _drifts(found), _findings(found)]
+    text: list[Section] = [title, _failed(found.checks), *tables, [verdict(found.checks)]]
+    page = summary_page("verify --integrator", found.checks, title, depth=2, more=tables)
+    report = checks_report(
+        "verify", found.checks, text, page, integrator=found.command, seed=seed,
+        findings=[
+            {"name": each.name, "text": each.says, "problems": list(each.problems)}
+            for each in found.findings
+        ],
+        convergence=[
+            _record(judged.problem.name, found.control, each)
+            for judged in found.judged
+            for each in judged.convergences
+        ],
+    )  # fmt: skip
+    return report._replace(pictures={"integrator": lambda: integrator_picture(found)})
+
+
+def _failed(checks: list[Check]) -> Section:
+    return listed_singly([check for check in checks if not check.passed])
+
+
+def _record(problem: str, control: str, each: Convergence) -> dict[str, Any]:
+    return {
+        "problem": problem,
+        "part": each.part,
+        "control": control,
+        "settings": list(each.settings),
+        "errors": list(each.errors),
+        "order": each.order,
+    }
+
+
+def _orders(found: Verdict) -> Section:
+    rows = []
+    for judged in found.judged:
+        parts = [judged.of(part) for part in PARTS]
+        row: list[Any] = [judged.problem.name]
+        for each in parts:
+            row += [None, None] if each is None else [each.order, each.errors[-1]]
+        rows.append(row)
+    if not rows:
+        return []
+    if found.control == "tolerance":
+        told = (
+            "order: power of the tolerance with which the error falls (1: in proportion); a dash: "
+            "rounding only. error: with the tolerance 1e-9, of omega relative to the largest"
+        )
+    else:
+        told = (
+            "order: power of the step size with which the error falls; a dash: rounding only. "
+            "error: with the smallest step, of omega relative to the largest"
+        )
+    return [told, Table(_ORDERS, rows)]
+
+
+def _drifts(found: Verdict) -> Section:
+    if found.drift is None:
+        return []
+    rows = [
+        [_MEANINGS[name], float(np.abs(values).max()), growth_power(found.drift.times, values)]
+        for name, values in found.drift.named().items()
+    ]
+    last = found.drift.times[-1]
+    return [f"without torque, up to {last:g} s; L: angular momentum", Table(_DRIFTS, rows)]
+
+
+def _findings(found: Verdict) -> Section:
+    lines: list[str] = []
+    for each in found.findings:
+        lines.append(f"FOUND {each.name}: {each.says} (in {', '.join(each.problems)})")
+    if not lines and found.judged:
+        lines.append(Line("no known fault was recognised"))
+    return lines
+
+
+def integrator_picture(found: Verdict) -> Picture:
+    """Return the picture of an integrator's errors and drifts, with the numbers that it shows.
+
+    Two panels show the errors of omega and of the attitude as functions of the step size (s) or of
+    the tolerance. A third panel shows the drifts of the conserved quantities (relative, or rad) as
+    functions of time (s).
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 4.2), dpi=110, layout="constrained")
+    panels: list[Axes] = list(figure.subplots(1, 3))
+    rows: list[list[Any]] = []
+    what = "tolerance" if found.control == "tolerance" else "step size"
+    for part, axes in zip(PARTS, panels, strict=False):
+        for judged in found.judged:
+            each = judged.of(part)
+            if each is None:
+                continue
+            shown = np.maximum(np.minimum(each.errors, 1e3), _FLOOR)
+            axes.loglog(each.settings, shown, marker="o", markersize=3.5,
+                        label=judged.problem.name, **_STYLES[judged.problem.kind])  # fmt: skip
+            pairs = zip(each.settings, each.errors, strict=True)
+            rows += [[judged.problem.name, part, x, error] for x, error in pairs]
+        unit = "relative" if part == "omega" else "rad"
+        axes.set_title(f"error of {part}, {unit}", fontsize=10)
+        axes.set_xlabel(what if found.control == "tolerance" else f"{what}, s")
+        axes.grid(True, alpha=0.3)
+        if axes.lines:
+            axes.legend(fontsize=7)
+    if found.drift is not None:
+        drawn = zip(found.drift.named().items(), _STYLES.values(), strict=False)
+        for (name, values), style in drawn:
+            shown = np.maximum(np.minimum(np.abs(values), 1e3), _FLOOR)
+            panels[2].semilogy(found.drift.times, shown, label=_MEANINGS[name], **style)
+            pairs = zip(found.drift.times.tolist(), values.tolist(), strict=True)
+            rows += [["long", name, t, value] for t, value in pairs]
+        panels[2].legend(fontsize=7)
+    panels[2].set_title("drift without torque", fontsize=10)
+    panels[2].set_xlabel("time, s")
+    panels[2].grid(True, alpha=0.3)
+    table = numbers("problem quantity setting_or_time value", rows)
+    return Picture(figure, table, [f"{found.command}: errors and drifts"])

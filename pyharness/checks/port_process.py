@@ -1,7 +1,7 @@
 """The process of a port, an implementation of the programs that answers requests line by line.
 
-An integrator that `verify --integrator` judges is such a process too. The port must answer within a time limit. In any case the port is ended, together with all processes
-that it started.
+An integrator that `verify --integrator` judges is such a process too. The port must answer within a
+time limit. In any case the port is ended, together with all processes that it started.
 """
 
 import contextlib

@@ -3,13 +3,8 @@
 import argparse
 import re
 
-from pyharness.checks.integrator import (
-    DRAWS,
-    Problem,
-    judge_integrator,
-    problems,
-    replay_command,
-)
+from pyharness.checks.integrators.judging import judge_integrator, replay_command
+from pyharness.checks.integrators.problem import DRAWS, Problem, problems
 from pyharness.checks.selection import Selection
 from pyharness.cli import options as shared
 from pyharness.cli.forecast import Cost, check_count
@@ -32,7 +27,7 @@ def check_integrator(options: argparse.Namespace) -> int:
     Returns
     -------
     int
-        The exit status: 0 if all checks passed and no fault was recognised, otherwise 1.
+        The exit status: 0 if all checks passed, otherwise 1.
 
     Raises
     ------
@@ -65,11 +60,10 @@ def check_integrator(options: argparse.Namespace) -> int:
     found = judge_integrator(
         command, chosen, again, due, lambda done, what: shared.progress(done, total, what)
     )
-    from pyharness.checks.integrator_report import integrator_report
+    from pyharness.checks.integrators.report import integrator_report
 
     shared.show(integrator_report(found, seed), options)
-    good = all(check.passed for check in found.checks)
-    return 0 if good and not found.findings else 1
+    return 0 if all(check.passed for check in found.checks) else 1
 
 
 def _check_names(names: list[str]) -> None:
@@ -83,7 +77,7 @@ def _check_names(names: list[str]) -> None:
 
 
 def _self_test(options: argparse.Namespace, chosen: list[Problem], due: float, again: str) -> int:
-    from pyharness.checks.plants.integrator_plants import (
+    from pyharness.checks.integrators.plants import (
         PLANTS,
         as_check,
         self_test,

@@ -13,7 +13,7 @@ def draw_moderate(seed: str, kind: str, number: int) -> Scene:
     """Return scene `number` of a seed, with the torque of a kind, a member of `KINDS`.
 
     A body can have the moments, and they differ from each other by at least a tenth. The body
-    rotates by some radians in the 4 s of the scene's 32 steps, and its initial attitude is not that
+    rotates by some radians in the 6 s of the scene's 12 steps, and its initial attitude is not that
     of the axes of space. Torques are some tenths of a moment times 1/s2.
     """
     source = Random(f"{seed}/moderate/{kind}/{number}")
@@ -36,9 +36,9 @@ def draw_moderate(seed: str, kind: str, number: int) -> Scene:
         omega=_vector(source, 0.4, 1.4),
         moments=(moments[0], moments[1], moments[2]),
         torque=law,
-        attitude=[source.gauss(0.0, 1.0) for _ in range(4)],  # type: ignore[arg-type]
-        step_size=0.125,
-        steps=32,
+        attitude=[source.gauss(0.0, 1.0) for _ in range(4)],
+        step_size=0.5,
+        steps=12,
     )
 
 

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import pytest
 from pyharness import load, solve
 from pyharness.checks.external_file import read_problem
 from pyharness.checks.golden import read_record
+from pyharness.checks.integrators import protocol as integrator_protocol
 from pyharness.checks.port_protocol import request
 from pyharness.cli.main import main
 from pyharness.cli.output import check_tree
@@ -26,6 +28,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene, scene_text
 from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.original.vectors import OURS, answers
+from pyharness.scenes.moderate import draw_moderate
 from tests.ensembles.sweeps import TILT, text, written
 from tests.ports import engine
 
@@ -134,6 +137,25 @@ def port_request(folder: Path) -> Reader:
     return Reader(path, read)
 
 
+def integrator_request(folder: Path) -> Reader:
+    path = folder / "request"
+    scene = draw_moderate("schema", "free", 0)
+    path.write_bytes(integrator_protocol.request(scene, [1.0], 0.5, 1e-6) + b"\n")
+
+    def read() -> None:
+        with path.open("rb") as asked:
+            command = [sys.executable, str(ROOT / "docs/how-to/integrator/rk4.py")]
+            found = subprocess.run(
+                command, stdin=asked, capture_output=True, text=True, check=False
+            )
+        if found.returncode:
+            assert found.stderr.count("\n") == 1, found.stderr
+            raise InputError(found.stderr)
+        assert json.loads(found.stdout)["omega"]
+
+    return Reader(path, read)
+
+
 FILES: dict[str, Callable[[Path], Reader]] = {
     "sweep store": sweep_store,
     "sweep file": sweep_file,
@@ -145,6 +167,7 @@ FILES: dict[str, Callable[[Path], Reader]] = {
     "edition": edition,
     "data package": data_package,
     "port request": port_request,
+    "integrator request": integrator_request,
 }
 
 
@@ -171,7 +194,7 @@ def test_another_schema_is_refused_in_a_line(kind: str, tmp_path: Path) -> None:
             reader.read()
             continue
         before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
-        words = rf"schema.*; this (version|port) reads schema {known} of a {kind}"
+        words = rf"schema.*; this (version|port|integrator) reads schema {known} of an? {kind}"
         with pytest.raises(InputError, match=words) as caught:
             reader.read()
         assert "\n" not in str(caught.value)

@@ -1,10 +1,9 @@
-"""Known faults of integrators: the motions that a faulty integrator computes instead of the true one.
+"""Known faults of integrators: the motions that a faulty integrator computes.
 
 If the answer of an integrator converges to one of these motions, the fault is named. Each motion is
 a solution of our own, of another scene or in other conventions.
 """
 
-import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ import numpy as np
 from pyharness.methods.solve import solve
 from pyharness.model.attitude import product
 from pyharness.model.scene import Scene
+from pyharness.model.state_torque import checked_torque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 
@@ -59,10 +59,6 @@ def _cross(a: Any, b: Any) -> list[Any]:
     ]
 
 
-def _under(scene: Scene, torque: Callable[..., Any], **changes: Any) -> Scene:
-    return replace(scene, torque=torque, **changes)
-
-
 def _law(scene: Scene, t: Any) -> list[Any]:
     """Return the torque of the scene's law at the symbolic time t."""
     law = scene.law
@@ -89,7 +85,7 @@ def _with_gyroscopic(factor: float) -> Callable[[Scene, Array, float], State]:
             pairs = zip(_law(scene, t), term, strict=True)
             return [n + (1.0 - factor) * each for n, each in pairs]
 
-        return true_motion(_under(scene, torque), times)
+        return true_motion(replace(scene, torque=checked_torque(torque)), times)
 
     return motion
 
@@ -100,7 +96,7 @@ def _with_law(change: Callable[[Scene], Any]) -> Callable[[Scene, Array, float],
     def motion(scene: Scene, times: Array, step: float) -> State | None:
         if scene.torque.is_zero:
             return None
-        return true_motion(replace(scene, torque=change(scene)), times)
+        return true_motion(replace(scene, torque=checked_torque(change(scene))), times)
 
     return motion
 
@@ -159,7 +155,7 @@ def _of_output(name: str) -> Callable[[Scene, Array, float], State]:
 
 
 def as_output(name: str, attitude: Array, scene: Scene) -> Array:
-    """Return attitudes as an integrator with the fault `name`, a member of `OUTPUTS`, gives them."""
+    """Return attitudes as an integrator with a fault gives them; `name` is in `OUTPUTS`."""
     if name == "attitude-from-identity":
         assert scene.attitude is not None
         return np.array(product(_conjugate(scene.attitude), attitude.T)).T
@@ -181,7 +177,12 @@ def _space_rates(scene: Scene, times: Array, step: float) -> State:
         return [2.0 * each - n for each, n in zip(term, _law(scene, t), strict=True)]
 
     x, y, z = scene.omega
-    other = _under(scene, torque, omega=(-x, -y, -z), attitude=_conjugate(scene.attitude))
+    other = replace(
+        scene,
+        torque=checked_torque(torque),
+        omega=(-x, -y, -z),
+        attitude=_conjugate(scene.attitude),
+    )
     found = true_motion(other, times)
     return State(-found.omega, found.attitude * _CONJUGATE)
 
@@ -196,15 +197,27 @@ def _doubled_rates(scene: Scene, times: Array, step: float) -> State:
         return [2.0 * n + 0.5 * each for n, each in zip(_law(scene, t), term, strict=True)]
 
     x, y, z = scene.omega
-    found = true_motion(_under(scene, torque, omega=(2.0 * x, 2.0 * y, 2.0 * z)), times)
+    found = true_motion(
+        replace(scene, torque=checked_torque(torque), omega=(2.0 * x, 2.0 * y, 2.0 * z)), times
+    )
     return State(0.5 * found.omega, found.attitude)
+
+
+def _thesis_program(scene: Scene, times: Array, step: float) -> State:
+    """Return the curve 2 y(t/2) - y(0) for the true states y, with quaternions of norm 1."""
+    half = true_motion(scene, 0.5 * times)
+    attitude = 2.0 * half.attitude - np.array(scene.attitude)
+    return State(
+        2.0 * half.omega - np.array(scene.omega),
+        attitude / np.linalg.norm(attitude, axis=1, keepdims=True),
+    )
 
 
 def _shift(steps: float) -> Callable[[Array, float], Array]:
     return lambda times, step: times + steps * step
 
 
-_ORDERS = [order for order in itertools.permutations(range(3)) if order != (0, 1, 2)]
+_ORDERS = ((0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0))
 
 FAULTS = (
     Fault("gyroscopic-missing", "the gyroscopic term omega x (I omega) is missing",
@@ -232,6 +245,9 @@ FAULTS = (
           _at_times(lambda times, step: 0.5 * times)),
     Fault("double-speed", "time passes at double speed: the state is that of twice the time",
           _at_times(lambda times, step: 2.0 * times)),
+    Fault("thesis-runge-kutta", "the state is 2 y(t/2) - y(0), as in the Runge-Kutta program of "
+          "the thesis: stages build on one another, and no step begins at the last result",
+          _thesis_program),
     Fault("step-late", "the state is that of one step before the requested time",
           _at_times(_shift(-1.0))),
     Fault("step-early", "the state is that of one step after the requested time",
@@ -255,7 +271,6 @@ FAULTS = (
 
 OUTPUTS = ("quaternion-transposed", "scalar-last", "attitude-from-identity")
 """The faults of the attitude alone, whose motion follows from any state by `as_output`."""
-
 
 
 def motions(scene: Scene, times: Array, step: float) -> Iterator[tuple[Fault, State]]:

@@ -1,4 +1,4 @@
-"""The lines that an integrator reads and writes; docs/how-to/integrators.md describes the fields."""
+"""The lines that an integrator reads and writes; docs/how-to/integrators.md has the fields."""
 
 import json
 import math

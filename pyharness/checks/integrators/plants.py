@@ -1,5 +1,6 @@
 """Planted faults in requests to an integrator and in its answers, and the self-test with them."""
 
+import itertools
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -9,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from pyharness.checks.check import Check, Name
-from pyharness.checks.integrator import Ask, Problem, Verdict, judge_problem, recognised
-from pyharness.checks.integrator_faults import FAULTS, State, as_output, space_omega
-from pyharness.checks.integrator_protocol import Motion, read_motion
+from pyharness.checks.integrators.faults import FAULTS, State, as_output, space_omega
+from pyharness.checks.integrators.judging import Ask, Verdict, judge_problem
+from pyharness.checks.integrators.problem import Problem
+from pyharness.checks.integrators.protocol import Motion, read_motion
+from pyharness.checks.integrators.recognition import recognised
 from pyharness.checks.port_process import PATIENCE, PortError, PortProcess
 from pyharness.checks.report import checks_report, summary_page
 from pyharness.model.attitude import product
@@ -63,7 +66,8 @@ def _frozen(asked: dict[str, Any]) -> None:
 def _held(asked: dict[str, Any]) -> None:
     """Delay the waves of the torque by half a step."""
     law, delay = asked["torque"], 0.5 * asked["step_size"]
-    sines, cosines = [], []
+    sines: list[Any] = []
+    cosines: list[Any] = []
     for waves, lead, sign, other in (
         (law["sines"], sines, -1.0, cosines),
         (law["cosines"], cosines, 1.0, sines),
@@ -190,7 +194,7 @@ def _advanced(
         return motion
     omega = np.vstack([asked["omega"], motion.omega])
     q, rows = tuple(asked["attitude"]), []
-    for a, b in zip(omega, omega[1:], strict=False):
+    for a, b in itertools.pairwise(omega):
         q = advance(q, a, b, h)
         rows.append(q)
     chosen = [round(t / h) - 1 for t in times]
@@ -270,7 +274,9 @@ def _can_have(plant: IntegratorPlant, control: Verdict) -> bool:
         return False
     kinds = {each.problem.kind for each in control.judged}
     if plant.name.startswith("torque"):
-        needed = {"wave"} if plant.name in ("torque-frozen", "torque-held") else {"constant", "wave"}
+        needed = (
+            {"wave"} if plant.name in ("torque-frozen", "torque-held") else {"constant", "wave"}
+        )
         return bool(kinds & needed)
     needs_attitude = plant.advance or plant.name in _OF_ATTITUDE
     return not needs_attitude or control.judged[0].finest.attitude is not None

@@ -1,11 +1,12 @@
-"""The report of `verify --integrator`: orders and errors, drifts, recognised faults, and a picture."""
+"""The report of `verify --integrator`: orders, errors, drifts, recognised faults, a picture."""
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyharness.checks.check import Check
-from pyharness.checks.integrator import PARTS, Convergence, Verdict, growth_power
+from pyharness.checks.integrators.judging import Verdict
+from pyharness.checks.integrators.problem import PARTS, Convergence, growth_power
 from pyharness.checks.report import checks_report, listed_singly, references, summary_page, verdict
 from pyharness.model.report import (
     Column,
@@ -40,6 +41,7 @@ _STYLES: dict[str, dict[str, Any]] = {
     "constant": {"color": "#c02020", "linestyle": (0, (5, 2))},
     "wave": {"color": "#107040", "linestyle": (0, (1, 1.2))},
 }
+_MARKERS = "os^Dv"
 _FLOOR = 1e-17  # smaller errors, and 0, are drawn here
 
 
@@ -48,9 +50,9 @@ def integrator_report(found: Verdict, seed: str) -> Report:
 
     `seed` is the seed of the random scenes.
     """
-    title = [
+    title: list[str] = [
         f"{found.command}: against the true solution of random scenes (seed: {seed})",
-        *references(found.checks),
+        *map(str, references(found.checks)),
     ]
     tables = [_orders(found), _drifts(found), _findings(found)]
     text: list[Section] = [title, _failed(found.checks), *tables, [verdict(found.checks)]]
@@ -98,7 +100,7 @@ def _orders(found: Verdict) -> Section:
     if found.control == "tolerance":
         told = (
             "order: power of the tolerance with which the error falls (1: in proportion); a dash: "
-            "rounding only. error: with the tolerance 1e-9, of omega relative to the largest"
+            "rounding only. error: with the smallest tolerance, of omega relative to the largest"
         )
     else:
         told = (
@@ -147,8 +149,10 @@ def integrator_picture(found: Verdict) -> Picture:
             if each is None:
                 continue
             shown = np.maximum(np.minimum(each.errors, 1e3), _FLOOR)
-            axes.loglog(each.settings, shown, marker="o", markersize=3.5,
-                        label=judged.problem.name, **_STYLES[judged.problem.kind])  # fmt: skip
+            number = int(judged.problem.name.rpartition("-")[2])
+            axes.loglog(each.settings, shown, marker=_MARKERS[number % len(_MARKERS)],
+                        markersize=4.5, markerfacecolor="none", label=judged.problem.name,
+                        **_STYLES[judged.problem.kind])  # fmt: skip
             pairs = zip(each.settings, each.errors, strict=True)
             rows += [[judged.problem.name, part, x, error] for x, error in pairs]
         unit = "relative" if part == "omega" else "rad"

@@ -1,0 +1,271 @@
+"""Checks of an integrator of rigid bodies in any language, against the true solution.
+
+The integrator is another program, which answers requests. Its errors are measured with smaller and
+smaller steps (or tolerances) in random scenes. If it converges to another motion than the true one,
+the fault is named. docs/how-to/integrators.md describes requests, answers and checks.
+"""
+
+import math
+import shlex
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pyharness.checks.check import Check, Name
+from pyharness.checks.integrators.problem import (
+    LEVELS,
+    PARTS,
+    Convergence,
+    Drift,
+    Judged,
+    Problem,
+    convergence,
+    drift_of,
+    finite_or_infinite,
+    growth_power,
+)
+from pyharness.checks.integrators.protocol import Motion, read_motion, request
+from pyharness.checks.integrators.recognition import FIRST_ORDER, Finding, recognised
+from pyharness.checks.port_process import PATIENCE, PortError, PortProcess
+from pyharness.compare.orders import ORDER_SLACK
+from pyharness.model.attitude import angle_between
+from pyharness.model.basis import Basis
+
+# An error above this many roundings, times the square root of the number of steps, is that of the
+# formula.
+_ROUNDINGS = 240.0
+_CONSERVED = 8.0  # rounding errors in a step of a reversible integrator
+_LONG_TIME, _LONG_ROWS, _LONG_STEP, _LONG_TOLERANCE = 512.0, 64, 1.0 / 32.0, 1e-6
+_NORM = 1e-3
+
+_SLACK = Basis(
+    "measured",
+    "missing part of the order of convergence",
+    "the slack of measured orders (`compare/orders.py`)",
+)
+_UNIT = Basis(
+    "measured",
+    "difference of the norm of a quaternion from 1: 0.001, or the error of the attitude (rad)",
+    "an integrator that does not normalise has a smaller error of the norm than of the angle "
+    "(`checks/integrator.py`)",
+)
+_SAME = Basis(
+    "derived",
+    "rows that differ between two answers to one request",
+    "a deterministic program gives the same answer (`checks/integrator.py`)",
+)
+
+
+@dataclass(eq=False)
+class Verdict:
+    """All results of the checks of an integrator, in the order in which they were made."""
+
+    command: str
+    checks: list[Check] = field(default_factory=list)
+    judged: list[Judged] = field(default_factory=list)
+    drift: Drift | None = None
+    findings: list[Finding] = field(default_factory=list)
+    control: str = ""
+
+
+def judge_integrator(
+    command: str,
+    chosen: Sequence[Problem],
+    again: Callable[[str], str],
+    due: float = 1.0,
+    told: Callable[[int, str], None] = lambda done, what: None,
+    patience: float = PATIENCE,
+) -> Verdict:
+    """Return the results of all checks of an integrator.
+
+    Parameters
+    ----------
+    command : str
+        The command that starts the integrator.
+    chosen : sequence of Problem
+        The scenes in which it is judged.
+    again : callable
+        Returns the command that repeats the checks in the scene of a name.
+    due : float
+        The order of convergence that the integrator should have at least.
+    told : callable
+        Is called with the number of finished problems, and the name of the next.
+    patience : float
+        The longest time to wait for an answer (s).
+
+    Returns
+    -------
+    Verdict
+        The checks and what was measured. An invalid answer is a failed check and ends the checks.
+
+    Raises
+    ------
+    InputError
+        If the command is empty.
+    """
+    found = Verdict(command)
+    where = "start"
+    try:
+        with PortProcess(command, patience, "--integrator") as process:
+
+            def ask(line: bytes, rows: int) -> Motion:
+                return read_motion(process.ask(line), rows)
+
+            for done, problem in enumerate(chosen):
+                where = problem.name
+                told(done, where)
+                judge_problem(ask, problem, due, found, again)
+            where = "long"
+            told(len(chosen), where)
+            _judge_long(ask, chosen, found, again)
+    except PortError as error:
+        name = Name("integrator", where)
+        found.checks.append(replace(name.judged(False, str(error)), again=again("")))
+    found.findings = recognised(found.judged)
+    for each in found.findings:
+        name = Name("integrator", "fault", each.name)
+        # A low order is a fault only if another one was requested, and is judged by its own checks.
+        check = name.judged(each.name in FIRST_ORDER, each.says)
+        found.checks.append(replace(check, again=again("")))
+    return found
+
+
+Ask = Callable[[bytes, int], Motion]
+
+
+def judge_problem(
+    ask: Ask, problem: Problem, due: float, found: Verdict, again: Callable[[str], str]
+) -> None:
+    """Add to `found` the checks of an integrator in one problem.
+
+    `ask` sends a request of some rows, and returns the answer. The other arguments are those of
+    `judge_integrator`. Raise PortError if an answer is not valid.
+    """
+    rows = len(problem.times)
+    answers = []
+    for level in range(LEVELS):
+        motion = ask(problem.request(level), rows)
+        if motion.refusal:
+            name = Name("integrator", problem.name)
+            check = name.described(None, f"refused: {motion.refusal}")
+            found.checks.append(replace(check, again=again(problem.name)))
+            return
+        answers.append(motion)
+    finest = answers[-1]
+    found.control = finest.control
+    by_tolerance = finest.control == "tolerance"
+    settings = [
+        problem.tolerance(level) if by_tolerance else problem.step_size(level)
+        for level in range(LEVELS)
+    ]
+    floor = _ROUNDINGS * finest.rounding * math.sqrt(problem.most_steps)
+    errors = [problem.errors(motion) for motion in answers]
+    judged = []
+    for k, part in enumerate(PARTS):
+        values = [each[k] for each in errors]
+        if any(value is None for value in values):
+            continue
+        known = [math.inf if value is None else value for value in values]
+        judged.append(convergence(part, settings, known, floor, by_tolerance))
+    found.judged.append(Judged(problem, tuple(answers), tuple(judged)))
+    wanted = 1.0 if by_tolerance else due
+    checks = [_order_check(each, problem, wanted, floor) for each in judged]
+    if finest.attitude is not None:
+        name = Name("integrator", "norm", problem.name)
+        angle = errors[-1][1]
+        assert angle is not None
+        checks.append(name.bounded(finest.norm, max(_NORM, angle), _UNIT))
+    if problem is found.judged[0].problem:
+        checks += [_repeated(ask, found.judged[0]), *_returned(ask, found.judged[0])]
+    found.checks += [
+        replace(check, again=again(problem.name), reference_bound=lambda: problem.bound)
+        for check in checks
+    ]
+
+
+def _order_check(each: Convergence, problem: Problem, due: float, floor: float) -> Check:
+    name = Name("integrator", each.part, problem.name, quantity="order")
+    unit = "" if each.part == "omega" else " rad"
+    note = f"error {each.errors[-1]:.1e}{unit}"
+    if each.order is None:
+        return name.judged(True, f"{note}, rounding from the start", None, ORDER_SLACK, _SLACK)
+    missing = due - each.order
+    settled = each.errors[-1] <= floor or missing <= ORDER_SLACK
+    note = f"order {each.order:.2f}, {note}"
+    return name.judged(settled, note, max(missing, -99.0), ORDER_SLACK, _SLACK)
+
+
+def _repeated(ask: Ask, judged: Judged) -> Check:
+    """Return the check that the same request has the same answer, to the last bit."""
+    problem, level = judged.problem, LEVELS // 2
+    motion, before = ask(problem.request(level), len(problem.times)), judged.answers[level]
+    pairs = [(motion.omega, before.omega)]
+    if motion.attitude is not None and before.attitude is not None:
+        pairs.append((motion.attitude, before.attitude))
+    differs = np.zeros(len(problem.times), bool)
+    for one, other in pairs:
+        if one.shape != other.shape:
+            differs[:] = True
+        else:
+            differs |= ~((one == other) | (np.isnan(one) & np.isnan(other))).all(axis=1)
+    return Name("integrator", "repeated", problem.name).bounded(float(differs.sum()), 0.0, _SAME)
+
+
+def _returned(ask: Ask, judged: Judged) -> list[Check]:
+    """Return how far the body is from its initial state after it went forth and back.
+
+    Without torque, a motion with the opposite omega is that with the opposite time.
+    """
+    problem, level = judged.problem, LEVELS // 2
+    forth = judged.answers[level]
+    if not problem.scene.torque.is_zero or forth.attitude is None:
+        return []
+    if not (np.isfinite(forth.omega[-1]).all() and np.isfinite(forth.attitude[-1]).all()):
+        return []
+    x, y, z = (-forth.omega[-1]).tolist()
+    a, b, c, d = forth.attitude[-1].tolist()
+    scene = replace(problem.scene, omega=(x, y, z), attitude=(a, b, c, d))
+    times = problem.times.tolist()
+    asked = request(scene, times, problem.step_size(level), problem.tolerance(level))
+    back = ask(asked, len(times))
+    name = Name("integrator", "return", problem.name)
+    if back.refusal or back.attitude is None:
+        return [name.described(None, f"refused: {back.refusal or 'no attitude'}")]
+    start = np.array(problem.scene.omega)
+    omega = finite_or_infinite(float(np.abs(back.omega[-1] + start).max() / np.abs(start).max()))
+    attitude = np.array([problem.scene.attitude])
+    angle = float(angle_between(back.attitude[-1:], attitude)[0])
+    error = max(omega, angle)
+    there = max(x for x in problem.errors(forth) if x is not None)
+    limit = _CONSERVED * forth.rounding * (problem.times[-1] / problem.step_size(level))
+    kept = "the integrator is reversible" if error <= max(limit, 1e-3 * there) else "not reversible"
+    return [name.described(error if math.isfinite(error) else None, kept)]
+
+
+def _judge_long(
+    ask: Ask, chosen: Sequence[Problem], found: Verdict, again: Callable[[str], str]
+) -> None:
+    """Add the drift of energy and angular momentum in a long motion without torque."""
+    free = next((each for each in chosen if each.scene.torque.is_zero), None)
+    if free is None or not any(each.problem is free for each in found.judged):
+        return
+    times = (np.arange(1, _LONG_ROWS + 1) * (_LONG_TIME / _LONG_ROWS)).tolist()
+    motion = ask(request(free.scene, times, _LONG_STEP, _LONG_TOLERANCE), len(times))
+    if motion.refusal:
+        return
+    found.drift = drift_of(free.scene, np.array(times), motion)
+    for quantity, values in found.drift.named().items():
+        name = Name("integrator", quantity, free.name, quantity="drift")
+        largest = float(np.abs(values).max())
+        power = growth_power(found.drift.times, values)
+        note = "" if power is None else f"grows with the power {power:.1f} of the time"
+        check = name.described(largest if math.isfinite(largest) else None, note)
+        found.checks.append(replace(check, again=again(free.name)))
+
+
+def replay_command(command: str, seed: str, draws: int, name: str = "") -> str:
+    """Return the command that repeats the checks of an integrator in one problem or in all."""
+    verb = f"python -m pyharness verify --integrator {shlex.quote(command)}"
+    where = f" --cell {name}" if name else ""
+    return f"{verb} --seed {shlex.quote(seed)} --draws {draws}{where}"

@@ -1,0 +1,367 @@
+"""`verify --integrator`: orders, drifts, known faults, invalid answers, and planted faults."""
+
+import json
+import math
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+
+from pyharness.checks.integrators.faults import FAULTS, motions, true_motion
+from pyharness.checks.integrators.plants import PLANTS, as_check, self_test
+from pyharness.checks.integrators.problem import LEVELS, convergence, growth_power, problems
+from pyharness.checks.integrators.protocol import read_motion, request
+from pyharness.checks.integrators.recognition import FIRST_ORDER
+from pyharness.checks.port_process import PortError
+from pyharness.cli.main import main
+from pyharness.model.attitude import angle_between
+from pyharness.scenes.moderate import KINDS, draw_moderate
+from tests.json_reference import schema_of
+
+Capture = pytest.CaptureFixture[str]
+ROOT = Path(__file__).parent.parent.parent
+FOLDER = ROOT / "docs/how-to/integrator"
+RK4 = FOLDER / "rk4.py"
+
+
+def command_of(path: Path) -> str:
+    return shlex.join([sys.executable, str(path)])
+
+
+def _json(capsys: Capture, command: str, *words: str, status: int = 0) -> Any:
+    assert main(["verify", "--integrator", command, *words, "--format", "json"]) == status
+    record = json.loads(capsys.readouterr().out)
+    Draft202012Validator(schema_of("verify")).validate(record)
+    return record
+
+
+def _faults(record: Any) -> set[str]:
+    return {each["name"] for each in record["findings"]}
+
+
+def test_a_right_integrator_has_its_order_and_no_fault(capsys: Capture) -> None:
+    record = _json(capsys, command_of(RK4), "--order", "4", "--seed", "right", "--draws", "1")
+    assert record["findings"] == []
+    assert [each["problem"] for each in record["convergence"][::2]] == [
+        f"{kind}-0" for kind in KINDS
+    ]
+    for each in record["convergence"]:
+        assert each["order"] == pytest.approx(4.0, abs=0.2)
+        assert each["control"] == "step_size"
+        assert len(each["errors"]) == LEVELS
+    checks = {check["id"]: check for check in record["checks"]}
+    assert checks["integrator/repeated/free-0"]["value"] == 0.0
+    assert checks["integrator/omega/free-0/order"]["reference_bound"]["basis"] == "proved"
+    assert 0.0 < checks["integrator/energy/free-0/drift"]["value"] < 1e-4
+    assert checks["integrator/return/free-0"]["note"] == "not reversible"
+    assert (
+        "--seed right --draws 1 --cell free-0 --order 4"
+        in (checks["integrator/norm/free-0"]["replay"])
+    )
+
+
+def test_a_higher_order_than_it_has_is_refused(capsys: Capture) -> None:
+    words = ("--order", "5", "--cell", "free-0", "--seed", "a b")
+    record = _json(capsys, command_of(RK4), *words, status=1)
+    failed = [check for check in record["checks"] if not check["passed"]]
+    assert [check["id"] for check in failed] == [
+        "integrator/omega/free-0/order", "integrator/attitude/free-0/order",
+    ]  # fmt: skip
+    _, _, command, *rest = shlex.split(failed[0]["replay"])[3:]
+    again = _json(capsys, command, *rest, status=1)["checks"]
+    assert [check["note"] for check in again if not check["passed"]] == [
+        check["note"] for check in failed
+    ]
+
+
+# Changes of a line of the example, and the fault that has to be named.
+MISTAKES = (
+    ("(n1 + (i2 - i3) * y_ * z) / i1", "n1 / i1", None),
+    ("(n1 + (i2 - i3) * y_ * z) / i1|(n2 + (i3 - i1) * z * x) / i2|(n3 + (i1 - i2) * x * y_) / i3",
+     "n1 / i1|n2 / i2|n3 / i3", "gyroscopic-missing"),
+    ("(i2 - i3)|(i3 - i1)|(i1 - i2)", "(i3 - i2)|(i1 - i3)|(i2 - i1)", "gyroscopic-sign"),
+    ("[y[3:] for y in rows]", "[[y[3], -y[4], -y[5], -y[6]] for y in rows]",
+     "quaternion-transposed"),
+    ("[y[3:] for y in rows]", "[y[4:] + y[3:4] for y in rows]", "scalar-last"),
+    ("c * z - d * y_|d * x - b * z|b * y_ - c * x", "d * y_ - c * z|b * z - d * x|c * x - b * y_",
+     "attitude-frame"),
+    ("        0.5 * (", "        (", "attitude-rate"),
+    ('asked["omega"] + asked["attitude"]', 'asked["omega"] + [1.0, 0.0, 0.0, 0.0]',
+     "attitude-from-identity"),
+    ('(i1, i2, i3), (n1', '(i2, i1, i3), (n1', "moments-213"),
+    ('torque(asked["torque"], t)', 'torque(asked["torque"], 0.0)', "torque-frozen"),
+    ('torque(asked["torque"], t)', "(0.0, 0.0, 0.0)", "torque-missing"),
+    ("(n1 +|(n2 +|(n3 +", "(n1 * i1 +|(n2 * i2 +|(n3 * i3 +", "torque-undivided"),
+    ("while n < round(time / h)", "while n < round(time / h) - 1", "step-late"),
+    ("step(asked, n * h, y, h)", "step(asked, n * h / 2, y, h / 2)", "half-speed"),
+    ("step(asked, n * h, y, h)", "[a + h * k for a, k in zip(y, slopes(asked, n * h, y))]",
+     "first-order"),
+    ("slopes(asked, t + h / 2,|slopes(asked, t + h,", "slopes(asked, t,|slopes(asked, t,",
+     "torque-held"),
+    ("[a + h / 2 * k for a, k in zip(y, k2)]",
+     "[a + h / 2 * (k + l) for a, k, l in zip(y, k1, k2)]", "first-order"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "fault"), MISTAKES)
+def test_a_mistake_in_the_source_is_named(
+    old: str, new: str, fault: str | None, tmp_path: Path, capsys: Capture
+) -> None:
+    text = RK4.read_text()
+    for before, after in zip(old.split("|"), new.split("|"), strict=True):
+        assert before in text
+        text = text.replace(before, after)
+    path = tmp_path / "mistaken.py"
+    path.write_text(text)
+    remark = fault in FIRST_ORDER
+    status = 0 if remark else 1
+    words = ("--seed", "mistake", "--draws", "1")
+    record = _json(capsys, command_of(path), *words, "--order", "1", status=status)
+    assert _faults(record) == ({fault} if fault else set())
+    assert _json(capsys, command_of(path), *words, "--order", "4", status=1)
+
+
+PROGRAM = """
+import json, sys
+from pyharness import Listing, Scene, TorqueLaw, run_program
+
+for line in sys.stdin:
+    asked = json.loads(line)
+    law = {name: asked["torque"][name] for name in ("constant", "rate")}
+    for name in ("sines", "cosines"):
+        law[name] = [(wave["amplitude"], wave["frequency"]) for wave in asked["torque"][name]]
+    h, times = asked["step_size"], asked["times"]
+    scene = Scene("asked", asked["omega"], asked["moments"], torque=TorqueLaw(**law), step_size=h,
+                  steps=round(times[-1] / h))
+    run = run_program(scene, Listing.LABEL("runge-kutta"), may_stop=False)
+    rows = [run.omega[round(t / h) - 1].tolist() for t in times]
+    print(json.dumps({"omega": rows}), flush=True)
+"""
+
+
+@pytest.mark.parametrize(("label", "order"), [("original", "1"), ("corrected", "4")])
+def test_the_program_of_the_thesis_is_an_integrator(
+    label: str, order: str, tmp_path: Path, capsys: Capture
+) -> None:
+    path = tmp_path / "program.py"
+    path.write_text(PROGRAM.replace("LABEL", label))
+    words = ("--order", order, "--draws", "1", "--seed", "1982")
+    record = _json(capsys, command_of(path), *words, status=int(label == "original"))
+    assert _faults(record) == ({"thesis-runge-kutta"} if label == "original" else set())
+
+
+def test_a_first_order_splitting_is_named_and_may_refuse_torques(capsys: Capture) -> None:
+    command = command_of(Path(__file__).with_name("splitting.py"))
+    record = _json(capsys, command, "--seed", "s", "--draws", "1")
+    assert _faults(record) == {"first-order-splitting"}
+    checks = {check["id"]: check for check in record["checks"]}
+    assert checks["integrator/constant-0"]["note"] == "refused: a torque"
+    assert _json(capsys, command, "--seed", "s", "--draws", "1", "--order", "2", status=1)
+
+
+def test_two_faults_at_once_are_named(tmp_path: Path, capsys: Capture) -> None:
+    text = RK4.read_text().replace("(i2 - i3)", "(i3 - i2)").replace("(i3 - i1)", "(i1 - i3)")
+    text = text.replace("(i1 - i2)", "(i2 - i1)")
+    path = tmp_path / "two.py"
+    path.write_text(text.replace("[y[3:] for", "[[y[3], -y[4], -y[5], -y[6]] for"))
+    record = _json(capsys, command_of(path), "--draws", "1", "--seed", "two", status=1)
+    assert _faults(record) == {"gyroscopic-sign", "quaternion-transposed"}
+
+
+def test_every_planted_fault_is_named() -> None:
+    found = list(self_test(command_of(RK4), problems("plants", 1)))
+    assert [each.plant for each in found] == [None, *PLANTS]
+    for each in found:
+        assert each.has_effect
+        assert each.passed, as_check(each)
+    known = {each.name for each in FAULTS} | FIRST_ORDER.keys()
+    assert {each.name for each in PLANTS} <= known
+
+
+def test_the_self_test_fails_for_a_faulty_integrator(tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "faulty.py"
+    path.write_text(RK4.read_text().replace("0.5 * (-b", "0.6 * (-b"))
+    words = ["verify", "--integrator", command_of(path), "--self-test", "--cell", "free-0"]
+    assert main([*words, "--seed", "x"]) == 1
+    assert "FAILED control" in capsys.readouterr().out
+
+
+# A body of an answer in Python, and words of the one line that the checks report.
+ANSWERS = (
+    ("print('x', flush=True)", "no JSON"),
+    ("print('[]', flush=True)", "a list where an object belongs"),
+    ("print('{}', flush=True)", "no 'omega'; an answer has omega and attitude, or refused"),
+    ("print('{\"omega\": []}', flush=True)", "omega has 0 rows; 6 times were requested"),
+    ("print(json.dumps({'omega': [[1, 2]] * 6}), flush=True)", "omega, row 1 has 2 numbers"),
+    ("print(json.dumps({'omega': [[1, 2, 'x']] * 6}), flush=True)", "no number of binary64"),
+    ("print(json.dumps({'omega': [[1, 2, None]] * 6}), flush=True)", "where a number belongs"),
+    ("print(json.dumps({'omega': [[1, 2, 3]] * 6, 'attitude': [[0] * 4] * 6}), flush=True)",
+     "attitude, row 1: all four numbers are 0"),
+    ("print(json.dumps({'omega': [[1, 2, 3]] * 6, 'control': 'x'}), flush=True)",
+     "control is \"x\"; allowed: step_size, tolerance"),
+    ("print(json.dumps({'omega': [[1, 2, 3]] * 6, 'precision': 16}), flush=True)",
+     "precision is 16; allowed: binary64, binary32"),
+    ("print(json.dumps({'refused': ''}), flush=True)", "refused is no text"),
+    ("raise ValueError('lost')", "lost"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("body", "message"), ANSWERS)
+def test_an_invalid_answer_is_a_line(
+    body: str, message: str, tmp_path: Path, capsys: Capture
+) -> None:
+    path = tmp_path / "answer.py"
+    path.write_text(f"import json, sys\nfor line in sys.stdin:\n    {body}\n")
+    record = _json(capsys, command_of(path), "--draws", "1", status=1)
+    (check,) = record["checks"]
+    assert check["id"] == "integrator/free-0"
+    assert message in check["note"]
+    assert "\n" not in check["note"]
+
+
+def test_numbers_that_are_not_finite_are_an_error(tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "lost.py"
+    path.write_text(RK4.read_text().replace("[y[:3] for y in rows]", '[["nan"] * 3 for _ in rows]'))
+    record = _json(capsys, command_of(path), "--cell", "free-0", "--seed", "n", status=1)
+    assert record["convergence"][0]["errors"] == [None] * LEVELS
+    failed = {check["id"] for check in record["checks"] if not check["passed"]}
+    assert "integrator/omega/free-0/order" in failed
+
+
+def test_an_integrator_that_forgets_its_request_is_noticed(tmp_path: Path, capsys: Capture) -> None:
+    """An answer that depends on what was requested before is not repeated."""
+    path = tmp_path / "drifting.py"
+    text = RK4.read_text().replace("for line in sys.stdin:", "COUNT = 0\nfor line in sys.stdin:")
+    text = text.replace(
+        "    print(json.dumps(solve(asked)), flush=True)",
+        "    COUNT += 1\n    answer = solve(asked)\n    answer['omega'][0][0] += COUNT * 1e-15\n"
+        "    print(json.dumps(answer), flush=True)",
+    )
+    path.write_text(text)
+    record = _json(capsys, command_of(path), "--cell", "free-0", "--seed", "r", status=1)
+    checks = {check["id"]: check for check in record["checks"]}
+    assert checks["integrator/repeated/free-0"]["value"] == 1.0
+
+
+def test_single_precision_and_no_attitude(tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "single.py"
+    text = RK4.read_text().replace(
+        'return {"omega": [y[:3] for y in rows], "attitude": [y[3:] for y in rows]}',
+        'import struct\n    single = lambda x: struct.unpack("f", struct.pack("f", x))[0]\n'
+        '    return {"omega": [[single(x) for x in y[:3]] for y in rows], "precision": "binary32"}',
+    )
+    path.write_text(text)
+    record = _json(capsys, command_of(path), "--draws", "1", "--seed", "single", "--order", "4")
+    assert {each["part"] for each in record["convergence"]} == {"omega"}
+    # In binary64 the same errors are those of a method that ceases to converge.
+    path.write_text(text.replace(', "precision": "binary32"', ""))
+    _json(capsys, command_of(path), "--draws", "1", "--seed", "single", "--order", "4", status=1)
+
+
+def test_pictures_and_reports_are_written(tmp_path: Path, capsys: Capture) -> None:
+    picture, page = tmp_path / "i.svg", tmp_path / "page.md"
+    words = ["verify", "--integrator", command_of(RK4), "--cell", "free-0", "--seed", "p"]
+    assert main([*words, "--plot", str(picture), "--also", str(page)]) == 0
+    assert picture.read_text().count("<path") > 10
+    rows = picture.with_suffix(".csv").read_text().splitlines()
+    assert rows[0] == "problem,quantity,setting_or_time,value"
+    assert len(rows) == 1 + 2 * LEVELS + 3 * 64
+    assert "no known fault was recognised" in page.read_text()
+    assert "order of omega" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_known_motions_differ_from_the_true_one_and_from_each_other(kind: str) -> None:
+    """Faults whose motions are equal could not be told apart."""
+    scene = draw_moderate("apart", kind, 0)
+    times = np.arange(1.0, 7.0)
+    true = true_motion(scene, times)
+    found = [("true", true), *((f.name, s) for f, s in motions(scene, times, 0.25))]
+    apart = {}
+    for k, (name, one) in enumerate(found):
+        for other, two in found[:k]:
+            omega = float(np.abs(one.omega - two.omega).max())
+            apart[other, name] = max(omega, float(angle_between(one.attitude, two.attitude).max()))
+    close = {pair for pair, distance in apart.items() if distance < 1e-2}
+    # A constant torque does not change.
+    assert close == ({("true", "torque-frozen")} if kind == "constant" else set())
+    names = {name for name, _ in found[1:]}
+    missing = {each.name for each in FAULTS} - names
+    assert missing == ({n for n in missing if n.startswith("torque")} if kind == "free" else set())
+
+
+@pytest.mark.parametrize("number", range(20))
+def test_scenes_are_bodies_that_can_be(number: int) -> None:
+    for kind in KINDS:
+        scene = draw_moderate("bodies", kind, number)
+        assert not scene.is_impossible
+        a, b, c = sorted(scene.moments or ())
+        assert b > 1.05 * a
+        assert c > 1.05 * b
+        assert scene.torque.is_zero == (kind == "free")
+
+
+def test_orders_of_synthetic_errors() -> None:
+    steps = [0.5**k for k in range(6)]
+    third = convergence("omega", steps, [h**3 for h in steps], 1e-9, False)
+    assert third.order == pytest.approx(3.0)
+    stuck = convergence("omega", steps, [max(h**3, 1e-3) for h in steps], 1e-9, False)
+    assert stuck.order == 0.0
+    assert convergence("omega", steps, [1e-15] * 6, 1e-12, False).order is None
+    lost = convergence("omega", steps, [math.inf] * 6, 1e-12, False)
+    assert lost.order == 0.0
+    late = convergence("omega", steps, [math.inf, math.inf, *[h**2 for h in steps[2:]]], 1e-9, True)
+    assert late.order == math.inf
+    tolerances = [10.0**-k for k in range(3, 9)]
+    even = convergence("omega", tolerances, [3 * x for x in tolerances], 1e-12, True)
+    assert even.order == pytest.approx(1.0)
+
+
+def test_growth_of_synthetic_drifts() -> None:
+    times = np.arange(1.0, 65.0)
+    assert growth_power(times, 1e-9 * times) == pytest.approx(1.0)
+    assert growth_power(times, 1e-9 * np.ones(64)) == 0.0
+    assert growth_power(times, np.zeros(64)) is None
+    assert growth_power(times, np.where(times > 60.0, np.inf, times)) is None
+
+
+def test_a_request_has_what_the_guide_says() -> None:
+    scene = draw_moderate("request", "wave", 0)
+    asked = json.loads(request(scene, [1.0, 2.0], 0.5, 1e-6))
+    guide = (ROOT / "docs/how-to/integrators.md").read_text()
+    for field in asked:
+        assert f"| `{field}` |" in guide
+    for each in FAULTS:
+        assert f"`{each.name}`" in guide or each.name.startswith("moments-")
+    for name in FIRST_ORDER:
+        assert f"`{name}`" in guide
+    with pytest.raises(PortError, match="2 times were requested"):
+        read_motion(b'{"omega": [[1, 2, 3]]}', 2)
+
+
+@pytest.mark.external
+@pytest.mark.parametrize(("words", "order"), [("RK45 fixed", 5), ("DOP853 fixed", 8), ("LSODA", 1)])
+def test_integrators_of_scipy_have_their_orders(words: str, order: int, capsys: Capture) -> None:
+    command = f"{command_of(FOLDER / 'scipy_ivp.py')} {words}"
+    record = _json(capsys, command, "--draws", "1", "--seed", "scipy", "--order", str(order))
+    assert record["findings"] == []
+    assert any(each["order"] is not None for each in record["convergence"])
+
+
+@pytest.mark.external
+@pytest.mark.parametrize(
+    ("package", "words", "faults"),
+    [("heyoka", "heyoka_taylor.py", set()),
+     ("mujoco", "mujoco_body.py Euler", {"first-order"}),
+     ("mujoco", "mujoco_body.py RK4", set())],
+)  # fmt: skip
+def test_other_integrators(package: str, words: str, faults: set[str], capsys: Capture) -> None:
+    pytest.importorskip(package)
+    name, *rest = words.split()
+    command = shlex.join([sys.executable, str(FOLDER / name), *rest])
+    record = _json(capsys, command, "--draws", "1", "--seed", "others")
+    assert _faults(record) == faults

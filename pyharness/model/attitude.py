@@ -178,5 +178,6 @@ def quaternion_of_axes(axes: Array) -> Quaternion:
     # SciPy is imported here, because only a full inertia matrix needs it.
     from scipy.spatial.transform import Rotation
 
-    x, y, z, w = Rotation.from_matrix(axes).as_quat().tolist()
+    # Older versions of SciPy take no array that is read-only.
+    x, y, z, w = Rotation.from_matrix(np.array(axes)).as_quat().tolist()
     return w, x, y, z

@@ -14,7 +14,7 @@ import pytest
 from pyharness import load, solve
 from pyharness.checks.external_file import read_problem
 from pyharness.checks.golden import read_record
-from pyharness.checks.integrators import protocol as integrator_protocol
+from pyharness.checks.integrators import protocol
 from pyharness.checks.port_protocol import request
 from pyharness.cli.main import main
 from pyharness.cli.output import check_tree
@@ -119,41 +119,33 @@ def data_package(folder: Path) -> Reader:
     return Reader(path, lambda: check_tree(str(folder), PACKAGE_MARK, "--data", "data package"))
 
 
-def port_request(folder: Path) -> Reader:
+def _request(folder: Path, line: bytes, command: list[str], field: str) -> Reader:
+    """Return a request and a process of the documents that answers it with a `field`."""
     path = folder / "request"
-    path.write_bytes(request(case_scene(1), Listing.original("two-term")) + b"\n")
+    path.write_bytes(line + b"\n")
 
     def read() -> None:
         with path.open("rb") as asked:
-            command = ["node", str(ROOT / "web" / "port.js")]
             found = subprocess.run(
                 command, stdin=asked, capture_output=True, text=True, check=False
             )
         if found.returncode:
             assert found.stderr.count("\n") == 1, found.stderr
             raise InputError(found.stderr)
-        assert json.loads(found.stdout)["rows"]
+        assert json.loads(found.stdout)[field]
 
     return Reader(path, read)
+
+
+def port_request(folder: Path) -> Reader:
+    line = request(case_scene(1), Listing.original("two-term"))
+    return _request(folder, line, ["node", str(ROOT / "web" / "port.js")], "rows")
 
 
 def integrator_request(folder: Path) -> Reader:
-    path = folder / "request"
-    scene = draw_moderate("schema", "free", 0)
-    path.write_bytes(integrator_protocol.request(scene, [1.0], 0.5, 1e-6) + b"\n")
-
-    def read() -> None:
-        with path.open("rb") as asked:
-            command = [sys.executable, str(ROOT / "docs/how-to/integrator/rk4.py")]
-            found = subprocess.run(
-                command, stdin=asked, capture_output=True, text=True, check=False
-            )
-        if found.returncode:
-            assert found.stderr.count("\n") == 1, found.stderr
-            raise InputError(found.stderr)
-        assert json.loads(found.stdout)["omega"]
-
-    return Reader(path, read)
+    line = protocol.request(draw_moderate("schema", "free", 0), [1.0], 0.5, 1e-6)
+    command = [sys.executable, str(ROOT / "docs/how-to/integrator/rk4.py")]
+    return _request(folder, line, command, "omega")
 
 
 FILES: dict[str, Callable[[Path], Reader]] = {

@@ -223,6 +223,17 @@ def test_an_invalid_answer_is_a_line(
     assert "\n" not in check["note"]
 
 
+def test_an_integrator_that_refuses_everything_does_not_pass(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    path = tmp_path / "refusing.py"
+    path.write_text('for _ in open(0):\n    print(\'{"refused": "never"}\', flush=True)\n')
+    record = _json(capsys, command_of(path), "--draws", "1", status=1)
+    (failed,) = [check for check in record["checks"] if not check["passed"]]
+    assert failed["note"] == "the integrator refused every scene"
+    assert main(["verify", "--integrator", command_of(path), "--self-test", "--draws", "1"]) == 1
+
+
 def test_numbers_that_are_not_finite_are_an_error(tmp_path: Path, capsys: Capture) -> None:
     path = tmp_path / "lost.py"
     path.write_text(RK4.read_text().replace("[y[:3] for y in rows]", '[["nan"] * 3 for _ in rows]'))

@@ -122,6 +122,10 @@ def judge_integrator(
     except PortError as error:
         name = Name("integrator", where)
         found.checks.append(replace(name.judged(False, str(error)), again=again("")))
+    if all(check.passed for check in found.checks) and not found.judged:
+        name = Name("integrator", "judged")
+        check = name.judged(False, "the integrator refused every scene")
+        found.checks.append(replace(check, again=again("")))
     found.findings = recognised(found.judged)
     for each in found.findings:
         name = Name("integrator", "fault", each.name)

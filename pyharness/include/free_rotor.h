@@ -45,7 +45,8 @@
 #ifdef __FAST_MATH__
 #error "free_rotor.h: compile without -ffast-math; it deletes compensated sums"
 #endif
-#if defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0
+/* 16 concerns only numbers of 16 bits. */
+#if defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0 && __FLT_EVAL_METHOD__ != 16
 #error "free_rotor.h: intermediate results have more digits; on x86 compile with -msse2 -mfpmath=sse"
 #endif
 

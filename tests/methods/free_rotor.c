@@ -1,5 +1,7 @@
 /* Calls of free_rotor.h for tests/methods/test_free_rotor.py: as a library, batches of scenes; as a
-   program, the functions on arbitrary bit patterns. */
+   program with the arguments INPUTS SEED, the functions on arbitrary bit patterns. With the argument
+   `binary64` or `binary32` the program reads scenes of eleven binary64 numbers (moments, omega,
+   attitude, time) and writes eight for each (omega, attitude, status). */
 #include "free_rotor.h"
 
 #include <stdio.h>
@@ -95,8 +97,29 @@ TRIAL(trial, double, uint64_t, free_rotor, free_rotor_prepare, free_rotor_at,
 TRIAL(trialf, float, uint32_t, free_rotorf, free_rotor_preparef, free_rotor_atf,
       free_rotor_step_compensatedf, 4e-6)
 
+static int solve_scenes(bool wide)
+{
+  double scene[11], found[8];
+  while (fread(scene, sizeof scene, 1, stdin) == 1) {
+    float narrow[11], narrow_found[7] = {0.0F};
+    int status, i;
+    for (i = 0; i < 11; i++) narrow[i] = (float)scene[i];
+    for (i = 0; i < 7; i++) found[i] = 0.0;
+    if (wide)
+      batch(1, scene, scene + 3, scene + 6, scene + 10, found, &status);
+    else
+      batchf(1, narrow, narrow + 3, narrow + 6, narrow + 10, narrow_found, &status);
+    for (i = 0; i < 7 && !wide; i++) found[i] = (double)narrow_found[i];
+    found[7] = status;
+    if (fwrite(found, sizeof found, 1, stdout) != 1) return 1;
+  }
+  return 0;
+}
+
 int main(int n_arguments, char **arguments)
 {
+  if (n_arguments > 1 && strncmp(arguments[1], "binary", 6) == 0)
+    return solve_scenes(strcmp(arguments[1], "binary64") == 0);
   const long long n = n_arguments > 1 ? atoll(arguments[1]) : 10000;
   long long counts[5] = {0};
   seed = n_arguments > 2 ? (uint64_t)atoll(arguments[2]) : 1982;

@@ -1,18 +1,22 @@
-"""`python -m tests.methods.free_rotor_campaign COUNT SEED`: compare free_rotor.h with the kernel.
+"""`python -m tests.methods.free_rotor_campaign COUNT SEED [TARGET]`: free_rotor.h and the kernel.
 
-COUNT random scenes, in equal parts of the kinds of `free_motions`, are solved by the header, which
-is compiled with the C compiler `$CC`, and by the Fortran kernel of the closed form. Times are up to
-1e6 s in binary64. In binary32 they are up to 1e3 s, and the scenes are rounded to binary32 first.
-The command prints for each precision the numbers of scenes that both solve and that only one of
-them solves, and the largest difference of a component, with its scene. A difference of omega is
-relative to the largest |omega| of the motion. Exit status 1 if a difference exceeds `BOUNDS`, or
-if only one of them solves a scene, apart from phases that are too large for binary32.
+COUNT random scenes, in equal parts of the kinds of `free_motions`, are solved by the header and by
+the Fortran kernel of the closed form. TARGET is `cc`, the C compiler `$CC` (default), `clang`, or
+`wasm`, which is WebAssembly by clang, run by node. The package ziglang has both of the latter.
+
+Times are up to 1e6 s in binary64. In binary32 they are up to 1e3 s, and the scenes are rounded to
+binary32 first. The command prints for each precision the numbers of scenes that both solve and that
+only one of them solves, and the largest difference of a component, with its scene. A difference of
+omega is relative to the largest |omega| of the motion. Exit status 1 if a difference exceeds
+`BOUNDS`, or if only one of them solves a scene, apart from phases that are too large for binary32.
 """
 
 import ctypes
+import importlib.util
 import os
 import random
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -32,7 +36,6 @@ CC = shlex.split(os.environ.get("CC", "cc"))
 OK, INVALID, RANGE, PHASE, OVERFLOW = range(5)
 # Largest differences from the kernel: measured 8e-16 and 4e-7 on 1e7 scenes.
 BOUNDS = {"binary64": 2e-15, "binary32": 1e-6}
-REAL: dict[str, Any] = {"binary64": np.float64, "binary32": np.float32}
 _CHUNK = 20_000
 
 
@@ -47,15 +50,36 @@ def compiled_library(folder: Path) -> Any:
     return ctypes.CDLL(str(compiled(folder / "free_rotor.so", flags=["-shared", "-fPIC"])))
 
 
-def states(library: Any, word: str, scenes: Any) -> tuple[Any, Any]:
-    """Return the header's states of scenes (moments, omega, attitude, time), and its codes."""
-    scenes = np.ascontiguousarray(scenes, REAL[word])
-    parts = [np.ascontiguousarray(scenes[:, a:b]) for a, b in ((0, 3), (3, 6), (6, 10), (10, 11))]
-    found = np.full((len(scenes), 7), np.nan, REAL[word])
-    ended = np.empty(len(scenes), np.intc)
-    function = library.batch if word == "binary64" else library.batchf
-    function(len(scenes), *[ctypes.c_void_p(x.ctypes.data) for x in (*parts, found, ended)])
-    return found.astype(float), ended
+def command(target: str, folder: Path) -> list[str] | None:
+    """Compile `SOURCE` for a target in a folder; return the command, None if tools are missing."""
+    zig = importlib.util.find_spec("ziglang") and [sys.executable, "-m", "ziglang", "cc"]
+    if target == "cc":
+        return [str(compiled(folder / "scenes"))]
+    if target == "clang":
+        clang = zig or (shutil.which("clang") and ["clang"])
+        return [str(compiled(folder / "scenes-clang", cc=clang))] if clang else None
+    node = shutil.which("node")
+    if not zig or node is None:
+        return None
+    built = compiled(folder / "scenes.wasm", flags=["-target", "wasm32-wasi"], cc=zig)
+    script = folder / "run.mjs"
+    script.write_text(
+        'import { readFileSync } from "node:fs";\n'
+        'import { WASI } from "node:wasi";\n'
+        'const args = ["scenes", ...process.argv.slice(3)];\n'
+        'const wasi = new WASI({ version: "preview1", args });\n'
+        "const built = await WebAssembly.compile(readFileSync(process.argv[2]));\n"
+        "wasi.start(await WebAssembly.instantiate(built, wasi.getImportObject()));\n"
+    )
+    return [node, "--no-warnings", str(script), str(built)]
+
+
+def solved(program: Sequence[str], word: str, scenes: Any) -> tuple[Any, Any]:
+    """Return a program's states of scenes (moments, omega, attitude, time), and its codes."""
+    given = np.ascontiguousarray(scenes, float).tobytes()
+    output = subprocess.run([*program, word], input=given, check=True, capture_output=True).stdout
+    found = np.frombuffer(output).reshape(len(scenes), 8)
+    return found[:, :7], found[:, 7].astype(int)
 
 
 def of_kernel(scenes: Any) -> tuple[Any, Any]:
@@ -118,11 +142,11 @@ class Tally:
         self.largest = 0.0
         self.worst: Any = None
 
-    def add(self, library: Any, scenes: Any) -> None:
-        """Solve scenes by the header and by the kernel, and compare the results."""
+    def add(self, program: Sequence[str], scenes: Any) -> None:
+        """Solve scenes by a program and by the kernel, and compare the results."""
         if self.word == "binary32":
             scenes = rounded(scenes)
-        found, ended = states(library, self.word, scenes)
+        found, ended = solved(program, self.word, scenes)
         wanted, kernel_ended = of_kernel(scenes)
         # The phase of needles, with moments in the ratio of 1e9, is too large for binary32.
         too_long = (ended == PHASE) & (self.word == "binary32")
@@ -148,8 +172,8 @@ class Tally:
         return self.disagreeing == 0 and self.largest < BOUNDS[self.word]
 
 
-def compare(count: int, seed: str, library: Any) -> list[Tally]:
-    """Compare about `count` scenes, drawn from a seed, in both precisions."""
+def compare(count: int, seed: str, program: Sequence[str]) -> list[Tally]:
+    """Compare a program on about `count` scenes, drawn from a seed, in both precisions."""
     source = random.Random(seed)
     tallies = [Tally(word) for word in BOUNDS]
     left = count
@@ -157,14 +181,18 @@ def compare(count: int, seed: str, library: Any) -> list[Tally]:
         scenes = drawn(-(-min(left, _CHUNK) // len(KINDS)), source)
         left -= len(scenes)
         for tally in tallies:
-            tally.add(library, scenes)
+            tally.add(program, scenes)
     return tallies
 
 
-def main(count: str = "100000", seed: str = "1") -> int:
+def main(count: str = "100000", seed: str = "1", target: str = "cc") -> int:
     """Print the comparison of `count` scenes."""
     with tempfile.TemporaryDirectory() as folder:
-        tallies = compare(int(count), seed, compiled_library(Path(folder)))
+        program = command(target, Path(folder))
+        if program is None:
+            print(f"{target}: needs the package ziglang, and node for WebAssembly")
+            return 1
+        tallies = compare(int(count), seed, program)
     for tally in tallies:
         print(tally)
     return 0 if all(tally.is_passed for tally in tallies) else 1

@@ -1,7 +1,6 @@
 """The header free_rotor.h: compiled as a user would, and compared with kernel and exact series."""
 
 import ctypes
-import importlib.util
 import random
 import shutil
 import subprocess
@@ -24,19 +23,18 @@ from tests.methods.free_rotor_campaign import (
     OVERFLOW,
     PHASE,
     RANGE,
-    REAL,
+    command,
     compare,
     compiled,
     compiled_library,
     difference,
     drawn,
     of_kernel,
-    states,
 )
 
 _ROOT = Path(__file__).parents[2]
+_REAL: dict[str, Any] = {"binary64": np.float64, "binary32": np.float32}
 _GUIDE = _ROOT / "docs/how-to/free-rotor"
-_ZIG = [sys.executable, "-m", "ziglang", "cc"] if importlib.util.find_spec("ziglang") else None
 
 
 def output_of(command: Sequence[str | Path]) -> str:
@@ -48,8 +46,24 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return compiled_library(tmp_path_factory.mktemp("free_rotor"))
 
 
-def test_header_agrees_with_the_kernel(library: Any) -> None:
-    for tally in compare(4000, "kernel", library):
+def states(library: Any, word: str, scenes: Any) -> tuple[Any, Any]:
+    """Return the library's states of scenes (moments, omega, attitude, time), and its codes."""
+    scenes = np.ascontiguousarray(scenes, _REAL[word])
+    parts = [np.ascontiguousarray(scenes[:, a:b]) for a, b in ((0, 3), (3, 6), (6, 10), (10, 11))]
+    found = np.full((len(scenes), 7), np.nan, _REAL[word])
+    ended = np.empty(len(scenes), np.intc)
+    function = library.batch if word == "binary64" else library.batchf
+    function(len(scenes), *[ctypes.c_void_p(x.ctypes.data) for x in (*parts, found, ended)])
+    return found.astype(float), ended
+
+
+@pytest.mark.parametrize("target", ["cc", "clang", "wasm"])
+def test_header_agrees_with_the_kernel(target: str, tmp_path: Path) -> None:
+    program = command(target, tmp_path)
+    if program is None:
+        pytest.skip("clang and WebAssembly need the package ziglang, or clang and node")
+    assert output_of([*program, "10000"]).startswith("10000 inputs")
+    for tally in compare(4000, "kernel", program):
         assert tally.is_passed, str(tally)
         assert tally.both > 3600
 
@@ -139,8 +153,8 @@ def test_zero_quaternion_and_overflow_are_refused(library: Any) -> None:
 
 def steps(library: Any, word: str, scene: Any, dt: float, count: int, compensated: bool) -> Any:
     """Return the state after `count` steps, with what was compensated added."""
-    moments = np.array(scene[:3], REAL[word])
-    state, rest = np.array(scene[3:10], REAL[word]), np.zeros(7, REAL[word])
+    moments = np.array(scene[:3], _REAL[word])
+    state, rest = np.array(scene[3:10], _REAL[word]), np.zeros(7, _REAL[word])
     function = library.batch_steps if word == "binary64" else library.batchf_steps
     real = ctypes.c_double if word == "binary64" else ctypes.c_float
     given = [ctypes.c_void_p(each.ctypes.data) for each in (moments, state, rest)]
@@ -201,28 +215,6 @@ def test_arbitrary_bits_under_sanitizers(tmp_path: Path) -> None:
 )
 def test_arbitrary_bits_at_other_levels(flags: list[str], tmp_path: Path) -> None:
     found = output_of([compiled(tmp_path / "fuzz", flags=flags), "10000"])
-    assert found.startswith("10000 inputs")
-
-
-def test_clang_and_web_assembly(tmp_path: Path) -> None:
-    clang = shutil.which("clang")
-    if clang is None and _ZIG is None:
-        pytest.skip("neither clang nor ziglang is installed")
-    native = compiled(tmp_path / "fuzz", cc=_ZIG or [clang])
-    assert output_of([native, "10000"]).startswith("10000 inputs")
-    node = shutil.which("node")
-    if _ZIG is None or node is None:
-        pytest.skip("WebAssembly needs ziglang and node")
-    built = compiled(tmp_path / "fuzz.wasm", flags=["-target", "wasm32-wasi"], cc=_ZIG)
-    script = tmp_path / "run.mjs"
-    script.write_text(
-        'import { readFileSync } from "node:fs";\n'
-        'import { WASI } from "node:wasi";\n'
-        'const wasi = new WASI({ version: "preview1", args: ["fuzz", "10000"] });\n'
-        "const built = await WebAssembly.compile(readFileSync(process.argv[2]));\n"
-        "wasi.start(await WebAssembly.instantiate(built, wasi.getImportObject()));\n"
-    )
-    found = output_of([node, "--no-warnings", script, built])
     assert found.startswith("10000 inputs")
 
 

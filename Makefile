@@ -18,6 +18,9 @@ BIN := .venv/bin
 FORTRAN := $(wildcard fortran/*.f90 fortran/*/*.f90)
 # What fypp wrote: the tools for Fortran do not read its input.
 WRITTEN := build/cp*/*_binary*.f90 build/cp*/words.f90
+SCRIPTS := $(shell grep -sl '^\#!/bin/sh' .ci/*) .ci/packages verify-port/verify-port.sh \
+  $(wildcard docs/how-to/cluster/*.sh)
+WORKFLOWS := $(wildcard .github/workflows/*.yml docs/how-to/port/.github/workflows/*.yml)
 
 .PHONY: compare test quick mutate cross-check wheel edition lint format clean FORCE
 
@@ -58,6 +61,8 @@ lint: .venv/ready-to-test
 	@$(BIN)/fprettify --diff $(WRITTEN) >build/written.diff
 	@test ! -s build/written.diff || { cat build/written.diff; exit 1; }
 	@$(BIN)/fortitude --quiet check fortran $(WRITTEN)
+	@$(BIN)/shellcheck -x -P SCRIPTDIR $(SCRIPTS)
+	@$(BIN)/jactionlint --shellcheck=$(BIN)/shellcheck $(WORKFLOWS)
 	@$(BIN)/zizmor --offline --quiet .github verify-port docs/how-to/port/.github
 
 format: .venv/ready-to-test

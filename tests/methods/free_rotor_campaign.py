@@ -133,7 +133,7 @@ def difference(found: Any, wanted: Any, scenes: Any) -> Any:
 
 
 class Tally:
-    """What the comparison of one precision has found so far."""
+    """The numbers of scenes and the largest difference in one precision."""
 
     def __init__(self, word: str) -> None:
         """Begin with no scenes; `word` is the precision."""

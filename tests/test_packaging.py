@@ -17,6 +17,7 @@ import pytest
 import yaml
 
 import pyharness
+from pyharness.model import build
 from pyharness.model.distribution import DISTRIBUTION
 from pyharness.model.facts import facts
 
@@ -106,6 +107,22 @@ def test_what_the_package_shows() -> None:
     )
     for name in dir(pyharness):
         assert getattr(pyharness, name) is not None
+
+
+def test_doctor_covers_what_the_package_needs() -> None:
+    names = {re.split("[^A-Za-z_-]", each)[0] for each in PROJECT["dependencies"]}
+    assert names == {"numpy", "scipy", *build.REQUIRED}
+    extras = PROJECT["optional-dependencies"]
+    for extra, needed in extras.items():
+        if extra != "peers":
+            assert {re.split("[^A-Za-z_-]", each)[0] for each in needed} & set(build.OPTIONAL), (
+                extra
+            )
+
+
+def test_issue_template_requests_the_output_of_doctor() -> None:
+    text = (ROOT / ".github/ISSUE_TEMPLATE/wrong-result.md").read_text()
+    assert "The output of `pyharness doctor`" in text
 
 
 def test_a_job_runs_with_the_newest_of_everything() -> None:

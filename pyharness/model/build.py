@@ -1,6 +1,5 @@
 """Versions and build options of this installation, and the packages that it depends on."""
 
-import importlib.util
 import os
 import sys
 from collections.abc import Iterable
@@ -9,11 +8,28 @@ from dataclasses import asdict, dataclass
 from pyharness.model.distribution import DISTRIBUTION
 from pyharness.model.report import Line, Report
 
+REQUIRED = ("mpmath", "fortranformat", "tqdm")
 OPTIONAL = {
     "matplotlib": "pictures: --plot",
+    "jinja2": "web pages: edition",
+    "xarray": "results with names: sweep",
     "zarr": "stores: sweep",
     "distributed": "clusters: sweep --executor dask",
+    "python-flint": "faster proofs: prove",
+    "spiceypy": "C-kernels: pyharness.interchange",
+    "argcomplete": "completion in the shell",
 }
+"""Distributions that are needed for a part of the package only, with that part."""
+
+INFLUENCES = (
+    "CC", "CFLAGS", "COLUMNS", "DASK_CONFIG", "FC", "FFLAGS", "GOTO_NUM_THREADS", "LANG", "LC_ALL",
+    "LD_LIBRARY_PATH", "LD_PRELOAD", "MKL_NUM_THREADS", "MPLBACKEND", "NO_COLOR",
+    "NPY_DISABLE_CPU_FEATURES", "OMP_NUM_THREADS", "OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE", "PYTHONHASHSEED",
+    "PYTHONHOME", "PYTHONOPTIMIZE", "PYTHONPATH", "PYTHONUTF8",
+)  # fmt: skip
+"""Variables of the environment that may change results, output, or what is imported or built."""
+
+_LEVELS = ("plain", "avx2", "avx512")
 
 
 @dataclass(frozen=True)
@@ -61,6 +77,69 @@ def build() -> Build:
     )
 
 
+@dataclass(frozen=True)
+class Installation:
+    """The installation and the machine, for a bug report, beside the build.
+
+    `folder` is the folder of the package, and `installer` the program that installed it, with the
+    word ``editable`` for an editable installation. `processor` is the name of the processor,
+    `cores` the number of cores that this process may use, and `instructions` the set of
+    instructions that the kernels use. `instructions` is None if the extension is not built.
+    `packages` has the version of each package, None if it is missing. `environment` has the
+    variables of `INFLUENCES` that are set.
+    """
+
+    folder: str
+    installer: str
+    processor: str
+    cores: int
+    instructions: str | None
+    packages: dict[str, str | None]
+    environment: dict[str, str]
+
+
+def installation() -> Installation:
+    """Return how pyharness was installed, the machine, and the versions of other packages."""
+    folder = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    return Installation(
+        folder=folder,
+        installer=_installer(),
+        processor=_processor(),
+        cores=len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else _cores(),
+        instructions=_instructions(),
+        packages={name: _version(name) for name in (*REQUIRED, *OPTIONAL)},
+        environment={name: os.environ[name] for name in INFLUENCES if name in os.environ},
+    )
+
+
+def _cores() -> int:
+    return os.cpu_count() or 1
+
+
+def _installer() -> str:
+    """Return the program that installed the distribution, such as ``pip, editable``."""
+    import json
+    from importlib.metadata import PackageNotFoundError, distribution
+
+    try:
+        found = distribution(DISTRIBUTION)
+    except PackageNotFoundError:
+        return "not installed"
+    name = (found.read_text("INSTALLER") or "unknown").strip()
+    origin = json.loads(found.read_text("direct_url.json") or "{}")
+    return f"{name}, editable" if origin.get("dir_info", {}).get("editable") else name
+
+
+def _instructions() -> str | None:
+    """Return the best set of instructions that was built and that this processor has."""
+    try:
+        from pyharness._kernels import choose_instructions
+    except ImportError:
+        return None
+    # The best set is chosen when the extension is loaded; this call repeats the choice.
+    return _LEVELS[int(choose_instructions(len(_LEVELS) - 1))]
+
+
 def machine(packages: Iterable[str]) -> dict[str, str]:
     """Return a description of this machine: processor, number of cores, and installed packages.
 
@@ -93,14 +172,17 @@ def _version(package: str) -> str | None:
         return None
 
 
-def doctor_report(build: Build) -> Report:
+def doctor_report(build: Build, here: Installation) -> Report:
     """Return the report of the subcommand `doctor` about this installation.
 
-    It shows the versions, the compiler and the compiler flags in `build`. For each optional package
-    it shows whether the package is installed, and what it is needed for.
+    It shows the versions, the compiler and the compiler flags in `build`, and the machine, the
+    packages and the variables of the environment in `here`. For each optional package it shows
+    what the package is needed for.
     """
     rows = {
         "pyharness": build.version,
+        "installed by": here.installer,
+        "folder": here.folder,
         "extension": build.extension or "not built: 'make compare', or 'pip install .'",
         "Fortran compiler": build.compiler or "unknown, for nothing is built",
         "Fortran flags": build.flags or "unknown, for nothing is built",
@@ -108,13 +190,19 @@ def doctor_report(build: Build) -> Report:
         "NumPy": build.numpy or "missing",
         "SciPy": build.scipy or "missing",
         "platform": build.platform,
+        "processor": f"{here.processor}, {here.cores} cores",
+        "instructions": here.instructions or "unknown, for nothing is built",
     }
-    missing = [name for name in OPTIONAL if importlib.util.find_spec(name) is None]
-    for package, purpose in OPTIONAL.items():
-        state = f"missing: 'pip install {package}'" if package in missing else "installed"
-        rows[package] = f"{state} ({purpose})"
+    for name in REQUIRED:
+        rows[name] = here.packages[name] or f"missing: 'pip install {name}'"
+    missing = [name for name in OPTIONAL if here.packages[name] is None]
+    for name, purpose in OPTIONAL.items():
+        state = here.packages[name] or f"missing: 'pip install {name}'"
+        rows[name] = f"{state} ({purpose})"
+    variables = (f"{name}={value}" for name, value in here.environment.items())
+    rows["environment"] = " ".join(variables) or "no variable that may change results"
     return Report(
         "doctor",
-        text=[[Line(f"{name:18s}{told}") for name, told in rows.items()]],
-        record=lambda: {"missing": missing, "build": asdict(build)},
+        text=[[Line(f"{name:18s}{value}") for name, value in rows.items()]],
+        record=lambda: {"missing": missing, "build": asdict(build), "installation": asdict(here)},
     )

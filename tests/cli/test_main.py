@@ -19,12 +19,13 @@ import pytest
 from pyharness import case_scene, solve
 from pyharness.cli.main import VERBS, main
 from pyharness.cli.parser import Parser
-from pyharness.model import extension
+from pyharness.model import build, extension
 from pyharness.model.errors import NotBuiltError
 from pyharness.model.listing import Listing
 from pyharness.model.report import short
 from pyharness.original import compiled
 from tests.conftest import Printed
+from tests.instruction_sets import LEVELS, level_here
 
 Capture = pytest.CaptureFixture[str]
 COMPARE = ["compare", "--case", "3"]
@@ -283,6 +284,25 @@ def test_doctor(printed: Printed) -> None:
     for words in ("Fortran compiler", "-ffp-contract=off", "NumPy", "matplotlib"):
         assert words in out
     assert _record(printed, "doctor")["build"]["extension"]
+
+
+def test_doctor_prints_what_a_bug_report_needs(
+    printed: Printed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in build.INFLUENCES:
+        monkeypatch.delenv(name, raising=False)
+    assert "environment       no variable" in printed("doctor")
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Haswell")
+    out = printed("doctor")
+    assert "environment       OPENBLAS_CORETYPE=Haswell\n" in out
+    found = _record(printed, "doctor")["installation"]
+    assert found["environment"] == {"OPENBLAS_CORETYPE": "Haswell"}
+    assert found["instructions"] == LEVELS[level_here()]
+    assert found["installer"] in out
+    assert found["cores"] >= 1
+    for name, text in found["packages"].items():
+        assert f"{name:18s}{text or 'missing'}" in out
+    assert Path(found["folder"]).samefile(Path(build.__file__).parents[1])
 
 
 def _python(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -21,7 +21,15 @@ from typing import Any
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
 # These differ from run to run: seconds and their consequences; the build and its folder.
-_VARIES = ("seconds", "seconds_per_step", "build", "speed", "preparation", "time_ratio")
+_VARIES = (
+    "seconds",
+    "seconds_per_step",
+    "build",
+    "speed",
+    "preparation",
+    "time_ratio",
+    "installation",
+)
 _SCENE = """\
 name = "forced"
 [body]

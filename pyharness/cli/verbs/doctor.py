@@ -1,9 +1,9 @@
-"""The verb `doctor`: report how this installation was built, and which packages it lacks."""
+"""The verb `doctor`: report what a bug report needs: build, machine, packages, environment."""
 
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.model.build import build, doctor_report
+from pyharness.model.build import build, doctor_report, installation
 
 FORMATS = ("table", "json")
 OPTIONS = {
@@ -13,11 +13,11 @@ EXAMPLE = "doctor"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print how this installation was built, and which packages it lacks.
+    """Print how this installation was built, the machine, and the versions of all packages.
 
     Return exit status 3 if the extension, which is the compiled Fortran code, is not built, else 0.
     """
     shared.check_outputs(options)
     found = build()
-    shared.show(doctor_report(found), options)
+    shared.show(doctor_report(found, installation()), options)
     return 0 if found.extension else 3

@@ -2,6 +2,7 @@
 
 import ctypes
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -247,6 +248,17 @@ def _written(folder: Path, text: str) -> Path:
 def test_fast_math_is_refused(tmp_path: Path) -> None:
     with pytest.raises(subprocess.CalledProcessError):
         compiled(tmp_path / "fast", flags=["-ffast-math"])
+
+
+def test_examples_of_the_guide_run(tmp_path: Path) -> None:
+    text = _GUIDE.with_suffix(".md").read_text()
+    example, step = re.findall(r"```c\n(.*?)```", text, re.DOTALL)
+    (shown,) = re.findall(r"```c\n.*?```\n\n```output\n(.*?)```", text, re.DOTALL)
+    printed = output_of([compiled(tmp_path / "example", _written(tmp_path, example))])
+    for line, wanted in zip(printed.splitlines(), shown.splitlines(), strict=True):
+        found = np.array(line.split(), float) - np.array(wanted.split(), float)
+        assert np.abs(found).max() < 3e-12
+    compiled(tmp_path / "step.o", _written(tmp_path, step), ["-c"])
 
 
 def test_benchmark_prints_a_table(tmp_path: Path) -> None:

@@ -139,6 +139,11 @@ static void print_row(const char *name, double seconds, long steps, const state_
   const double *q = y->q, *p = exact->q;
   invariants(start, other, &energy0);
   invariants(y, momentum, &energy);
+  if (!isfinite(energy)) {
+    printf("| %s | %.0f | not finite | not finite | not finite | not finite | not finite |\n", name,
+           1e9 * seconds / (double)steps);
+    return;
+  }
   cross(momentum, other, across);
   for (int i = 0; i < 3; i++) error[i] = y->omega[i] - exact->omega[i];
   const double omega_error = length(error) / length(exact->omega);

@@ -125,6 +125,25 @@ def test_issue_template_requests_the_output_of_doctor() -> None:
     assert "The output of `pyharness doctor`" in text
 
 
+def test_conda_recipe_agrees_with_the_project() -> None:
+    """`python .ci/conda/build.py` builds it; `.ci/weekly` does so every week."""
+    recipe = yaml.safe_load((ROOT / ".ci/conda/recipe.yaml").read_text())
+    text = (ROOT / "pyproject.toml").read_text()
+    project, groups = tomllib.loads(text)["project"], tomllib.loads(text)["dependency-groups"]
+    needed = recipe["requirements"]
+    assert recipe["context"]["version"] == pyharness.__version__
+    assert recipe["package"] == {"name": project["name"], "version": "${{ version }}"}
+    assert recipe["about"]["summary"] == project["description"]
+    assert recipe["about"]["license"] == project["license"]
+    wanted = {each.replace(">=", " >=") for each in project["dependencies"]}
+    assert set(needed["run"]) == {"python", *wanted}
+    wanted = {each.replace(">=", " >=") for each in groups["build"]}
+    assert set(needed["host"]) == {"python", "pip", *wanted}
+    for pattern in project["license-files"]:
+        for path in ROOT.glob(pattern):
+            assert str(path.relative_to(ROOT)) in recipe["about"]["license_file"]
+
+
 def test_a_job_runs_with_the_newest_of_everything() -> None:
     workflow = ROOT / ".github/workflows/ci.yml"
     job = yaml.safe_load(workflow.read_text())["jobs"]["run"]

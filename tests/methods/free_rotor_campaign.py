@@ -34,7 +34,7 @@ SOURCE = Path(__file__).with_name("free_rotor.c")
 FLAGS = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{get_include()}"]
 CC = shlex.split(os.environ.get("CC", "cc"))
 OK, INVALID, RANGE, PHASE, OVERFLOW = range(5)
-# Largest differences from the kernel: measured 8e-16 and 4e-7 on 1e7 scenes.
+# Largest differences from the kernel: at most 1.0e-15 and 4e-7 with three compilers.
 BOUNDS = {"binary64": 2e-15, "binary32": 1e-6}
 _CHUNK = 20_000
 

@@ -35,6 +35,24 @@ static int is_plain(PyObject *object, int dimensions)
          PyArray_TYPE(array) == NPY_DOUBLE && PyArray_ISCARRAY_RO(array);
 }
 
+/* Return whether `object`, the argument `out`, can take the results of the n bodies of `start`. The
+   kernel may write a result before it reads the start again, so that they may not overlap. */
+static int is_place(PyObject *object, PyArrayObject *start, npy_intp n)
+{
+  PyArrayObject *array = (PyArrayObject *)object;
+  if (!is_plain(object, 2) || !PyArray_ISWRITEABLE(array)) return 0;
+  const char *own = PyArray_BYTES(array), *other = PyArray_BYTES(start);
+  return PyArray_DIM(array, 0) == n && PyArray_DIM(array, 1) == 3 &&
+         (own + PyArray_NBYTES(array) <= other || other + PyArray_NBYTES(start) <= own);
+}
+
+/* Return whether the only argument with a name is `out`. */
+static int names_out(PyObject *names)
+{
+  return PyTuple_GET_SIZE(names) == 1 &&
+         PyUnicode_CompareWithASCIIString(PyTuple_GET_ITEM(names, 0), "out") == 0;
+}
+
 /* Enter the kernel. Return whether every start has a result at the first attempt. */
 static int enter(const many_starts *self, PyArrayObject *packed, int n, const double *start,
                  int n_times, const double *times, double *omega, int8_t *status)
@@ -55,7 +73,7 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
   int n_times = 1;
 
   if (self->address == NULL) goto slowly;
-  if (PyVectorcall_NARGS(n_given) != 2 || names != NULL || !is_plain(given[0], 2)) goto slowly;
+  if (PyVectorcall_NARGS(n_given) != 2 || !is_plain(given[0], 2)) goto slowly;
   PyArrayObject *start = (PyArrayObject *)given[0];
   npy_intp shape[2] = {PyArray_DIM(start, 0), 3};
   if (PyArray_DIM(start, 1) != 3 || shape[0] < 1 || shape[0] > 1 << 18) goto slowly;
@@ -67,8 +85,9 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
   } else {
     goto slowly;
   }
+  if (names != NULL && !(names_out(names) && is_place(given[2], start, shape[0]))) goto slowly;
 
-  PyObject *omega = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
+  PyObject *omega = names ? Py_NewRef(given[2]) : PyArray_SimpleNew(2, shape, NPY_DOUBLE);
   PyObject *status = PyArray_SimpleNew(1, shape, NPY_INT8);
   PyObject *both = omega && status ? PyTuple_Pack(2, omega, status) : NULL;
   if (both != NULL) {

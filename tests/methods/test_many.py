@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import Scene, TorqueLaw, case_scene, prepare, solve, solve_many
+from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve, solve_many
 from pyharness.methods import many_scenes
 from pyharness.methods.many import Ensemble
 from pyharness.model.codes import Methods, Statuses
@@ -314,6 +314,34 @@ def test_results_go_where_the_caller_says() -> None:
     assert again is first
     assert peak < 20000  # bytes: no object for each body
     assert np.array_equal(again.omega, solve_many(TOP, 2.0, omega0=starts).omega)
+
+
+@pytest.mark.parametrize("law", [TorqueLaw(), TorqueLaw((1.0, 2.0, 3.0))])
+def test_results_of_a_solver_may_overlap_its_starts(law: TorqueLaw) -> None:
+    solver = prepare(replace(TOP, torque=law))
+    starts = np.random.default_rng(7).standard_normal((20, 3))
+    times = np.linspace(0.5, 3.0, 20)
+    omega, status = solver.many(starts, times)
+    for shift in (0, 1, 20, 25):  # rows between the starts and the results
+        place = np.zeros((45, 3))
+        place[:20] = starts
+        out = place[shift : shift + 20]
+        found = solver.many(place[:20], times, out=out)
+        assert found[0] is out
+        assert out.tobytes() == omega.tobytes()
+        assert found[1].tobytes() == status.tobytes()
+    for wrong in (np.empty((19, 3)), np.empty((20, 4)), np.empty((20, 3), "f4"), place[0]):
+        before = wrong.copy()
+        with pytest.raises(InputError, match="out: allowed: a writable array of float64"):
+            solver.many(starts, times, out=wrong)
+        assert np.array_equal(wrong, before, equal_nan=True)
+    read_only = np.zeros((20, 3))
+    read_only.flags.writeable = False
+    with pytest.raises(InputError, match="out: allowed: a writable array"):
+        solver.many(starts, times, out=read_only)
+    assert not read_only.any()
+    with pytest.raises(TypeError):
+        solver.many(starts, times, place=omega)
 
 
 def test_any_array_will_do() -> None:

@@ -15,6 +15,7 @@ from pyharness.bench.ensemble_contenders import (
     coefficients,
 )
 from pyharness.bench.heyoka_equations import heyoka_equations
+from pyharness.model.attitude import quaternion_rates
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
@@ -27,7 +28,7 @@ def ensemble_peers() -> list[EnsembleContender]:
     one = EnsembleContender
     blocks, alone = partial(compiled.numba_rk4, True), partial(compiled.numba_rk4, False)
     return [
-        one("heyoka-batch", "tolerance", heyoka_batch, (1,), package="heyoka"),
+        one("heyoka-batch", "tolerance", heyoka_batch, (1,), attitude=True, package="heyoka"),
         one("heyoka-ensemble", "tolerance", _heyoka_ensemble, package="heyoka"),
         one("numba-blocks-rk4", "steps", blocks, package="numba"),
         one("numba-bodies-rk4", "steps", alone, package="numba"),
@@ -43,17 +44,20 @@ def heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[[
 
     A load is a set of bodies with their initial omegas and torques. For each batch of bodies in
     turn, the function sets the state and the torque of the integrator. It returns omega of the
-    bodies at the end time of the load (rad/s), shape (n, 3). `setting` is the tolerance, and
-    `threads` has no effect.
+    bodies at the end time of the load (rad/s), shape (n, 3), or the attitudes, shape (n, 4), of a
+    load that requests them. `setting` is the tolerance, and `threads` has no effect.
     """
     import heyoka
 
     size = heyoka.recommended_simd_size()
     of_state = isinstance(load.scene.torque, StateTorque)
     scene = load.scene if of_state else None
-    integrator = _integrator(load.torque is not None, setting, size, scene)
-    first = load.omega0
-    if load.scene.attitude is not None:
+    with_attitude = load.attitude0 is not None
+    integrator = _integrator(load.torque is not None, setting, size, scene, with_attitude)
+    first, wanted = load.omega0, slice(0, 3)
+    if load.attitude0 is not None:
+        first, wanted = np.hstack([first, load.attitude0]), slice(3, 7)
+    elif load.scene.attitude is not None:
         first = np.hstack([first, np.tile(load.scene.attitude, (load.n, 1))])
     starts, torques = _batches(first, size), _batches(load.acceleration, size)
     ends = np.empty_like(starts)
@@ -67,7 +71,7 @@ def heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[[
                 parameters[:] = torques[k]
             integrator.propagate_until(load.horizon)
             ends[k] = state
-        return ends.transpose(0, 2, 1).reshape(-1, first.shape[1])[: load.n, :3]
+        return ends.transpose(0, 2, 1).reshape(-1, first.shape[1])[: load.n, wanted]
 
     return run
 
@@ -97,11 +101,15 @@ def _heyoka_ensemble(load: EnsembleLoad, setting: float, threads: int) -> Callab
 
 
 @cache
-def _integrator(with_torque: bool, tolerance: float, size: int, scene: Scene | None = None) -> Any:
+def _integrator(
+    with_torque: bool, tolerance: float, size: int, scene: Scene | None = None,
+    with_attitude: bool = False,
+) -> Any:  # fmt: skip
     """Return a batch integrator of `size` bodies, compiled for a tolerance.
 
-    The bodies are those of the benchmark, with a constant torque if `with_torque`. If `scene` is
-    not None, they are those of a scene whose torque depends on the state.
+    The bodies are those of the benchmark, with a constant torque if `with_torque`, and with an
+    attitude if `with_attitude`. If `scene` is not None, they are those of a scene whose torque
+    depends on the state.
     """
     import heyoka
 
@@ -111,6 +119,9 @@ def _integrator(with_torque: bool, tolerance: float, size: int, scene: Scene | N
     if with_torque:
         rates = [rate + heyoka.par[axis] for axis, rate in enumerate(rates)]
     equations = list(zip((x, y, z), rates, strict=True))
+    if with_attitude:
+        q = heyoka.make_vars("q0", "q1", "q2", "q3")
+        equations += zip(q, quaternion_rates((x, y, z), q), strict=True)
     if scene is not None:
         equations = heyoka_equations(scene)
     start = np.ones((len(equations), size))

@@ -1,6 +1,6 @@
 """The result of `solve_many`: final states of many bodies, in new or given arrays."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -28,6 +28,18 @@ class Ensemble(BatchResult):
         requested.
     estimates : ndarray, shape (n, 2), or None
         The columns `error` and `growth`; None if they were not requested.
+    t_events, y_events : list of list of ndarray, or None
+        For each function of events a list of its events in the motion of each body: the times (s),
+        shape (k,), and omega (rad/s), with the attitude if it is computed, shape (k, 3) or (k, 7).
+        None in place of an array stands for a body without a result. Both are None if no events
+        were requested.
+    sensitivities : dict of ndarray, or None
+        For each requested name the derivatives of omega, and of the attitude's quaternion if it is
+        computed, at the end, shape (n, 3, m) or (n, 7, m), where m is the number of values of the
+        parameter. They are NaN for a body without a result.
+    refusals : dict of str, or None
+        The reasons for missing events and sensitivities, by the number of the body (from 0), for
+        bodies that have a final state.
 
     Examples
     --------
@@ -42,6 +54,10 @@ class Ensemble(BatchResult):
 
     attitude: Array | None = None
     estimates: Array | None = None
+    t_events: list[list[Array | None]] | None = field(default=None, repr=False)
+    y_events: list[list[Array | None]] | None = field(default=None, repr=False)
+    sensitivities: dict[str, Array] | None = field(default=None, repr=False)
+    refusals: dict[int, str] | None = field(default=None, repr=False)
 
     @property
     def error(self) -> Array | None:

@@ -4,7 +4,7 @@ The result of a body does not depend on the other bodies, on their order or on t
 threads. It is bit-for-bit identical in all these cases.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pyharness.methods.ensemble import Ensemble as Ensemble
 from pyharness.methods.ensemble import place_for
+from pyharness.methods.many_details import Details
 from pyharness.methods.many_scenes import (
     Axes,
     check_alike,
@@ -56,6 +57,7 @@ _TORQUE = ("torque_constant", "torque_rate", "sines", "cosines")
 _STARTS = ("omega0", "attitude0")
 _MERGED = ("torque_constant", "sines", "cosines")  # what `with_merged_rows` may change
 _NOTHING = np.empty((4, 0), order="F")  # in place of attitudes
+_NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
 _UNKNOWN = -1.0  # a kernel's estimate of what it does not know
 
 
@@ -77,6 +79,8 @@ def solve_many(
     step: Number | None = None,
     effort: float = 1.0,
     estimates: bool = False,
+    events: object = None,
+    sensitivities: Iterable[str] | None = None,
     threads: int = 1,
     out: "Ensemble | Array | None" = None,
     progress: bool = False,
@@ -123,6 +127,13 @@ def solve_many(
     estimates : bool
         Whether to return the estimated error of each result, and the error amplification of each
         motion.
+    events : callable, Event, or list of these
+        Functions whose roots from time 0 to each final time are found, as in `solve`; none may be
+        terminal. They need the method `auto`, `taylor` or `closed-form`. The events of a body take
+        some milliseconds, because its motion is solved once more by the function `solve`.
+    sensitivities : iterable of str
+        Names of parameters, as in `solve`, for the derivatives of the final states with respect to
+        each. They take some tenths of a millisecond for a body, and need the same methods.
     threads : int
         Number of threads. The kernel releases the interpreter's lock (GIL).
     out : Ensemble, or array of shape (n, 3), optional
@@ -142,7 +153,8 @@ def solve_many(
     ------
     InputError
         If the arrays differ in their numbers of rows, if the method is unknown or can't solve the
-        bodies, or if the tolerance or the effort is out of range.
+        bodies, if the tolerance or the effort is out of range, or if events or sensitivities are
+        requested that can't be computed for any body.
     NotBuiltError
         If the extension is not built.
 
@@ -160,11 +172,24 @@ def solve_many(
         "coefficients": coefficients, "inertia": inertia, "torque_constant": torque_constant,
         "torque_rate": torque_rate, "sines": sines, "cosines": cosines,
     }  # fmt: skip
+    details = None
+    scene = scene if isinstance(scene, Scene) else list(scene)
+    if scene and (events is not None or sensitivities is not None):
+        details = Details(
+            scene, t_end, arrays, method=method, tolerance=tolerance, effort=effort,
+            events=events, sensitivities=sensitivities,
+        )  # fmt: skip
     with bar_of_bodies(boolean("progress", progress)):
-        return _solved(
+        found = _solved(
             scene, t_end, arrays, out, step, method=method, tolerance=tolerance, effort=effort,
             estimates=boolean("estimates", estimates), threads=threads,
         )  # fmt: skip
+    if details is None:
+        # The result of an earlier call may be used again.
+        has_details = found.t_events is not None or found.sensitivities is not None
+        return replace(found, **_NO_DETAILS) if has_details else found
+    with bar_of_bodies(progress):
+        return details.added_to(found)
 
 
 def _solved(

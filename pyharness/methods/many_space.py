@@ -77,7 +77,7 @@ def solve_one_by_one(
         raise InputError(NO_ATTITUDE)
     with_attitude = attitude0 is not None
     omega0 = scene.omega if arrays["omega0"] is None else arrays["omega0"]
-    rows = _rows(arrays)
+    rows = rows_of_bodies(arrays)
     starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
     counted = {**rows, "omega0": starts, "t_end": times}
     if with_attitude:
@@ -135,7 +135,7 @@ def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
     `arrays` maps names of arguments of `solve_many` to arrays of bodies and torques, or to None for
     an array that was not given. The given scene supplies every quantity without an array.
     """
-    rows = _rows(arrays)
+    rows = rows_of_bodies(arrays)
     found: list[Scene | None] = []
     for i in range(count_bodies(rows)):
         try:
@@ -145,7 +145,7 @@ def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
     return found
 
 
-def _rows(arrays: dict[str, Any]) -> dict[str, Array]:
+def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:
     """Return the arrays among `arrays` that describe bodies and torques, with checked shapes.
 
     `arrays` maps names of arguments of `solve_many` to their values. Other arguments and values of

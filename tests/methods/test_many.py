@@ -341,7 +341,7 @@ def test_results_of_a_solver_may_overlap_its_starts(law: TorqueLaw) -> None:
         solver.many(starts, times, out=read_only)
     assert not read_only.any()
     with pytest.raises(TypeError):
-        solver.many(starts, times, place=omega)
+        solver.many(starts, times, place=omega)  # type: ignore[call-arg]
 
 
 def test_any_array_will_do() -> None:

@@ -295,7 +295,10 @@ def _solve_groups(
         groups.setdefault(kind, []).append(row)
     for kind, rows in groups.items():
         own: Any = scenes[rows[0]] if kind >= 0 else [scenes[row] for row in rows]
-        part = solve_many(own, times[rows], step=step, **settings)
+        # One scene is not worth the preparation of a vector kernel. With an array, even of the same
+        # torque, the body is solved alone.
+        alone = {"torque_constant": own.law.constant} if kind >= 0 and own.torque.in_space else {}
+        part = solve_many(own, times[rows], step=step, **alone, **settings)
         found.omega[rows], found.status[rows] = part.omega, part.status
         if found.attitude is not None:
             found.attitude[rows] = part.attitude

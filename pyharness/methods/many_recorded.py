@@ -20,12 +20,13 @@ def solve_side_by_side(
 
     `solver` is the prepared solver of all bodies. The arrays have a row for each of n bodies, or
     one row for all: the initial omegas (rad/s), the final times (s), and the initial attitudes or
-    None. The results are written into `found`. All bodies in `piece` are left if the solver has no
-    recorded torque, or does more than its kernel. A body is also left if its error can't be
-    measured side by side.
+    None. The results are written into `found`. All bodies in `piece` are left if the torque of the
+    solver is neither recorded nor about the axes of space, or if the solver does more than its
+    kernel. A body is also left if its error can't be measured side by side.
     """
     is_plain = "__call__" not in vars(type(solver))
-    if not is_plain or solver.packed[Places.METHOD] != Methods.TAPE:
+    packed = getattr(solver, "packed_for_lanes", solver.packed) if is_plain else None
+    if packed is None or packed[Places.METHOD] != Methods.TAPE:
         return list(range(piece.start, piece.stop))
     n = piece.stop - piece.start
 
@@ -37,7 +38,7 @@ def solve_side_by_side(
         first, last = unit_quaternions(part(turns)), np.empty((n, 4))
     omega, status = np.empty((n, 3)), np.empty(n, np.int8)
     extension().tape_many(
-        solver.packed, part(starts).T, part(times), first.T, given_up, omega.T, last.T, status,
+        packed, part(starts).T, part(times), first.T, given_up, omega.T, last.T, status,
         found.estimates_of(piece),
     )  # fmt: skip
     taken = status == Statuses.COMPLETE

@@ -26,6 +26,7 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 
 _REST: Triple = (0.0, 0.0, 0.0)
+_MOST_KEPT = 8  # prepared solvers
 _BODIES = ("moments", "inertia", "coefficients")
 NO_ATTITUDE = "the torque needs the initial attitude; give attitude0, or scenes with an attitude"
 
@@ -89,7 +90,7 @@ def solve_one_by_one(
         found.estimates[:] = np.nan
     settings: Any = {"effort": effort, "attitude": with_attitude}
     # All bodies share one solver if they differ in their starts alone.
-    shared = None if rows else prepare(at_rest, method, tolerance, **settings)
+    shared = None if rows else _kept_solver(scene, method, tolerance, effort, with_attitude)
     # `omega0` or `attitude0` may share memory with `out`.
     omega = np.full((n, 3), np.nan)
     attitude = np.full((n, 4), np.nan) if with_attitude else None
@@ -127,6 +128,27 @@ def solve_one_by_one(
     if found.attitude is not None and attitude is not None:
         found.attitude[:] = attitude
     return found
+
+
+_kept: dict[tuple[int, str, float, float, bool], tuple[Scene, Any]] = {}
+
+
+def _kept_solver(
+    scene: Scene, method: str, tolerance: float, effort: float, with_attitude: bool
+) -> Any:
+    """Return the prepared solver of a scene at rest, which is kept for further calls.
+
+    For few bodies the preparation takes longer than the solution. An entry holds for one object
+    only, and keeps it alive so that no other object gets its identity.
+    """
+    key = id(scene), method, tolerance, effort, with_attitude
+    if key not in _kept:
+        if len(_kept) >= _MOST_KEPT:
+            _kept.clear()
+        settings: Any = {"effort": effort, "attitude": with_attitude}
+        at_rest = replace(scene, omega=_REST, attitude=None)
+        _kept[key] = scene, prepare(at_rest, method, tolerance, **settings)
+    return _kept[key][1]
 
 
 def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:

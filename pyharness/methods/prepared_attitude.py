@@ -16,8 +16,10 @@ from pyharness.methods.plan import Plan, plan
 from pyharness.methods.registry import check_attitude
 from pyharness.model.attitude import IDENTITY, Quaternion, unit_quaternion
 from pyharness.model.codes import Methods, Places
+from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
 from pyharness.model.scene import Scene
+from pyharness.model.state_torque import of_law
 from pyharness.model.trajectory import Array
 from pyharness.model.values import number, three_floats
 
@@ -97,6 +99,22 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
         argument of another type or shape raises an InputError.
         """
         return partial(many_attitudes, self, self._code)
+
+    @cached_property
+    def packed_for_lanes(self) -> Array:
+        """Return the data of the scene for the kernel that solves several bodies side by side.
+
+        This kernel takes recorded torques. A torque about the axes of space is therefore recorded
+        as a function of time and attitude, unless it has too many terms.
+        """
+        if self._code != Methods.SPACE_TORQUE:
+            return self.packed
+        scene, (tolerance, _, effort) = self.plan.scene, self._given
+        try:
+            recorded = replace(scene, torque=of_law(scene.law))
+            return packed_scene(recorded, Methods.TAPE, tolerance, effort)
+        except InputError:
+            return self.packed
 
 
 def prepared_attitude(scene: Scene, method: str, tolerance: float, effort: float) -> AttitudeSolver:

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import Scene, prepare, solve, solve_many, torques
+from pyharness import Scene, TorqueLaw, prepare, solve, solve_many, torques
 from pyharness.methods.ensemble import Ensemble
 from pyharness.methods.many_recorded import solve_side_by_side
 from pyharness.model.arrays import unit_quaternions
+from pyharness.model.attitude import angle_between
 from pyharness.model.codes import Statuses
 from pyharness.model.extension import extension
 from pyharness.scenes.state_scenes import STEADY, SUDDEN, TURNING, draw, draw_ready
@@ -85,6 +86,69 @@ def test_most_bodies_of_a_batch_are_solved_side_by_side() -> None:
     orbit = torques.gravity_gradient(MOMENTS, 0.5)
     turning = Scene("", (1.0, 0.0, 0.0), moments=MOMENTS, torque=orbit, attitude=(1, 0, 0, 0))
     assert len(lanes(turning, starts, 5.0, turns)[1]) <= 10
+
+
+SPACE_LAWS = {
+    "constant": TorqueLaw((0.4, -0.3, 0.2), frame="space"),
+    "ramp": TorqueLaw((0.4, 0.0, 0.2), rate=(0.1, 0.2, -0.1), frame="space"),
+    "waves": TorqueLaw(
+        (0.1, 0.0, 0.0), sines=[((0.3, 0.2, 0.1), 2.0)], cosines=[((0.2, 0.3, 0.0), 40.0)],
+        frame="space",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("moments", [MOMENTS, (2.0, 2.0, 2.0)])
+@pytest.mark.parametrize("law", SPACE_LAWS)
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-7, 1e-12])
+def test_a_torque_about_the_axes_of_space_is_solved_side_by_side(
+    law: str, moments: Any, tolerance: float
+) -> None:
+    source = np.random.default_rng(6)
+    n = 40
+    starts, turns = source.normal(size=(n, 3)), unit_quaternions(source.normal(size=(n, 4)))
+    times = source.uniform(-5.0, 5.0, n)
+    scene = Scene("", (1.0, 0.0, 0.0), moments=moments, torque=SPACE_LAWS[law])
+    alone, left = lanes(scene, starts, times, turns, tolerance)
+    assert len(left) <= n // 4
+    found = solve_many(
+        scene, times, omega0=starts, attitude0=turns, tolerance=tolerance, estimates=True
+    )
+    assert found.attitude is not None
+    assert found.error is not None
+    assert found.growth is not None
+    done = sorted(set(range(n)) - set(left))
+    assert found.omega[done].tobytes() == alone.omega[done].tobytes()
+    solver = prepare(scene, tolerance=tolerance, attitude=True)
+    many = solver.many(starts, times, turns)
+    assert found.omega.tobytes() == many[0].tobytes()
+    assert found.attitude.tobytes() == many[1].tobytes()
+    for i in range(n):
+        own = replace(scene, omega=tuple(starts[i]), attitude=tuple(turns[i]))
+        true = solve(own, times[i], "taylor", 1e-14, attitude=True)
+        assert true.attitude is not None
+        scale = max(np.abs(starts[i]).max(), np.abs(true.omega[-1]).max())
+        allowed = tolerance + 4e-15 * found.growth[i] if i in done else 2.0 * tolerance
+        error = np.abs(found.omega[i] - true.omega[-1]).max() / scale
+        angle = angle_between(found.attitude[i], true.attitude[-1])
+        assert max(error, angle) <= allowed
+        if i in left:  # the single-body kernel solved it
+            assert np.array_equal(solver(starts[i], times[i], turns[i])[0], found.omega[i])
+    single = solve_many(scene, times[3], omega0=starts[3], attitude0=turns[3], tolerance=tolerance)
+    assert single.omega[0].tobytes() == found.omega[3].tobytes()
+
+
+def test_a_law_with_too_many_terms_for_a_recording_is_solved_body_by_body() -> None:
+    waves = [((0.01, 0.0, 0.01), 1.0 + 0.01 * k) for k in range(2100)]
+    scene = Scene(
+        "", (1.0, 0.3, 0.0), moments=MOMENTS, torque=TorqueLaw(sines=waves, frame="space")
+    )
+    starts, turns = np.eye(3)[:2], np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+    assert lanes(scene, starts, 0.5, turns)[1] == [0, 1]
+    found = solve_many(scene, 0.5, omega0=starts, attitude0=turns)
+    solver = prepare(scene, attitude=True)
+    for i in range(2):
+        assert np.array_equal(found.omega[i], solver(starts[i], 0.5, turns[i])[0])
 
 
 @pytest.mark.parametrize("level", [0, 1, 2])

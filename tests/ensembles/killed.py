@@ -1,6 +1,11 @@
-"""A sweep killed half way and resumed: ``python -m tests.ensembles.killed 10000000``."""
+"""A sweep killed half way and resumed: ``python -m tests.ensembles.killed 10000000``.
+
+With the word ``attitude`` as second argument, the sweep stores attitudes too, and two worker
+processes solve it.
+"""
 
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -16,7 +21,7 @@ _PATIENCE = 600.0  # s
 _ATTEMPTS = 5
 SWEEP = """
 chunk = {chunk}
-reductions = ["end", "status", "growth"]
+reductions = [{reductions}]
 [scene]
 case = 3
 [solve]
@@ -36,6 +41,10 @@ count = 100
 """
 
 
+OMEGA = '"end", "status", "growth"'
+ATTITUDE = '"end", "status", "attitude", "pointing-error"'
+
+
 @dataclass(frozen=True)
 class Killed:
     """The outcome: all chunks, those done when the sweep was killed, and faults after resuming."""
@@ -47,13 +56,15 @@ class Killed:
 
 
 def kill_and_resume(
-    folder: Path, scenes: int, chunk: int, t_end: float = 1.0, executor: str = "here"
-) -> Killed:
+    folder: Path, scenes: int, chunk: int, t_end: float = 1.0, executor: str = "here",
+    reductions: str = OMEGA,
+) -> Killed:  # fmt: skip
     """Run a sweep undisturbed; kill it half way and resume it; compare the bytes."""
     path = folder / "sweep.toml"
-    path.write_text(SWEEP.format(chunk=chunk, count=scenes // 100, t_end=t_end))
+    count = scenes // 100
+    path.write_text(SWEEP.format(chunk=chunk, count=count, t_end=t_end, reductions=reductions))
     whole, killed = folder / "whole.zarr", folder / "killed.zarr"
-    _finish(path, whole)
+    _finish(path, whole, executor)
     n_chunks = len(_done(whole))
     # On a busy machine the sweep may have ended before the signal.
     for _ in range(_ATTEMPTS):
@@ -62,7 +73,7 @@ def kill_and_resume(
             break
     before = {path: path.stat().st_mtime_ns for path in killed.rglob("*") if path.is_file()}
     done = {*_done(killed)}
-    _finish(path, killed)
+    _finish(path, killed, executor)
     again = [
         str(path)
         for path, when in before.items()
@@ -95,8 +106,8 @@ def _start(path: Path, store: Path, executor: str = "here") -> "subprocess.Popen
     )
 
 
-def _finish(path: Path, store: Path) -> None:
-    if _start(path, store).wait(_PATIENCE) != 0:
+def _finish(path: Path, store: Path, executor: str) -> None:
+    if _start(path, store, executor).wait(_PATIENCE) != 0:
         raise AssertionError(f"the sweep of {path} did not end well")
 
 
@@ -113,17 +124,21 @@ def _place(path: Path, store: Path) -> tuple[str, ...]:
 
 
 def main() -> int:
-    """Kill and resume a sweep of so many scenes, and print the outcome."""
+    """Kill and resume a sweep of so many scenes, and print the outcome and the memory."""
     scenes = int(float(sys.argv[1])) if len(sys.argv) > 1 else 10_000_000
+    with_attitude = sys.argv[2:] == ["attitude"]
+    own = ("processes", ATTITUDE) if with_attitude else ("here", OMEGA)
     with tempfile.TemporaryDirectory() as folder:
         begin = time.monotonic()
-        found = kill_and_resume(Path(folder), scenes, min(100_000, max(100, scenes // 100)))
+        chunk = min(100_000, max(100, scenes // 100))
+        found = kill_and_resume(Path(folder), scenes, chunk, 1.0, *own)
         size = sum(map(len, files(Path(folder) / "killed.zarr").values()))
         print(f"{scenes} scenes, {found.n_chunks} chunks, {size / 1e6:.0f} MB")
         print(f"killed when {found.n_done} were done")
         print(f"chunks written again: {len(found.written_again)}")
         print(f"files that differ from those of a sweep undisturbed: {len(found.different)}")
-        print(f"{time.monotonic() - begin:.0f} s")
+        most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+        print(f"{time.monotonic() - begin:.0f} s; largest process {most / 1024:.0f} MiB")
     return 1 if found.written_again or found.different else 0
 
 

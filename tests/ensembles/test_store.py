@@ -24,15 +24,17 @@ from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.store import opened
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
-from tests.ensembles.killed import kill_and_resume
+from tests.ensembles.killed import ATTITUDE, OMEGA, kill_and_resume
 from tests.ensembles.sweeps import PROGRAM, SQUARE, TILT, files, text, written
 
 
-@pytest.mark.parametrize("executor", ["here", "processes"])
+@pytest.mark.parametrize(
+    ("executor", "reductions"), [("here", OMEGA), ("processes", OMEGA), ("processes", ATTITUDE)]
+)
 def test_killed_at_half_way_it_resumes_and_does_nothing_twice(
-    executor: str, tmp_path: Path
+    executor: str, reductions: str, tmp_path: Path
 ) -> None:
-    found = kill_and_resume(tmp_path, 8_000, 200, t_end=3.0, executor=executor)
+    found = kill_and_resume(tmp_path, 8_000, 200, 3.0, executor, reductions)
     assert found.n_chunks == 40
     assert found.n_chunks // 2 <= found.n_done < found.n_chunks
     assert found.written_again == []

@@ -83,9 +83,9 @@ class Details:
         slopes: list[dict[str, Array] | None] = [None] * n
         refusals: dict[int, str] = {}
         expect_bodies(n)
-        for i in range(n):
+        for i, has_result in enumerate(found.has_result):
             count_done(1)
-            if not found.has_result[i]:
+            if not has_result:
                 continue
             try:
                 one = solve(

@@ -16,14 +16,13 @@ import numpy as np
 from pyharness.methods.averaged_coordinates import Coordinates
 from pyharness.methods.averaged_error import Done, estimates
 from pyharness.methods.averaged_step import MacroStep, NotResolvedError
-from pyharness.methods.averaged_torque import torque_of
+from pyharness.methods.averaged_torque import fastest_of, torque_of
 from pyharness.methods.problem import rows_trajectory
 from pyharness.methods.sensitivity import is_sensitive
 from pyharness.model.array_type import Array
 from pyharness.model.effort import advice
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import ROUNDING, Trajectory
 
 NODES = 20  # in a macro-step
@@ -64,7 +63,8 @@ def averaged(
 
     Raise InputError for an opaque torque, and if omega would not oscillate about a principal axis
     without the torque; if the motion is near the separatrix; if the torque is not weak, or varies
-    as fast as the motion and may be in resonance with it; and if the work limit is exceeded.
+    as fast as the motion and may be in resonance with it; if the torque may change within a part of
+    a macro-step, as a pulse; and if the work limit is exceeded.
     """
     coordinates = Coordinates.of(scene.euler_coefficients, scene.omega)
     if coordinates is None:
@@ -111,11 +111,7 @@ class _Run:
 
     def _check_waves(self) -> None:
         """Set the highest frequency of the torque's waves, and raise InputError if it is high."""
-        self.fastest = 0.0  # rad/s; unknown for a recorded torque
-        if isinstance(self.scene.torque, StateTorque):
-            return
-        law = self.scene.law
-        self.fastest = max((abs(f) for a, f in law.sines + law.cosines if any(a)), default=0.0)
+        self.fastest = fastest_of(self.scene.torque)  # rad/s
         slow = _FASTEST * self.pace
         if self.fastest > slow:
             raise InputError(

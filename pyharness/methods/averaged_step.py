@@ -111,7 +111,8 @@ class MacroStep:
             mean = mean + correction
             change, last = float((np.abs(correction).max(axis=1) / sizes).max()), change
             stalls = sweep >= _LEAST_SWEEPS and not change < 0.5 * last
-            if change <= _CONVERGED or stalls:
+            # The first sweep is without the oscillation, and may change nothing for that reason.
+            if (sweep > 1 and change <= _CONVERGED) or stalls:
                 break
         self._check(mean)
         if not change <= _ROUNDED:

@@ -16,7 +16,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.scenes.random_scenes import draw
 from pyharness.scenes.weak_torques import MOTIONS, TORQUES, draw_weak
-from pyharness.torques import damping, opaque, rate_control
+from pyharness.torques import damping, opaque, pulses, rate_control, table
 from pyharness.truth.integer_series import integer_series
 
 MOMENTS = (3.0, 2.0, 1.2)
@@ -136,6 +136,45 @@ def test_recorded_torque_of_omega(torque: Any) -> None:
     times = [10.0, 1e3]
     found = _averaged(scene, times, 1e-11)
     assert _error(found, solve(scene, times, "taylor", 1e-14).omega) < 1e-11
+
+
+@pytest.mark.parametrize(
+    "torque",
+    [
+        pulses([2345.0], [1.0], (1e-3, 0.0, 1e-3)),
+        table([0.0, 4000.0, 4010.0, 4020.0], [(0.0, 0.0, 0.0), PUSH.constant] * 2),
+        lambda t, w: (1e-4 * np.exp(-((t - 1234.0) ** 2)), 0.0, -1e-6 * w[2]),
+        lambda t, w: (1e-6 / (1.0 + (t - 50.0) ** 2), 0.0, 0.0),
+        lambda t, w: (1e-6 * np.sin(1e-6 * t * t), 0.0, 0.0),
+    ],
+)
+def test_torque_with_changes_that_a_macro_step_may_miss_is_refused(torque: Any) -> None:
+    """A pulse between the nodes of a macro-step had no effect, and an error of 1e-12."""
+    with pytest.raises(InputError, match="may miss changes"):
+        _averaged(replace(SCENE, torque=torque), [1e4])
+
+
+def test_recorded_torque_with_slow_changes_is_solved_and_with_fast_waves_refused() -> None:
+    def torque(t: Any, w: Any) -> Any:
+        wave = np.sin(2e-3 * t + 0.1 * w[0]) * np.cos(1e-3 * t) / 3.0
+        return (1e-6 * wave - 1e-6 * w[0], 1e-12 * t * t * w[1], 1e-9 * t * np.tanh(w[2]))
+
+    scene = replace(SCENE, torque=torque)
+    times = [10.0, 1e3]
+    found = _averaged(scene, times, 1e-11)
+    assert _error(found, solve(scene, times, "taylor", 1e-14).omega) < 1e-11
+    fast = damping([1e-6, 1e-6, 1e-6]) + TorqueLaw(sines=[((1e-6, 0.0, 0.0), 0.5)])
+    with pytest.raises(InputError, match="frequency 0.5 rad/s"):
+        _averaged(replace(SCENE, torque=fast), [1e4])
+
+
+@pytest.mark.parametrize("coefficients", [(0.3, -0.5, 0.2), (-0.3, 0.5, 0.2), (0.3, -0.5, 0.3)])
+def test_torque_whose_first_mean_is_zero_is_averaged(coefficients: tuple[float, ...]) -> None:
+    """The first sweep changes nothing; it was taken for the last one, and the scene refused."""
+    a, b, c = coefficients
+    scene = Scene("", SCENE.omega, coefficients=(a, b, c), torque=TorqueLaw((1e-6, 0.0, 0.0)))
+    found = _averaged(scene, [1e3])
+    assert _error(found, integer_series(scene, [1e3]).omega) < 1e-12
 
 
 def test_rows_do_not_depend_on_other_rows_and_are_in_the_order_of_the_times() -> None:

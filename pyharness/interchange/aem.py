@@ -17,6 +17,7 @@ from pyharness.interchange.epochs import (
     Epoch,
     epoch_text,
     half_years,
+    is_before,
     later,
     read_epoch,
     seconds_between,
@@ -43,6 +44,7 @@ _DEFAULTS = {
     "TIME_SYSTEM": "TAI",
 }
 _OPTIONAL = ("CREATION_DATE", "CENTER_NAME")
+_SMALLEST = 1e-6  # norm of a quaternion that is read; the largest is its inverse
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +139,10 @@ def write_aem(
         )
     begin = read_epoch("epoch", epoch)
     epochs = [later(begin, time) for time in times.tolist()]
+    if not all(map(is_before, epochs, epochs[1:])):
+        raise InputError(
+            "write_aem: two times are the same within 1e-15 s; allowed: times that are apart"
+        )
     if keywords["TIME_SYSTEM"] == "UTC" and half_years(epochs[0], epochs[-1]):
         raise InputError(
             "write_aem: UTC may have a leap second at the end of June and December; allowed: "
@@ -277,7 +283,7 @@ def _segments(file: str, text: str) -> Iterator[_Lines]:
             key, equal, value = map(str.strip, line.partition("="))
             if not equal or not key or not value:
                 raise now.wrong("there is no keyword with a value")
-            if key in now.metadata and place == "header":
+            if key in now.metadata:
                 raise now.wrong(f"{key} occurs twice")
             if place == "header" and not header.metadata and key != "CCSDS_AEM_VERS":
                 raise now.wrong("the first keyword must be CCSDS_AEM_VERS")
@@ -316,17 +322,28 @@ def _segment(lines: _Lines) -> AttitudeEphemeris:
     if not (np.diff(time) > 0.0).all():
         late = lines.rows[1 + int(np.argmin(np.diff(time) > 0.0))][0]
         raise lines.wrong("the times are not in ascending order", late)
+    if meta["TIME_SYSTEM"].upper() == "UTC":
+        for epoch, (number, _) in zip(epochs, lines.rows, strict=True):
+            if half_years(epochs[0], epoch):
+                raise lines.wrong(
+                    "UTC may have a leap second at the end of June and December; allowed: times "
+                    "within a half year, or the time system TAI",
+                    number,
+                )
     rows = np.array(values)
-    scalar_first = version == "1.0" and meta.get("QUATERNION_TYPE", "LAST").upper() == "FIRST"
+    scalar_first = version == "1.0" and _choice(lines, "QUATERNION_TYPE", "LAST", "FIRST") != "LAST"
     order = [0, 1, 2, 3] if scalar_first else [3, 0, 1, 2]
     attitude = rows[:, :4][:, order]
-    norm = np.linalg.norm(attitude, axis=1, keepdims=True)
-    if not norm.all():
-        raise lines.wrong("a quaternion is 0", lines.rows[int(np.argmin(norm))][0])
+    with np.errstate(over="ignore"):
+        norm = np.linalg.norm(attitude, axis=1, keepdims=True)
+    # No quaternion of another size has a meaning, and its square may be out of range.
+    if not ((norm > _SMALLEST) & (norm < 1.0 / _SMALLEST)).all():
+        odd = int(np.argmin((norm > _SMALLEST) & (norm < 1.0 / _SMALLEST)))
+        raise lines.wrong("a quaternion is 0, or far from length 1", lines.rows[odd][0])
     attitude = attitude / norm
     a, b = meta["REF_FRAME_A"], meta["REF_FRAME_B"]
     a_is_body = a.upper().startswith(_BODY) and not b.upper().startswith(_BODY)
-    backward = version == "1.0" and meta.get("ATTITUDE_DIR", "A2B").upper() == "B2A"
+    backward = version == "1.0" and _choice(lines, "ATTITUDE_DIR", "A2B", "B2A") != "A2B"
     omega = None
     if kind == "QUATERNION/DERIVATIVE":
         # q' = q (0, omega)/2, with omega about the axes of frame B
@@ -345,6 +362,14 @@ def _segment(lines: _Lines) -> AttitudeEphemeris:
         omega = None if omega is None else -_rotated(attitude, omega)
         attitude = attitude * [1.0, -1.0, -1.0, -1.0]
     return AttitudeEphemeris(dict(meta), epoch_text(epochs[0]), time, attitude, omega)
+
+
+def _choice(lines: _Lines, key: str, usual: str, other: str) -> str:
+    """Return the value of a keyword that has two values; `usual` is the default."""
+    found = lines.metadata.get(key, usual).upper()
+    if found not in (usual, other):
+        raise lines.wrong(f"{key} is {found}; allowed: {usual}, {other}")
+    return found
 
 
 def _vector_of_product(q: Array, p: Array) -> Array:

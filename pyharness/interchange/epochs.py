@@ -13,6 +13,7 @@ _CALENDAR = re.compile(
 _DAY = 86_400
 _DECIMALS = 15  # of a second; the rounding error is less than that of a time in binary64
 _EXACT = Context(prec=60)
+_FARTHEST = 1e15  # s; the calendar has fewer
 _J2000 = (date(2000, 1, 1), Decimal(_DAY // 2))
 
 # A date, and the seconds since its midnight.
@@ -56,6 +57,8 @@ def later(epoch: Epoch, time: float) -> Epoch:
     Raise InputError if the calendar has no such day.
     """
     day, seconds = epoch
+    if abs(time) > _FARTHEST:
+        raise _beyond(time)
     total = _EXACT.add(seconds, Decimal(repr(time)))
     total = _EXACT.quantize(total, Decimal(1).scaleb(-_DECIMALS))
     days = int(_EXACT.divide_int(total, Decimal(_DAY)))
@@ -65,9 +68,13 @@ def later(epoch: Epoch, time: float) -> Epoch:
     try:
         return day + timedelta(days), rest
     except OverflowError:
-        raise InputError(
-            f"time {time:g} s is beyond the calendar; allowed: dates in the years 1 to 9999"
-        ) from None
+        raise _beyond(time) from None
+
+
+def _beyond(time: float) -> InputError:
+    return InputError(
+        f"time {time:g} s is beyond the calendar; allowed: dates in the years 1 to 9999"
+    )
 
 
 def epoch_text(epoch: Epoch) -> str:
@@ -83,6 +90,11 @@ def seconds_between(first: Epoch, second: Epoch) -> float:
     """Return the seconds from one epoch to another, rounded once."""
     days = _DAY * (second[0] - first[0]).days
     return float(_EXACT.add(Decimal(days), _EXACT.subtract(second[1], first[1])))
+
+
+def is_before(first: Epoch, second: Epoch) -> bool:
+    """Return whether an epoch is before another one."""
+    return first < second
 
 
 def seconds_past_j2000(epoch: Epoch) -> float:

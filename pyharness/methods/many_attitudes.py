@@ -10,7 +10,7 @@ from pyharness.methods.ensemble import Ensemble, place_for
 from pyharness.methods.many_recorded import solve_side_by_side
 from pyharness.model.arrays import check_rows, row_of, rows_of, threads_of
 from pyharness.model.attitude import IDENTITY, scalar_first
-from pyharness.model.codes import Methods
+from pyharness.model.codes import Methods, Statuses
 from pyharness.model.extension import ENDS, extension
 from pyharness.model.pieces import for_each_piece
 from pyharness.model.scene import Scene
@@ -93,5 +93,9 @@ def _each(
         if given_up[0]:
             return
         turn = None if turns is None else row_of(turns, i)
+        if turn is not None and not (np.isfinite(turn).all() and turn.any()):
+            found.omega[i] = found.attitude[i] = np.nan
+            found.status[i] = Statuses.REFUSED
+            continue
         found.omega[i], found.attitude[i] = solver(starts[i], float(row_of(times, i)), turn)
         found.status[i] = ENDS.index(solver.status)

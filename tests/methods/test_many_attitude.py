@@ -232,3 +232,25 @@ def test_a_torque_of_the_state_turns_many_bodies() -> None:
         truth = solve(alone, [2.0], attitude=True)
         assert truth.attitude is not None
         assert angle_between(found.attitude[row : row + 1], truth.attitude).max() <= 1e-11
+
+
+@pytest.mark.parametrize(
+    "torque",
+    [
+        TorqueLaw((1.0, 0.0, 0.0)),
+        TorqueLaw((1.0, 0.0, 0.0), frame="space"),
+        torques.damping([1.0, 2.0, 3.0]),
+    ],
+)
+def test_a_bad_attitude_spoils_no_other_of_a_prepared_solver(torque: Any) -> None:
+    """Under most torques one such row had raised an error, and all results were lost."""
+    starts, turns = np.ones((3, 3)), np.ones((3, 4))
+    many = prepare(replace(TOP, torque=torque, attitude=(1.0, 0.0, 0.0, 0.0)), attitude=True).many
+    good = many(starts, 1.0, turns)
+    turns[0], turns[2, 1] = 0.0, np.nan
+    omega, attitude, status = many(starts, 1.0, turns)
+    assert np.isnan(attitude[[0, 2]]).all()
+    assert np.isnan(omega[[0, 2]]).all()
+    assert status[0] and status[2]
+    assert np.array_equal(attitude[1], good[1][1])
+    assert np.array_equal(omega[1], good[0][1])

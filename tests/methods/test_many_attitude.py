@@ -251,6 +251,7 @@ def test_a_bad_attitude_spoils_no_other_of_a_prepared_solver(torque: Any) -> Non
     omega, attitude, status = many(starts, 1.0, turns)
     assert np.isnan(attitude[[0, 2]]).all()
     assert np.isnan(omega[[0, 2]]).all()
-    assert status[0] and status[2]
+    assert status[0]
+    assert status[2]
     assert np.array_equal(attitude[1], good[1][1])
     assert np.array_equal(omega[1], good[0][1])

@@ -10,6 +10,9 @@ module taylor_error
   integer, parameter :: STEPS_IN_BLOCK = 8
   integer, parameter :: STEPS_IN_FINE_BLOCK = 2
   integer, parameter :: MOST_BLOCKS = 256 ! even
+  ! In a precise integration the amplification is computed at the first rows, and then at most once
+  ! in so many steps, to save time.
+  integer, parameter :: FIRST_LOOKS = 16, STEPS_BETWEEN_LOOKS = 128
   real(dp), parameter :: RIDGE = 1.001_dp   ! makes the fit work for one pole or none
   real(dp), parameter :: LEAST = tiny(1.0_dp)
   real(dp), parameter :: FIRST(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp] ! selects the first lane
@@ -32,6 +35,8 @@ module taylor_error
     integer :: closed
     integer :: steps_a_block
     logical :: is_merged    !! whether blocks were merged
+    integer :: looks        !! rows at which the amplification was computed
+    real(dp) :: at_rows     !! the largest amplification at these rows
   end type blocks_t
 
   public :: begin, count_step, estimate_truncation, estimate_truncation_from_rest, growths_of, &
@@ -51,6 +56,8 @@ contains
     blocks%closed = 0
     blocks%has_row(1) = .false.
     blocks%is_merged = .false.
+    blocks%looks = 0
+    blocks%at_rows = 0.0_dp
     blocks%steps_a_block = merge(STEPS_IN_FINE_BLOCK, STEPS_IN_BLOCK, precise)
   end subroutine begin
 
@@ -175,6 +182,15 @@ contains
 
     blocks%steps = blocks%steps + 1
     blocks%has_row(blocks%closed + 1) = blocks%has_row(blocks%closed + 1) .or. with_row
+    ! Near the separatrix, the amplification may be much larger at a row than at the end of its block.
+    if (precise .and. with_row) then
+      n = (blocks%closed*blocks%steps_a_block + blocks%steps)/STEPS_BETWEEN_LOOKS
+      if (blocks%looks < FIRST_LOOKS + n) then
+        blocks%looks = blocks%looks + 1
+        largest = bounded(lanes(2:, :))
+        blocks%at_rows = max(blocks%at_rows, growth_until(blocks%closed, largest, blocks))
+      end if
+    end if
     if (blocks%steps < blocks%steps_a_block) return
     blocks%steps = 0
     blocks%closed = blocks%closed + 1
@@ -239,6 +255,7 @@ contains
     do n = 1, blocks%closed
       if (blocks%has_row(n)) growth = max(growth, growth_until(n, UNIT, blocks))
     end do
+    growth = max(growth, blocks%at_rows)
     largest = growth
     if (.not. precise .or. growth < WORTH_A_LOOK) return
     do n = 1, blocks%closed

@@ -16,7 +16,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.scenes.random_scenes import draw
 from pyharness.scenes.weak_torques import MOTIONS, TORQUES, draw_weak
-from pyharness.torques import damping, opaque, pulses, rate_control, table
+from pyharness.torques import damping, opaque, pulses, rate_control, recorded, table
 from pyharness.truth.integer_series import integer_series
 
 MOMENTS = (3.0, 2.0, 1.2)
@@ -159,7 +159,7 @@ def test_recorded_torque_with_slow_changes_is_solved_and_with_fast_waves_refused
         wave = np.sin(2e-3 * t + 0.1 * w[0]) * np.cos(1e-3 * t) / 3.0
         return (1e-6 * wave - 1e-6 * w[0], 1e-12 * t * t * w[1], 1e-9 * t * np.tanh(w[2]))
 
-    scene = replace(SCENE, torque=torque)
+    scene = replace(SCENE, torque=recorded(torque))
     times = [10.0, 1e3]
     found = _averaged(scene, times, 1e-11)
     assert _error(found, solve(scene, times, "taylor", 1e-14).omega) < 1e-11

@@ -55,7 +55,7 @@ def _state_torque(scene: Scene, given: StateTorque) -> Torque:
 
 
 class _Slot(NamedTuple):
-    """How a slot of a tape depends on time directly, not by way of omega.
+    """The direct dependence of a slot of a tape on time, not that by way of omega.
 
     `fastest` is the highest frequency of its waves (rad/s), and infinite if the slot is more than a
     sum of products of waves and powers of the time. `rate` is the derivative with respect to time

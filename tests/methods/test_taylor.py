@@ -280,11 +280,12 @@ def test_growth_from_few_starts_is_seen() -> None:
     moments = (1.908871055132049, 1.6944745539067607, 0.5085885178521218)
     omega = (0.0012638412446339218, -0.40645864143219074, -3.387026803568728e-05)
     scene, times = Scene("", omega, moments=moments), [9000.0, 18365.7655353155]
-    known = solve(scene, times, "closed-form", 1e-9).growth
-    found = solve(scene, times, "taylor", 1e-9).growth
-    assert known is not None
-    assert found is not None
-    assert known / 2.0 <= found <= 2.0 * known
+    for asked in (times[:1], times[1:], times):
+        # The closed form has the amplification until the last time.
+        known = max(solve(scene, [time], "closed-form", 1e-9).growth or 0.0 for time in asked)
+        found = solve(scene, asked, "taylor", 1e-9).growth
+        assert found is not None
+        assert known / 2.0 <= found <= 2.0 * known
 
 
 def test_error_of_a_row_near_the_separatrix_does_not_depend_on_later_rows() -> None:
@@ -297,10 +298,9 @@ def test_error_of_a_row_near_the_separatrix_does_not_depend_on_later_rows() -> N
     scene, end = Scene("", omega, moments=moments), 7495.232634479441
     times = [0.3 * end, end]
     truth = solve(scene, times, "closed-form", 1e-13).omega
-    for chosen in (times[:1], times, np.linspace(0.0, end, 2001)[1:].tolist() + times[:1]):
-        chosen = sorted(chosen)
+    for chosen in (times[:1], times, np.linspace(0.0, end, 2001)[1:].tolist()):
         found = solve(scene, chosen, "taylor", 7e-7)
         assert found.error is not None
-        error = np.abs(found.omega[chosen.index(times[0])] - truth[0]).max()
+        error = np.abs(found.omega[np.argmin(np.abs(found.time - times[0]))] - truth[0]).max()
         assert 1e-5 < error <= 2.0 * found.error
         assert found.ended == "sensitive"

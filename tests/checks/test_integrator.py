@@ -163,6 +163,24 @@ def test_a_first_order_splitting_is_named_and_may_refuse_torques(capsys: Capture
     assert _json(capsys, command, "--seed", "s", "--draws", "1", "--order", "2", status=1)
 
 
+def test_an_integrator_that_refuses_every_scene_does_not_pass(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    path = tmp_path / "refuses.py"
+    path.write_text("for line in open(0):\n    print('{\"refused\": \"no\"}', flush=True)\n")
+    record = _json(capsys, command_of(path), "--draws", "1", status=1)
+    failed = [check for check in record["checks"] if not check["passed"]]
+    assert [check["id"] for check in failed] == ["integrator/answers"]
+
+
+def test_rounding_errors_are_not_named_first_order() -> None:
+    """Binary32 that an integrator does not declare had the order 1 in one pair by chance."""
+    steps = [0.5 / 2.0**level for level in range(LEVELS)]
+    noise = [1e-2, 6e-4, 4e-5, 2e-6, 6e-7, 4e-7, 1.2e-6, 6e-7]
+    assert not convergence("omega", steps, noise, 1e-12, False).is_first
+    assert convergence("omega", steps, steps, 1e-12, False).is_first
+
+
 def test_two_faults_at_once_are_named(tmp_path: Path, capsys: Capture) -> None:
     text = RK4.read_text().replace("(i2 - i3)", "(i3 - i2)").replace("(i3 - i1)", "(i1 - i3)")
     text = text.replace("(i1 - i2)", "(i2 - i1)")

@@ -26,6 +26,8 @@ PARTS = ("omega", "attitude")
 _COARSEST, _PER_LEVEL = 1e-3, 0.1  # tolerances
 _EACH = 2  # coarsest steps between two requested times
 _ORDER_ONE = 1.5  # a measured order below this counts as 1
+_SEVERAL = 4  # steps that must show the order 1
+_LEAST = 1e-300  # in place of an error of 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +133,16 @@ class Convergence:
 
     @property
     def is_first(self) -> bool:
-        """Return whether the order is 1, up to the accuracy of the measurement."""
-        return self.order is not None and 1.0 - ORDER_SLACK <= self.order < _ORDER_ONE
+        """Return whether the order is 1, up to the accuracy of the measurement.
+
+        Several steps must show it, because rounding errors may do so in one pair of steps by
+        chance.
+        """
+        if self.order is None:
+            return False
+        far = _power(self.errors[-_SEVERAL] / max(self.errors[-1], _LEAST),
+                     self.settings[-_SEVERAL] / self.settings[-1])  # fmt: skip
+        return all(1.0 - ORDER_SLACK <= each < _ORDER_ONE for each in (self.order, far))
 
     @property
     def is_higher(self) -> bool:

@@ -182,7 +182,7 @@ contains
 
     blocks%steps = blocks%steps + 1
     blocks%has_row(blocks%closed + 1) = blocks%has_row(blocks%closed + 1) .or. with_row
-    ! Near the separatrix, the amplification may be much larger at a row than at the end of its block.
+    ! Near the separatrix, the amplification may be much larger at a row than where its block ends.
     if (precise .and. with_row) then
       n = (blocks%closed*blocks%steps_a_block + blocks%steps)/STEPS_BETWEEN_LOOKS
       if (blocks%looks < FIRST_LOOKS + n) then

@@ -167,7 +167,7 @@ def test_an_integrator_that_refuses_every_scene_does_not_pass(
     tmp_path: Path, capsys: Capture
 ) -> None:
     path = tmp_path / "refuses.py"
-    path.write_text("for line in open(0):\n    print('{\"refused\": \"no\"}', flush=True)\n")
+    path.write_text('for line in open(0):\n    print(\'{"refused": "no"}\', flush=True)\n')
     record = _json(capsys, command_of(path), "--draws", "1", status=1)
     failed = [check for check in record["checks"] if not check["passed"]]
     assert [check["id"] for check in failed] == ["integrator/answers"]

@@ -6,7 +6,8 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 
 KINDS = ("free", "constant", "wave")
-"""The kinds of scenes: without torque, under a constant torque, and under waves of the torque."""
+"""The kinds of scenes: without torque, under a constant torque, and under waves and a
+linear torque."""
 
 
 def draw_moderate(seed: str, kind: str, number: int) -> Scene:
@@ -28,6 +29,7 @@ def draw_moderate(seed: str, kind: str, number: int) -> Scene:
         law = TorqueLaw(constant=_torque(source, moments))
     elif kind == "wave":
         law = TorqueLaw(
+            rate=[0.1 * x for x in _torque(source, moments)],
             sines=[(_torque(source, moments), source.uniform(1.0, 3.0))],
             cosines=[(_torque(source, moments), source.uniform(1.0, 3.0))],
         )

@@ -66,10 +66,11 @@ def kill_and_resume(
     whole, killed = folder / "whole.zarr", folder / "killed.zarr"
     _finish(path, whole, executor)
     n_chunks = len(_done(whole))
-    # On a busy machine the sweep may have ended before the signal.
+    # On a busy machine the sweep may have ended before the signal, or may be about to end.
     for _ in range(_ATTEMPTS):
         shutil.rmtree(killed, ignore_errors=True)
-        if _killed(_start(path, killed, executor), killed, n_chunks // 2):
+        was_running = _killed(_start(path, killed, executor), killed, n_chunks // 2)
+        if was_running and len(_done(killed)) < n_chunks:
             break
     before = {path: path.stat().st_mtime_ns for path in killed.rglob("*") if path.is_file()}
     done = {*_done(killed)}

@@ -101,6 +101,16 @@ def _with_law(change: Callable[[Scene], Any]) -> Callable[[Scene, Array, float],
     return motion
 
 
+def _without(**part: Any) -> Callable[[Scene, Array, float], State | None]:
+    """Return the motion without a part of the torque law; None if the law has no such part."""
+
+    def motion(scene: Scene, times: Array, step: float) -> State | None:
+        law = replace(scene.law, **part)
+        return None if law == scene.law else true_motion(replace(scene, torque=law), times)
+
+    return motion
+
+
 def _frozen(scene: Scene) -> TorqueLaw:
     law = scene.law
     values = np.array(law.constant) + sum(np.array(amplitude) for amplitude, _ in law.cosines)
@@ -230,6 +240,10 @@ FAULTS = (
           _of_state(lambda state, scene: State(_DEGREES * state.omega, state.attitude))),
     Fault("torque-missing", "the torque is ignored", _with_law(lambda scene: TorqueLaw())),
     Fault("torque-frozen", "the torque keeps its value at time 0", _with_law(_frozen)),
+    Fault("torque-rate-missing", "the linear part of the torque is ignored",
+          _without(rate=(0.0, 0.0, 0.0))),
+    Fault("torque-sines-missing", "the sines of the torque are ignored", _without(sines=())),
+    Fault("torque-cosines-missing", "the cosines of the torque are ignored", _without(cosines=())),
     Fault("torque-in-space", "the torque acts about the axes of space, not of the body",
           _with_law(lambda scene: replace(scene.law, frame="space"))),
     Fault("torque-undivided", "the torque is not divided by the moments", _with_law(_undivided)),

@@ -116,10 +116,6 @@ def judge_integrator(
                 where = problem.name
                 told(done, where)
                 judge_problem(ask, problem, due, found, again)
-            if not found.judged:
-                name = Name("integrator", "answers")
-                check = name.judged(False, "every scene was refused, so that nothing was checked")
-                found.checks.append(replace(check, again=again("")))
             where = "long"
             told(len(chosen), where)
             _judge_long(ask, chosen, found, again)

@@ -130,12 +130,20 @@ def _turn(omega: Array, h: float) -> Any:
     return math.cos(0.5 * spin * h), *(factor * omega).tolist()
 
 
+def _part(field: str, value: Any) -> Callable[[dict[str, Any]], None]:
+    """Return a fault that replaces a part of the torque."""
+    return _set("torque", lambda law: {**law, field: value})
+
+
 PLANTS = (
     IntegratorPlant("gyroscopic-missing", _no_gyroscopic_term),
     *(IntegratorPlant(f"moments-{order}", _ordered(order))
       for order in ("132", "213", "231", "312", "321")),
     IntegratorPlant("torque-missing", lambda asked: _scaled(asked, (0.0, 0.0, 0.0))),
     IntegratorPlant("torque-frozen", _frozen),
+    IntegratorPlant("torque-rate-missing", _part("rate", [0.0] * 3)),
+    IntegratorPlant("torque-sines-missing", _part("sines", [])),
+    IntegratorPlant("torque-cosines-missing", _part("cosines", [])),
     IntegratorPlant("torque-sign", lambda asked: _scaled(asked, (-1.0, -1.0, -1.0))),
     IntegratorPlant("torque-undivided", lambda asked: _scaled(asked, asked["moments"])),
     IntegratorPlant("torque-held", _held, needs_step=True),
@@ -274,14 +282,15 @@ def _can_have(plant: IntegratorPlant, control: Verdict) -> bool:
         return False
     kinds = {each.problem.kind for each in control.judged}
     if plant.name.startswith("torque"):
-        needed = (
-            {"wave"} if plant.name in ("torque-frozen", "torque-held") else {"constant", "wave"}
-        )
-        return bool(kinds & needed)
+        return bool(kinds & ({"wave"} if plant.name in _OF_WAVES else {"constant", "wave"}))
     needs_attitude = plant.advance or plant.name in _OF_ATTITUDE
     return not needs_attitude or control.judged[0].finest.attitude is not None
 
 
+_OF_WAVES = (
+    "torque-frozen", "torque-held", "torque-rate-missing", "torque-sines-missing",
+    "torque-cosines-missing",
+)  # fmt: skip
 _OF_ATTITUDE = (
     "omega-in-space", "quaternion-transposed", "scalar-last", "attitude-from-identity",
 )  # fmt: skip

@@ -27,6 +27,7 @@ _COARSEST, _PER_LEVEL = 1e-3, 0.1  # tolerances
 _EACH = 2  # coarsest steps between two requested times
 _ORDER_ONE = 1.5  # a measured order below this counts as 1
 _SEVERAL = 4  # steps that must show the order 1
+_LATE = 3  # tolerances before the last that must show the order too
 _LEAST = 1e-300  # in place of an error of 0
 
 
@@ -166,9 +167,9 @@ def convergence(
     floor : float
         An error that may be rounding error. Errors below it are not used.
     overall : bool
-        Whether the order is that from the first to the last error above the floor, as for
-        tolerances, with which errors fall irregularly. Otherwise it is that of the last pair whose
-        second error is above the floor.
+        Whether the order is that from the first to the last error above the floor, or over the last
+        four if it is smaller there, as for tolerances, with which errors fall irregularly.
+        Otherwise it is that of the last pair whose second error is above the floor.
 
     Returns
     -------
@@ -179,8 +180,12 @@ def convergence(
     order = None
     if seen:
         last = seen[-1]
-        first = 0 if overall else last - 1
-        order = _power(errors[first] / errors[last], settings[first] / settings[last])
+        # An error that ceases to fall shows in the last tolerances alone.
+        firsts = {0, max(0, last - _LATE)} if overall else {last - 1}
+        order = min(
+            _power(errors[first] / errors[last], settings[first] / settings[last])
+            for first in firsts
+        )
     return Convergence(part, tuple(settings), tuple(errors), order)
 
 

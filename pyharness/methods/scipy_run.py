@@ -1,6 +1,8 @@
 """Integrations by SciPy's `solve_ivp` under one work limit; SciPy is imported on first use."""
 
+import contextlib
 import math
+import threading
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -22,6 +24,9 @@ LARGEST_PHASE = 1e13
 # LSODA squares the time span to choose its first step. Below 1e-150 s the square underflows to 0,
 # and LSODA does not advance.
 _SHORTEST_SPAN = 2.0**-300
+# LSODA of older versions of SciPy has one state for all threads, and raises an exception if two
+# integrations alternate. The lock is reentrant, so that a torque may integrate too.
+_ALONE = {"LSODA": threading.RLock()}
 
 
 class NoNumberError(Exception):
@@ -87,7 +92,11 @@ class Run:
 
         phase_left.terminal = True  # type: ignore[attr-defined]
         # A warning of LSODA only repeats that rows are missing.
-        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+        with (
+            np.errstate(all="ignore"),
+            warnings.catch_warnings(action="ignore"),
+            _ALONE.get(name, contextlib.nullcontext()),
+        ):
             try:
                 return solve_ivp(
                     self._counted,

@@ -2,13 +2,16 @@
 
 import math
 import re
+import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from random import Random
 from typing import Any
 
 import numpy as np
 import pytest
 
+from pyharness import solve
 from pyharness.methods.scipy_ivp import FINEST, finest_tolerance, scipy_method
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
@@ -308,3 +311,21 @@ def test_a_torque_that_needs_the_attitude_needs_one(name: str) -> None:
         scene = Scene("", _OMEGA, _MOMENTS, torque=torque)
         with pytest.raises(InputError, match=r"depends on the attitude .* give attitude=True"):
             scipy_method(name)(scene, [1.0], 1e-6)
+
+
+def test_threads_may_use_lsoda_at_a_time() -> None:
+    """LSODA of older versions of SciPy can't alternate between two integrations."""
+
+    def slow(t: float, w: Any) -> Any:
+        time.sleep(1e-5)  # another thread runs
+        return -0.3 * w
+
+    body = Scene("slow", (0.3, 1.1, -0.7), moments=(3.0, 2.0, 1.2), torque=opaque(slow))
+
+    def last(_: int) -> list[float]:
+        found: list[float] = solve(body, [1.0], "lsoda", 1e-6).omega[-1].tolist()
+        return found
+
+    with ThreadPoolExecutor(4) as pool:
+        results = list(pool.map(last, range(8)))
+    assert all(result == results[0] for result in results)

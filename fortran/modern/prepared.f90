@@ -88,7 +88,7 @@ contains
   end subroutine solve_recorded
 
   subroutine solve_near_one(packed, n_packed, omega0, t_end, omega, status, steps, found)
-    !! Solve in units that bring omega near 1. The scale is a power of two, so no digit changes.
+    !! Solve in units that bring omega near 1.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)  !! rad/s
@@ -99,10 +99,29 @@ contains
     real(dp), intent(out) :: found(2)  !! relative, so independent of the units
     real(dp), target :: copy(0:n_packed - 1)
     real(dp) :: start(3)
-    real(dp) :: reach      ! bound of omega0 and of what the torque adds, rad/s
-    real(dp) :: share      ! part of its amplitude that a wave reaches
     real(dp) :: time       ! in the new units
     integer :: power       ! omega is 2**power times its value in the new units
+
+    call bring_near_one(packed, n_packed, omega0, t_end, copy, start, time, power)
+    if (power == 0) then
+      call solve_as_given(packed, n_packed, omega0, t_end, omega, status, steps, found)
+      return
+    end if
+    call solve_as_given(copy, n_packed, start, time, omega, status, steps, found)
+    call scale_back(power, omega, status)
+  end subroutine solve_near_one
+
+  pure subroutine bring_near_one(packed, n_packed, omega0, t_end, copy, start, time, power)
+    !! Convert a problem to units that bring omega near 1. The scale is a power of two, so no digit
+    !! changes. If no other units are needed, or if they don't serve, the power is 0.
+    integer, intent(in) :: n_packed
+    real(dp), intent(in) :: packed(0:n_packed - 1)
+    real(dp), intent(in) :: omega0(3)  !! rad/s
+    real(dp), intent(in) :: t_end      !! s
+    real(dp), intent(out) :: copy(0:n_packed - 1), start(3), time !! in the new units
+    integer, intent(out) :: power      !! omega is 2**power times its value in the new units
+    real(dp) :: reach      ! bound of omega0 and of what the torque adds, rad/s
+    real(dp) :: share      ! part of its amplitude that a wave reaches
     integer :: code, i
 
     reach = max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3)))
@@ -139,22 +158,25 @@ contains
     ! matter.
     if (.not. (all(abs(copy) <= huge(time)) .and. abs(time) <= huge(time) &
                .and. (abs(time) >= tiny(time) .or. .not. abs(t_end) > 0.0_dp))) power = 0
-    if (power == 0) then
-      call solve_as_given(packed, n_packed, omega0, t_end, omega, status, steps, found)
-      return
-    end if
     do i = 1, 3
       start(i) = scale(omega0(i), -power)
     end do
-    call solve_as_given(copy, n_packed, start, time, omega, status, steps, found)
+  end subroutine bring_near_one
+
+  pure subroutine scale_back(power, omega, status)
+    !! Convert omega back from the units of `bring_near_one`.
+    integer, intent(in) :: power
+    real(dp), intent(inout) :: omega(3)
+    integer, intent(inout) :: status
+    integer :: i
+
     ! Without a result omega has no meaning and may be NaN.
-    if (is_result(status)) then
-      do i = 1, 3
-        omega(i) = scale(omega(i), power)
-      end do
-      if (.not. all(abs(omega) <= huge(time))) status = OVERFLOW
-    end if
-  end subroutine solve_near_one
+    if (.not. is_result(status)) return
+    do i = 1, 3
+      omega(i) = scale(omega(i), power)
+    end do
+    if (.not. all(abs(omega) <= huge(omega))) status = OVERFLOW
+  end subroutine scale_back
 
   subroutine solve_as_given(packed, n_packed, omega0, t_end, omega, ended, count, found)
     !! Solve without regard to the scale. Without a result omega has no meaning.
@@ -271,8 +293,12 @@ contains
     type(problem_t) :: problem
     type(solution_t) :: solution
     real(dp), target :: times(1), attitudes(4, 0:1)
+    real(dp), target :: copy(0:n_packed - 1) ! in units that bring omega near 1
+    real(dp) :: omega0(3)   ! in these units
+    real(dp) :: largest     ! omega at time 0, rad/s
     real(dp) :: both(3, 2)  ! moments and their low parts, kg m2
     integer :: code, n_rows
+    integer :: power        ! of two, by which omega was divided
 
     code = int(packed(METHOD))
     times(1) = t_end
@@ -290,11 +316,22 @@ contains
         call torque_free_attitude_rows(both, start, 1, times, state(:3), state(4:), n_rows, status)
       end if
       if (status == REFUSED .and. code /= CLOSED_FORM) then
-        call unpack(packed, n_packed, problem)
+        power = 0
+        largest = maxval(abs(start(:3)))
+        if (.not. (largest <= LARGE .and. largest*LARGE >= 1.0_dp)) then
+          call bring_near_one(packed, n_packed, start(:3), t_end, copy, omega0, times(1), power)
+        end if
+        if (power == 0) then
+          omega0 = start(:3)
+          times(1) = t_end
+          call unpack(packed, n_packed, problem)
+        else
+          call unpack(copy, n_packed, problem)
+        end if
         attitudes(:, 0) = start(4:)
         solution%rows(1:3, 1:1) => state(:3)
         solution%attitudes(1:4, 0:1) => attitudes
-        associate (request => request_t(start(:3), packed(TOLERANCE), packed(EFFORT), times))
+        associate (request => request_t(omega0, packed(TOLERANCE), packed(EFFORT), times))
           if (code == SPACE_TORQUE) then
             call space_torque_solve(problem, maxval(packed(MOMENTS:MOMENTS + 2)) &
                                     /packed(MOMENTS:MOMENTS + 2), request, solution)
@@ -304,6 +341,7 @@ contains
         end associate
         state(4:) = attitudes(:, 1)
         status = solution%status
+        call scale_back(power, state(:3), status)
         steps = solution%steps
         found = [solution%error, solution%growth]
       end if

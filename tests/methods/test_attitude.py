@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
+import pyharness
 from pyharness import (
     InputError,
     Scene,
@@ -360,3 +361,24 @@ def test_growth_has_the_way_in_it() -> None:
     largest = float(np.abs(solve(case_scene(4), np.linspace(0.0, 5.0, 200).tolist()).omega).max())
     assert bare.growth is not None
     assert found.growth == pytest.approx(bare.growth * (1.0 + 0.5 * largest * 50.0), rel=0.05)
+
+
+@pytest.mark.parametrize("frame", ["body", "space"])
+@pytest.mark.parametrize("factor", [2.0**-560, 2.0**-505, 2.0**505])
+def test_prepared_series_and_batches_rescale_omega_and_torque(factor: float, frame: str) -> None:
+    """Products of such omegas underflow or overflow; the motion is the same in another time."""
+    # The square of the smallest factor is 0.
+    push = (0.1, 0.2, -0.1) if factor * factor > 0.0 else (0.0, 0.0, 0.0)
+
+    def states(scale: float) -> list[Any]:
+        law = TorqueLaw(constant=tuple(scale * scale * x for x in push), frame=frame)
+        omega, q = np.array([0.3, 1.1, -0.7]) * scale, (0.8, 0.0, 0.6, 0.0)
+        body = Scene("", omega, moments=(3.0, 2.0, 1.2), torque=law, attitude=q)
+        end = 2.5 / scale
+        alone, turned = prepare(body, "taylor", 1e-12, attitude=True)(tuple(omega), end, q)
+        many = pyharness.solve_many(body, end, attitude0=[q], method="taylor", tolerance=1e-12)
+        assert many.attitude is not None
+        return [np.array(alone) / scale, turned, many.omega[0] / scale, many.attitude[0]]
+
+    for found, wanted in zip(states(factor), states(1.0), strict=True):
+        assert found == pytest.approx(wanted, abs=1e-13)

@@ -120,10 +120,12 @@ def test_a_mistake_in_the_source_is_named(
     path.write_text(text)
     remark = fault in FIRST_ORDER
     status = 0 if remark else 1
-    words = ("--seed", "mistake", "--draws", "1")
-    record = _json(capsys, command_of(path), *words, "--order", "1", status=status)
+    # Without a scene without torque, the long motion is left out.
+    words = ("--seed", "mistake", "--cell")
+    record = _json(capsys, command_of(path), *words, "constant-0,wave-0", status=status)
     assert _faults(record) == ({fault} if fault else set())
-    assert _json(capsys, command_of(path), *words, "--order", "4", status=1)
+    if remark:
+        _json(capsys, command_of(path), *words, "wave-0", "--order", "4", status=1)
 
 
 PROGRAM = """

@@ -16,6 +16,9 @@ from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 
+_CALM = 1e3  # amplifications below it grow with the time, so that the last is the largest
+_MOST_ROWS = 16  # at which the amplification is computed
+
 
 def period_of(scene: Scene) -> float:
     """Return the period of omega (s) of a body without torque; 0 if there is none, or a torque."""
@@ -24,6 +27,25 @@ def period_of(scene: Scene) -> float:
     bare = principal(scene)[0]
     found = extension().torque_free_period(bare.euler_coefficients, remainders(bare), bare.omega)
     return float(found)
+
+
+def _largest_estimate(
+    scene: Scene, times: Sequence[float], noise: float
+) -> tuple[float | None, float | None]:
+    """Return the largest estimated error at any of the times (s), and the error amplification.
+
+    `noise` is that of `closed_form_estimate`. Near the separatrix the amplification at earlier
+    times may be the larger one. It is then computed at some of them too.
+    """
+    error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
+    if error is None or growth is None or growth < _CALM:
+        return error, growth
+    for row in {*np.linspace(0, len(times) - 1, _MOST_ROWS).astype(int).tolist()}:
+        other, larger = closed_form_estimate(scene, scene.omega, times[row], noise)
+        if other is None or larger is None:
+            return None, None
+        error, growth = max(error, other), max(growth, larger)
+    return error, growth
 
 
 def known_solution(
@@ -80,6 +102,6 @@ def known_solution(
     if status != COMPLETE:
         return trajectory_of(times, rows, n_rows, status, len(times), 0, attitudes=attitudes)
     noise = torque_noise(scene, scene.omega, times[-1])
-    error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
+    error, growth = _largest_estimate(scene, times, noise)
     status = SENSITIVE if is_sensitive(growth, tolerance, noise) else COMPLETE
     return trajectory_of(times, rows, n_rows, status, len(times), 0, error, growth, attitudes)

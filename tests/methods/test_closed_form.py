@@ -268,3 +268,17 @@ def test_what_the_sum_of_a_sphere_can_not_hold_is_added_at_the_end() -> None:
     scene = Scene("", (0.0, 1.0, 0.0), moments=(1.0,) * 3, torque=TorqueLaw(cosines=pushes))
     found = solve(scene, [1.0], "closed-form", 1e-9)
     assert found.omega[0, 1] == 1.0 + 2.0**-52
+
+
+def test_amplification_before_the_last_time_counts_near_the_separatrix() -> None:
+    moments = (1.908871055132049, 1.6944745539067607, 0.5085885178521218)
+    omega = (0.0012638412446339218, -0.40645864143219074, -3.387026803568728e-05)
+    scene = Scene("near the separatrix", omega, moments=moments)
+    alone = solve(scene, [9000.0], "closed-form", 1e-9)
+    both = solve(scene, [9000.0, 18365.77], "closed-form", 1e-9)
+    assert alone.growth is not None
+    assert both.growth is not None
+    assert both.error is not None
+    assert alone.ended == both.ended == "sensitive"
+    assert both.growth >= alone.growth > 1e7
+    assert both.error >= (alone.error or 0.0) > 1e-9

@@ -125,7 +125,7 @@ def _drawn(axes: Any) -> Iterator[tuple[str, tuple[Any, ...]]]:
 
 
 def _open_figure() -> "Figure | None":
-    """Return the figure that is open in matplotlib, and close it; None if none is open."""
+    """Return the figure that is open in matplotlib, and close it; None if no figure is open."""
     import sys
 
     if "matplotlib.pyplot" not in sys.modules:

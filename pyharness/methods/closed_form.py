@@ -32,15 +32,17 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return the largest estimated error at any of the times (s), and the error amplification.
+    """Return the estimated error and the error amplification, the largest at any of the times (s).
 
-    `noise` is that of `closed_form_estimate`. Near the separatrix the amplification at earlier
-    times may be the larger one. It is then computed at some of them too.
+    Both are computed at the last time. Near the separatrix, the amplification may be larger at an
+    earlier time than at the last; it is then also computed at some of the earlier times. `noise`
+    has the same meaning as in `closed_form_estimate`.
     """
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth
-    for row in {*np.linspace(0, len(times) - 1, _MOST_ROWS).astype(int).tolist()}:
+    rows = {*np.linspace(0, len(times) - 1, _MOST_ROWS).astype(int).tolist()}
+    for row in rows - {len(times) - 1}:
         other, larger = closed_form_estimate(scene, scene.omega, times[row], noise)
         if other is None or larger is None:
             return None, None

@@ -5,18 +5,10 @@ from random import Random
 
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw, Wave
+from pyharness.scenes.free_motions import KINDS
 from pyharness.scenes.free_motions import draw as draw_motion
 
-MOTIONS = (
-    "generic",
-    "near symmetry",
-    "near separatrix",
-    "middle axis",
-    "any axis",
-    "flat",
-    "symmetric",
-    "steady",
-)
+MOTIONS = tuple(kind for kind in KINDS if kind not in ("needle", "sphere"))
 TORQUES = ("constant", "linear", "slow waves", "fast wave", "sum")
 _WEAKEST, _STRONGEST = -9.0, -5.0  # powers of 10; torque over the largest gyroscopic torque
 

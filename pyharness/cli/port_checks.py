@@ -101,7 +101,8 @@ def requested_cells(
 
 
 def _self_test(options: argparse.Namespace, cells: Sequence[Cell]) -> int:
-    from pyharness.checks.plants.port_plants import PLANTS, as_check, report, self_test
+    from pyharness.checks.plants.port_plants import PLANTS
+    from pyharness.checks.plants.port_self_test import as_check, report, self_test
 
     found = []
     for caught in self_test(options.port, cells):

@@ -10,7 +10,8 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from pyharness import run_program
-from pyharness.checks.plants.port_plants import PLANTS, as_check, self_test
+from pyharness.checks.plants.port_plants import PLANTS
+from pyharness.checks.plants.port_self_test import as_check, self_test
 from pyharness.checks.port import Cell, compared, port, port_cells, random_cells
 from pyharness.checks.port_protocol import VARIABLES
 from pyharness.cli.main import main
@@ -152,7 +153,7 @@ def test_a_check_that_sees_nothing_would_fail_the_self_test(
         right = {**json.loads(line), "rows": [[float(x).hex() for x in row] for row in rows]}
         return compared(cell, twin, json.dumps(right).encode(), *rest)
 
-    monkeypatch.setattr("pyharness.checks.plants.port_plants.compared", blind)
+    monkeypatch.setattr("pyharness.checks.plants.port_self_test.compared", blind)
     cells = port_cells(["two-term"], [2], [CELL])
     missed = {
         each.plant.name for each in self_test(documented_command(), cells)

@@ -1,28 +1,18 @@
-"""Planted faults in the answers of a port, and the self-test of `verify --port` with them."""
+"""Planted faults in the answers of a port and in the requests to it."""
 
-import copy
-import json
 import math
-import random
-import shlex
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
-from pyharness.checks.check import Check, Name
-from pyharness.checks.port import Cell, compared
-from pyharness.checks.port_process import PortError, PortProcess
 from pyharness.checks.port_protocol import VARIABLES
-from pyharness.checks.report import checks_report, summary_page
 from pyharness.model.listing import Listing
-from pyharness.model.report import Report, counted
 
 Rows = list[list[float]]
 # A change of the parsed answer. It returns None if the fault has no meaning for this answer.
 AnswerFault = Callable[[dict[str, Any]], dict[str, Any] | None]
 # A change of the request, as if the port ignored a field of it.
 RequestFault = Callable[[dict[str, Any]], None]
-_MOST_CELLS = 24  # cells in which the faults are planted
 
 
 @dataclass(frozen=True)
@@ -36,42 +26,6 @@ class PortPlant:
     fault: str
     answer: AnswerFault | None = None
     request: RequestFault | None = None
-
-
-@dataclass(frozen=True)
-class Noticed:
-    """The runs in which a planted fault changed the port's answer, and those that failed.
-
-    Attributes
-    ----------
-    plant : PortPlant or None
-        The planted fault; None for the control without a fault.
-    changed : int
-        The number of runs in which the fault changed the answer; all runs for the control.
-    failed : int
-        The number of these runs whose check failed.
-    example : str
-        The id and the note of one failed check.
-    """
-
-    plant: PortPlant | None
-    changed: int
-    failed: int
-    example: str
-
-    @property
-    def passed(self) -> bool:
-        """Return whether each changed answer was noticed; for the control, whether none failed.
-
-        A fault that changed no answer, as a fault of the stop test in runs without a stop, passes.
-        The report counts such faults.
-        """
-        return self.changed == self.failed if self.plant else self.failed == 0
-
-    @property
-    def has_effect(self) -> bool:
-        """Return whether the planted fault changed an answer; true for the control."""
-        return self.plant is None or self.changed > 0
 
 
 def _middle(rows: Rows) -> int:
@@ -320,134 +274,3 @@ PLANTS = (
               request=_in_scene("initial_torque", change=lambda torque: None)),
 )  # fmt: skip
 """The planted faults: first those in the answers of a port, then those in the requests."""
-
-
-def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Noticed]:
-    """Yield what the check of a port notices, first without any fault, then with each fault.
-
-    A fault has to be noticed in each run in which it changes the port's answer. At most
-    `_MOST_CELLS` of the runs `cells`, chosen always in the same way, are used. If the port gives no
-    valid answer, only a failed control is yielded. `command` starts the port.
-    """
-    chosen = _chosen(cells)
-    try:
-        with PortProcess(command) as process:
-            yield from _planted(process, chosen)
-    except PortError as error:
-        yield Noticed(None, len(chosen), 1, str(error))
-
-
-def _chosen(cells: Sequence[Cell]) -> list[Cell]:
-    """Return at most `_MOST_CELLS` runs, with every program, if possible every case and ending."""
-    order = random.Random("self-test").sample(range(len(cells)), len(cells))
-    found: dict[tuple[object, ...], int] = {}
-    for n in order:
-        cell = cells[n]
-        label = cell.listing.label if len(found) < _MOST_CELLS // 2 else "any"
-        has_more = bool(cell.listing.readings), bool(cell.listing.conjectures)
-        found.setdefault((cell.listing.program, label, cell.scene.case, *has_more), n)
-    return [cells[n] for n in sorted(list(found.values())[:_MOST_CELLS])]
-
-
-def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Noticed]:
-    lines = [process.ask(cell.request) for cell in cells]
-    twins = [cell.twin() for cell in cells]
-    checked = [compared(*each) for each in zip(cells, twins, lines, strict=True)]
-    failed = [check for check in checked if not check.passed]
-    example = f"{failed[0].id}: {failed[0].note}" if failed else ""
-    yield Noticed(None, len(cells), len(failed), example)
-    answers = [_parsed(line) for line in lines]
-    for plant in PLANTS:
-        changed, notes = 0, []
-        for cell, twin, answer in zip(cells, twins, answers, strict=True):
-            faulty = _faulty(process, plant, cell, answer)
-            if faulty is None or _same(faulty, answer):
-                continue
-            changed += 1
-            try:
-                check = compared(cell, twin, _written(faulty))
-            except PortError as error:
-                check = replace(checked[0], name=cell.of, passed=False, note=str(error))
-            if not check.passed:
-                notes.append(f"{check.id}: {check.note}")
-        yield Noticed(plant, changed, len(notes), notes[0] if notes else "")
-
-
-def _faulty(
-    process: PortProcess, plant: PortPlant, cell: Cell, answer: dict[str, Any]
-) -> dict[str, Any] | None:
-    if plant.answer is not None:
-        return plant.answer(copy.deepcopy(answer))
-    assert plant.request is not None
-    asked = json.loads(cell.request)
-    before = copy.deepcopy(asked)
-    plant.request(asked)
-    return None if asked == before else _parsed(process.ask(json.dumps(asked).encode()))
-
-
-def _parsed(line: bytes) -> dict[str, Any]:
-    """Return a valid answer as a dictionary, with floats in place of numbers that are texts."""
-    answer: dict[str, Any] = json.loads(line)
-    answer["rows"] = [[_float(x) for x in row] for row in answer["rows"]]
-    if answer["stop"] is not None:
-        answer["stop"]["quotient"] = _float(answer["stop"]["quotient"])
-    return answer
-
-
-def _float(x: float | str) -> float:
-    if isinstance(x, str):
-        return float.fromhex(x) if "x" in x.lower() else float(x)
-    return float(x)
-
-
-def _written(answer: dict[str, Any]) -> bytes:
-    rows = {"rows": [[x.hex() for x in row] for row in answer["rows"]]} if "rows" in answer else {}
-    stop = answer.get("stop")
-    if stop is not None:
-        rows["stop"] = {**stop, "quotient": stop["quotient"].hex()}  # type: ignore[assignment]
-    return json.dumps({**answer, **rows}).encode()
-
-
-def _same(faulty: dict[str, Any], answer: dict[str, Any]) -> bool:
-    # As text, because NaN differs from itself, and because zeros have a sign.
-    return json.dumps(faulty, sort_keys=True) == json.dumps(answer, sort_keys=True)
-
-
-def as_check(noticed: Noticed) -> Check:
-    """Return the result for a planted fault as a check, which passes if the fault was noticed.
-
-    Its value is the number of runs in which the fault was noticed.
-    """
-    name = Name("self-test", "port", noticed.plant.name if noticed.plant else "none")
-    return Check(name, noticed.passed, float(noticed.failed), None, None, _told(noticed))
-
-
-def _told(noticed: Noticed) -> str:
-    if noticed.plant is None:
-        return noticed.example or f"nothing fails in {counted(noticed.changed, 'run')}"
-    if not noticed.has_effect:
-        return "changes no answer in these runs"
-    seen = f"noticed in {noticed.failed} of {counted(noticed.changed, 'changed run')}"
-    return f"{seen} ({noticed.example})" if noticed.example else seen
-
-
-def report(command: str, found: Sequence[Noticed]) -> Report:
-    """Return the report of the self-test: for each planted fault, in how many runs it was noticed.
-
-    `command` started the port, and `found` has the results, the control first.
-    """
-    again = f"python -m pyharness verify --port {shlex.quote(command)} --self-test"
-    lines = []
-    for each in found:
-        plant = each.plant
-        name, fault = (plant.name, plant.fault) if plant else ("none", "no fault: nothing may fail")
-        lines += [f"{'' if each.passed else 'FAILED '}{name}: {fault}", f"  {_told(each)}"]
-    missed = sum(not each.passed for each in found)
-    idle = sum(not each.has_effect for each in found)
-    end = f"{missed} not as it should be" if missed else "each noticed"
-    end += f", but {idle} without effect in these runs" if idle else ""
-    title = [f"{command}: faults planted in its answers"]
-    text = [title, lines, [f"{counted(len(found) - 1, 'plant')} and a control: {end}"]]
-    checks = [replace(as_check(each), again=again) for each in found]
-    page = summary_page("verify --port --self-test", checks, title)
-    return checks_report("verify", checks, text, page, port=command)

@@ -75,11 +75,14 @@ def test_the_reference_agrees() -> None:
         drawn, _ = drawn_with_truth(kind, 60)
         found = solve_many(TOP, tolerance=1e-9, **drawn)
         assert found.attitude is not None
-        for row in (0, 7):
-            scene = replace(scene_of(drawn, row), attitude=drawn["attitude0"][row])
-            truth = solve(scene, [drawn["t_end"][row]], "reference", attitude=True).attitude
-            assert truth is not None
-            assert angle_between(found.attitude[row : row + 1], truth[-1:])[0] <= 1e-9
+        # Some five radians within 1 s: the reference takes seconds for a long motion.
+        times = np.abs(drawn["t_end"])
+        turns = np.where(times < 1.0, np.linalg.norm(drawn["omega0"], axis=1) * times, np.inf)
+        row = int(np.argmin(np.abs(turns - 5.0)))
+        scene = replace(scene_of(drawn, row), attitude=drawn["attitude0"][row])
+        truth = solve(scene, [drawn["t_end"][row]], "reference", attitude=True).attitude
+        assert truth is not None
+        assert angle_between(found.attitude[row : row + 1], truth[-1:])[0] <= 1e-9
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -7,7 +7,7 @@ module taylor
   use problem, only: problem_t, request_t, solution_t
   use series, only: LONG
   use statuses, only: COMPLETE, GAVE_UP, SENSITIVE
-  use taylor_march, only: attempt_t, coupling_of, march
+  use taylor_march, only: attempt_t, coupling_of, march, TOO_LONG
   use taylor_rows, only: outcome_t, room_t
   use torque_noise, only: torque_noise_of, wave_rounding_of
   use torque_terms, only: wave_t, waves_of
@@ -91,7 +91,9 @@ contains
     real(dp) :: growth
     real(dp) :: error    ! error of this integration, as far as it is known, relative
     real(dp) :: blurred  ! by rounding at the end, relative
+    logical :: too_coarse ! whether the motion is too long for variations that are not precise
     logical :: again    ! whether the amplification is known too coarsely
+    logical :: blurs    ! whether rounding errors may exceed the tolerance
 
     t_end = request%times(size(request%times))
     planned = PLANNED_GROWTH
@@ -102,6 +104,7 @@ contains
     ! Where a precise integration is likely to exceed the work limit, another one is tried first.
     farthest = coupling_of(problem%coefficients)*maxval(abs(request%omega))*abs(t_end)
     attempt%precise = farthest > LONG .and. farthest < 0.25_dp*most
+    attempt%turn_limit = LONG
     attempt%stride = 1 + int(STEPS_BETWEEN_LOOKS/cost, int64)
     solution%needed = 0.0_dp
     call waves_of(problem, waves)
@@ -109,19 +112,30 @@ contains
       attempt%most_steps = most - spent
       call march(problem, request, attempt, room, waves, solution, outcome)
       spent = spent + real(outcome%steps, dp)
+      if (solution%status == TOO_LONG) then
+        ! If a precise integration would exceed the work limit, this one goes to the end.
+        attempt%precise = outcome%ahead < most - spent
+        attempt%turn_limit = huge(spent)
+        cycle
+      end if
       ! If a perturbation grew so much, rounding chose the trajectory, which ends in another motion.
       growth = outcome%growth
       if (outcome%largest > CHOOSING) growth = outcome%largest
+      too_coarse = .not. attempt%precise .and. outcome%precise_steps > LONG
       if (solution%status /= COMPLETE) exit
-      if (outcome%finest .and. (attempt%precise .or. growth <= planned)) exit
-      again = growth > planned .or. (.not. attempt%precise .and. outcome%precise_steps > LONG)
-      attempt%precise = attempt%precise .or. again
+      if (outcome%finest .and. .not. too_coarse .and. (attempt%precise .or. growth <= planned)) exit
+      again = growth > planned .or. too_coarse
       ! Where perturbations grow, a few steps cause most of the error; their estimates may be wrong
       ! by chance.
       error = max(outcome%error, outcome%least)*(1.0_dp + min(growth, PLANNED_GROWTH)/DOUBTED)
+      blurs = again .and. ROUNDING*growth > UNSURE*request%tolerance
+      ! The error may be as small already as another integration would make it.
+      if (attempt%precise .and. .not. blurs .and. &
+          error*max(SAFETY, SAFETY*growth/PLANNED_GROWTH) <= TRUSTED*request%tolerance) exit
+      attempt%precise = attempt%precise .or. again
       ! Exit as well if a precise integration would take too many steps.
       if (attempt%precise .and. outcome%precise_steps > most - spent) exit
-      if (again .and. ROUNDING*growth > UNSURE*request%tolerance) then
+      if (blurs) then
         ! Before the result is called sensitive: long steps may overestimate the amplification near
         ! the separatrix.
         attempt%tolerance = 0.0_dp
@@ -136,6 +150,8 @@ contains
       end if
     end do
     solution%steps = outcome%steps
+    ! Errors grow in proportion to the rotation even where nothing amplifies them.
+    if (too_coarse) growth = max(growth, outcome%precise_steps)
     ! The factor for the attitude is known, and requires no precise integration.
     growth = growth*outcome%way
     blurred = ROUNDING*growth*(1.0_dp + real(solution%steps, dp)/WALK)

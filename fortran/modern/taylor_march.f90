@@ -5,15 +5,15 @@ module taylor_march
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use problem, only: problem_t, request_t, solution_t
-  use series, only: LEAST_LOCAL_TOLERANCE, LONG, SLACK
+  use series, only: LEAST_LOCAL_TOLERANCE, SLACK
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use taylor_attitude, only: begin_attitude, expand_both, turn_error, turn_on
   use taylor_error, only: begin, count_step, estimate_truncation, &
                           estimate_truncation_from_rest, growths_of, likely_remainder
-  use taylor_plan, only: plan
+  use taylor_plan, only: order_of_variations, plan
   use taylor_rows, only: add_last_row, add_rows, outcome_t, room_t, state_t
-  use taylor_series, only: expand, fitting, ORDER_LONG, ORDER_PRECISE, predict_step, &
-                           propagate_precisely, propagate_variations, rescale, size_of
+  use taylor_series, only: expand, fitting, predict_step, propagate_precisely, &
+                           propagate_variations, rescale, size_of
   use torque_terms, only: longest_turn, steps_by_turns, torque_terms_at, turn_waves, wave_t
   use two_words, only: two_sum
   implicit none(type, external)
@@ -28,7 +28,11 @@ module taylor_march
   real(dp), parameter :: GROWING = 1.3_dp
   ! Radians about the body in a step. Perturbations rotate even where omega is steady.
   real(dp), parameter :: A_STEP = 60.0_dp
-  real(dp), parameter :: A_PRECISE_STEP = 1.0_dp
+  real(dp), parameter :: A_PRECISE_STEP = 2.0_dp
+  ! If the local tolerance is below FINE, truncation errors of one sign would add up over many steps
+  ! to more than rounding errors do. Shorter steps have none.
+  real(dp), parameter :: A_FINE_STEP = 1.25_dp
+  real(dp), parameter :: FINE = 1e-17_dp
   ! Steps of a few lengths that recur would round the same factors with the same errors, and these
   ! errors would add up over many steps. Each step of a precise integration, such as any long one,
   ! is therefore shorter by a fraction of SPREAD that varies.
@@ -39,11 +43,14 @@ module taylor_march
   real(dp), parameter :: BY_CHANCE = 0.1_dp
   integer, parameter :: FEW_STEPS = 2
   real(dp), parameter :: NO_DIGIT = 1e100_dp ! a relative error that leaves no digit
+  ! A status that no caller sees: the motion is so long that a precise integration is needed.
+  integer, parameter, public :: TOO_LONG = -1
 
   ! One integration of a request.
   type, public :: attempt_t
     real(dp) :: tolerance      ! of this integration
     logical :: precise         ! propagate variations with high accuracy
+    real(dp) :: turn_limit     ! rotation of perturbations after which it ends unless precise, rad
     real(dp) :: most_steps     ! number of steps allowed
     integer(int64) :: stride   ! steps between polls for an interrupt
   end type attempt_t
@@ -80,6 +87,7 @@ contains
     integer(int64) :: decay   ! logarithm of the ratio of last terms over two orders
     integer(int64) :: part    ! 65536 over the order
     integer :: order
+    integer :: order_varied   ! of precise variations
     integer :: lasting        ! steps for which waves are advanced, not recomputed
     integer :: n_before       ! rows before this step
     real(dp) :: varied        ! multiple of GOLDEN modulo 1
@@ -109,7 +117,11 @@ contains
       found%finest = local_tolerance <= LEAST_LOCAL_TOLERANCE
       part = 65536/order
       coupling = coupling_of(problem%coefficients)
-      farthest = merge(A_PRECISE_STEP, A_STEP, attempt%precise)
+      farthest = A_STEP
+      if (attempt%precise) then
+        farthest = merge(A_FINE_STEP, A_PRECISE_STEP, local_tolerance < FINE)
+        order_varied = order_of_variations(order, attempt%tolerance, local_tolerance)
+      end if
       lasting = steps_by_turns(local_tolerance)
       if (size(waves) > 0) longest = longest_turn(order, local_tolerance)
       s%torque = 0.0_dp
@@ -191,8 +203,7 @@ contains
         end if
         error = s%lanes(1, :)
         if (attempt%precise) then
-          call propagate_precisely(merge(ORDER_LONG, ORDER_PRECISE, &
-                                         coupling*now%scale*abs(t_end) > LONG), s)
+          call propagate_precisely(order_varied, s)
         else
           call propagate_variations(s)
         end if
@@ -236,6 +247,14 @@ contains
         call two_sum((now%t), h + now%t_low, now%t, now%t_low)
         rest = (t_end - now%t) - now%t_low
         h = next
+        if (.not. attempt%precise) then
+          if (coupling*now%scale*abs(now%t) > attempt%turn_limit) then
+            ! The rotation so far, extrapolated in proportion to the square of the time.
+            found%ahead = (coupling*now%scale*abs(t_end))*abs(t_end/now%t)/A_FINE_STEP
+            solution%status = TOO_LONG
+            exit
+          end if
+        end if
         if (found%steps >= next_look) then
           if (real(found%steps, dp) >= attempt%most_steps) then
             ! Extrapolate the steps so far in proportion to the time, or faster if the motion

@@ -11,7 +11,10 @@ module taylor_plan
 
   real(dp), parameter :: ALIKE = 0.05_dp ! weight of a radian of a wave in the local tolerance
 
-  public :: add_wave_rates, first_step, local_tolerance_of, plan, steady_rates
+  ! Order of precise variations at the smallest local tolerance: enough for 1e6 radians.
+  integer, parameter :: ORDER_FINEST = 18
+
+  public :: add_wave_rates, first_step, local_tolerance_of, order_of_variations, plan, steady_rates
 
 contains
 
@@ -119,5 +122,20 @@ contains
     bits = 1023 - ishft(transfer(local_tolerance, bits), -52)
     order_for = max(LEAST_ORDER, min(MOST_ORDER, 8 + 2*int((16*bits + 100)/100)))
   end function order_for
+
+  pure integer function order_of_variations(order, tolerance, local_tolerance)
+    !! Return the even order to which precise variations are propagated. Their errors grow in
+    !! proportion to the square of the time, as those of the motion do, for which reason the local
+    !! tolerance is smaller than the tolerance. Terms of omega decrease by its power 1/order.
+    integer, intent(in) :: order
+    real(dp), intent(in) :: tolerance, local_tolerance
+
+    order_of_variations = ORDER_FINEST
+    if (local_tolerance > LEAST_LOCAL_TOLERANCE) then
+      order_of_variations = 2*ceiling(1.0_dp + 0.5_dp*order &
+                                      *log(local_tolerance/tolerance)/log(local_tolerance))
+    end if
+    order_of_variations = max(LEAST_ORDER, min(order, order_of_variations))
+  end function order_of_variations
 
 end module taylor_plan

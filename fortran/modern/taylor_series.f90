@@ -29,8 +29,6 @@ module taylor_series
   integer, parameter :: ORDER_CARRIED = 7 ! order of the exponential
   real(dp), parameter :: EXPONENT = 3.0_dp ! largest norm of an exponent that is taken at once
   real(dp), parameter :: MOST_PARTS = 1e3_dp
-  ! Orders of precise variations. In a long motion, whose steps must not lose its phase, the higher.
-  integer, parameter, public :: ORDER_PRECISE = 10, ORDER_LONG = 14
   integer, parameter :: MOST_MOMENTS = 8 ! terms that count in means and moments
   integer :: k_
   ! Weights of term k: its integral over the step, and its integral times the time from the middle.
@@ -107,31 +105,30 @@ contains
   end subroutine propagate_variations
 
   ! unroll: propagate_precisely
-  pure subroutine propagate_precisely(order, s)
-    !! Propagate perturbations to higher order, by the linear part of the recurrence of the terms.
-    integer, intent(in) :: order       !! ORDER_PRECISE or ORDER_LONG
+  subroutine propagate_precisely(order, s)
+    !! Propagate perturbations as accurately as the motion, by the linear part of the recurrence of
+    !! the terms.
+    integer(c_int), intent(in), value :: order
     type(series_t), intent(inout) :: s
-    real(dp) :: d(4, 3, 0:ORDER_LONG)
-    real(dp) :: x(4), y(4), z(4)
+    real(dp) :: d(4, 3, 0:MOST_ORDER), products(4, 3)
     integer :: i, j, k
 
     d(:, :, 0) = s%lanes
     do k = 1, order
-      x = 0.0_dp
-      y = 0.0_dp
-      z = 0.0_dp
+      products = 0.0_dp
       do j = 0, k - 1
         do i = 1, 4
-          x(i) = x(i) + s%terms(2, j)*d(i, 3, k - 1 - j) + s%terms(3, j)*d(i, 2, k - 1 - j)
-          y(i) = y(i) + s%terms(1, j)*d(i, 3, k - 1 - j) + s%terms(3, j)*d(i, 1, k - 1 - j)
-          z(i) = z(i) + s%terms(1, j)*d(i, 2, k - 1 - j) + s%terms(2, j)*d(i, 1, k - 1 - j)
+          products(i, 1) = products(i, 1) &
+                           + (s%terms(2, j)*d(i, 3, k - 1 - j) + s%terms(3, j)*d(i, 2, k - 1 - j))
+          products(i, 2) = products(i, 2) &
+                           + (s%terms(1, j)*d(i, 3, k - 1 - j) + s%terms(3, j)*d(i, 1, k - 1 - j))
+          products(i, 3) = products(i, 3) &
+                           + (s%terms(1, j)*d(i, 2, k - 1 - j) + s%terms(2, j)*d(i, 1, k - 1 - j))
         end do
       end do
-      d(:, 1, k) = (s%factors(1)/k)*x
-      d(:, 2, k) = (s%factors(2)/k)*y
-      d(:, 3, k) = (s%factors(3)/k)*z
-    end do
-    do k = 1, order
+      do i = 1, 3
+        d(:, i, k) = (s%factors(i)/k)*products(:, i)
+      end do
       s%lanes = s%lanes + d(:, :, k)
     end do
   end subroutine propagate_precisely

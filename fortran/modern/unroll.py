@@ -54,7 +54,6 @@ MODULES = (
 LEAST_ORDER, MOST_ORDER = 12, 24
 ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)
 ORDER_CARRIED = 7
-ORDERS_PRECISE = (10, 14)
 # The two factors of the products in equations 13-15, and the arrays in which the plain code stores
 # each unknown.
 FACTORS = (("y", "z"), ("x", "z"), ("x", "y"))
@@ -72,7 +71,8 @@ WIDE, LAG = 10, 2  # order from which sums are over all axes at once; newest ter
 TORQUE = 4 * (MOST_ORDER + 1)
 RATES = TORQUE + 4 * MOST_ORDER
 CHANGE = RATES + 4
-TURNS = CHANGE + 4 + 12
+LANES = CHANGE + 4  # perturbations, four numbers an axis
+TURNS = LANES + 12
 MORE_TURNS = 2  # terms of the attitude beyond the order: the first of the truncation error
 HALF = TURNS + 4 * (MOST_ORDER + MORE_TURNS + 1)
 TURN = HALF + 4
@@ -142,13 +142,13 @@ def fortran_source(text: str, level: str, file: str) -> str:
         "expand": fortran_door("expand", "taylor_terms", level),
         "expand_both": fortran_door("expand_both", "attitude_terms", level),
         "multiply": fortran_multiply(),
-        "propagate_precisely": fortran_precise(),
+        "propagate_precisely": fortran_door("propagate_precisely", "variation_terms", level),
         "many_step": many_steps(),
         "many_attitude": attitude_sums(),
     }
     if level == "plain":
         written["expand"] = fortran_terms()
-        del written["expand_both"]
+        del written["expand_both"], written["propagate_precisely"]
     blocks = re.split(r" *! unroll: (\w+)\n(.*?) *! end unroll\n", text, flags=re.DOTALL)
     parts = [blocks[0]]
     for name, as_written, rest in zip(blocks[1::3], blocks[2::3], blocks[3::3], strict=True):
@@ -293,42 +293,6 @@ def fortran_multiply() -> Iterator[str]:
     yield "end subroutine multiply"
 
 
-def fortran_precise() -> Iterator[str]:
-    """Yield the linear part of the recurrence for vectors side by side, with a loop an order."""
-    names = [f"{name}{k}" for k in range(ORDERS_PRECISE[-1] + 1) for name in "xyz"]
-    yield "pure subroutine propagate_precisely(order, s)"
-    yield "  integer, intent(in) :: order"
-    yield "  type(series_t), intent(inout) :: s"
-    yield from (f"  real(dp) :: {name}" for name in names)
-    yield "  integer :: i"
-    yield "  select case (order)"
-    for order in ORDERS_PRECISE:
-        yield f"  case ({order})"
-        yield from (f"  {line}" for line in precise_loop(order))
-    yield "  end select"
-    yield "end subroutine propagate_precisely"
-
-
-def precise_loop(order: int) -> Iterator[str]:
-    """Yield the loop over the vectors for the terms up to `order`."""
-    yield "  do i = 1, 4"
-    yield from (f"    {name}0 = s%lanes(i, {axis})" for axis, name in enumerate("xyz", 1))
-    for k in range(1, order + 1):
-        for axis, (name, (u, v)) in enumerate(zip("xyz", FACTORS, strict=True), 1):
-            start = ""
-            for j in range(k - 1, -1, -1):
-                for one, other in ((u, v), (v, u)):
-                    place = f"s%terms({'xyz'.index(one) + 1}, {j})"
-                    yield f"    {name}{k} = {start}{place}*{other}{k - 1 - j}"
-                    start = f"{name}{k} + "
-            yield f"    {name}{k} = (s%factors({axis})*(1.0_dp/{k}.0_dp))*{name}{k}"
-    for axis, name in enumerate("xyz", 1):
-        yield f"    s%lanes(i, {axis}) = {name}0"
-        for k in range(1, order + 1):
-            yield f"    s%lanes(i, {axis}) = s%lanes(i, {axis}) + {name}{k}"
-    yield "  end do"
-
-
 # ---- C ------------------------------------------------------------------------------------------
 
 
@@ -345,6 +309,7 @@ def c_source(level: str) -> Iterator[str]:
 #define PARTS2(q) _mm256_permute4x64_pd(q, _MM_SHUFFLE(1, 0, 3, 2))
 #define PARTS3(q) _mm256_permute4x64_pd(q, _MM_SHUFFLE(0, 1, 2, 3))
 #define AXIS(v, n) _mm256_permute4x64_pd(v, 0x55 * (n - 1))
+#define EACH(x) _mm256_broadcast_sd(&(x))
 #define BOTH(low, high) _mm512_insertf64x4(_mm512_castpd256_pd512(low), high, 1)
 #define FOLDED(v) _mm256_add_pd(_mm512_castpd512_pd256(v), _mm512_extractf64x4_pd(v, 1))
 """.splitlines()
@@ -354,7 +319,15 @@ def c_source(level: str) -> Iterator[str]:
             yield "{"
             yield from (f"  {line}" for line in c_terms(order, name == "both", level == "avx512"))
             yield "}\n"
-    for name, entry in (("terms", "taylor_terms"), ("both", "attitude_terms")):
+        yield f"static void variations_{order}(double *restrict s)"
+        yield "{"
+        yield from (f"  {line}" for line in c_variations(order, level == "avx512"))
+        yield "}\n"
+    for name, entry in (
+        ("terms", "taylor_terms"),
+        ("both", "attitude_terms"),
+        ("variations", "variation_terms"),
+    ):
         yield f"void {entry}_{level}(int order, double *s)"
         yield "{"
         yield "  switch (order) {"
@@ -467,6 +440,85 @@ def attitude_term(k: int, wide: bool) -> Iterator[str]:
         yield f"const __m256d z{k} = _mm256_mul_pd({first});"
     yield f"const __m256d k{k} = _mm256_add_pd(y{k}, z{k});"
     yield f"_mm256_store_pd(s + {TURNS + 4 * k}, k{k});"
+
+
+def c_variations(order: int, wide: bool) -> Iterator[str]:
+    """Yield the linear part of the recurrence for four perturbations of omega, one a lane.
+
+    Term k of the perturbation of an axis is v1_k, v2_k or v3_k. A wide register has the terms of
+    two axes, and the terms of omega that they are multiplied by. Two orders are summed at once, so
+    that each loaded term is used twice. Products with the newest terms are added last.
+    """
+    pairs = {axis: [each for each in (1, 2, 3) if each != axis] for axis in (1, 2, 3)}
+    yield f"const __m256d v1_0 = {load(LANES)}, v2_0 = {load(LANES + 4)}, v3_0 = {load(LANES + 8)};"
+    for axis, (u, v) in pairs.items():
+        yield f"const __m256d f{axis} = EACH(s[{RATES + axis - 1}]);"
+        # Axis u is multiplied by the omega of axis v, and the other way round.
+        for mine, other in ((u, v), (v, u)):
+            yield f"const __m256d n{axis}{mine} = _mm256_mul_pd(f{axis}, EACH(s[{other - 1}]));"
+    yield "__m256d sum1 = v1_0, sum2 = v2_0, sum3 = v3_0;"
+    yield from older_factors(0, wide)
+    for k in range(1, order + 1, 2):
+        yield from (line for j in (k - 1, k) if j for line in omega_factors(j, wide))
+        for i in range(k):
+            for axis, m in ((axis, m) for axis in pairs for m in (k, k + 1)):
+                if m - 1 - i > 0:
+                    yield from older_product(axis, pairs[axis], m, i, wide)
+        for m in (k, k + 1):
+            for axis, (u, v) in pairs.items():
+                value = f"_mm256_mul_pd(n{axis}{u}, v{u}_{m - 1})"
+                if m > 1:
+                    older = f"FOLDED(e{axis}_{m})" if wide else f"e{axis}_{m}"
+                    older = f"_mm256_mul_pd(f{axis}, {older})"
+                    value = f"_mm256_fmadd_pd(n{axis}{u}, v{u}_{m - 1}, {older})"
+                value = f"_mm256_fmadd_pd(n{axis}{v}, v{v}_{m - 1}, {value})"
+                value = f"_mm256_mul_pd({value}, _mm256_set1_pd(1.0 / {m}))"
+                yield f"const __m256d v{axis}_{m} = {value};"
+                yield f"sum{axis} = _mm256_add_pd(sum{axis}, v{axis}_{m});"
+            yield from older_factors(m, wide)
+    yield from (f"_mm256_store_pd(s + {LANES + 4 * axis - 4}, sum{axis});" for axis in pairs)
+
+
+def older_factors(k: int, wide: bool) -> Iterator[str]:
+    """Yield the registers of two axes that term k of the perturbations contributes to products."""
+    if wide:
+        for axis, u, v in ((1, 2, 3), (2, 1, 3), (3, 1, 2)):
+            yield f"const __m512d vv{axis}_{k} = BOTH(v{u}_{k}, v{v}_{k});"
+
+
+def omega_factors(j: int, wide: bool) -> Iterator[str]:
+    """Yield the registers that term j of omega contributes to products."""
+    if not wide:
+        yield from (
+            f"const __m256d w{axis}_{j} = EACH(s[{4 * j + axis - 1}]);" for axis in (1, 2, 3)
+        )
+        return
+    yield f"const __m512d w_{j} = _mm512_broadcast_f64x4({load(4 * j)});"
+    for axis, u, v in ((1, 2, 3), (2, 1, 3), (3, 1, 2)):
+        places = ", ".join([str(v - 1)] * 4 + [str(u - 1)] * 4)
+        yield (
+            f"const __m512d ww{axis}_{j} = "
+            f"_mm512_permutexvar_pd(_mm512_setr_epi64({places}), w_{j});"
+        )
+
+
+def older_product(axis: int, pair: list[int], m: int, i: int, wide: bool) -> Iterator[str]:
+    """Yield the sum e for term m of an axis with the product of term i of the perturbations."""
+    u, v = pair
+    j, total = m - 1 - i, f"e{axis}_{m}"
+    if wide:
+        given = f"vv{axis}_{i}, ww{axis}_{j}"
+        if i == 0:
+            yield f"__m512d {total} = _mm512_mul_pd({given});"
+        else:
+            yield f"{total} = _mm512_fmadd_pd({given}, {total});"
+        return
+    for n, (mine, other) in enumerate(((u, v), (v, u))):
+        given = f"v{mine}_{i}, w{other}_{j}"
+        if i == 0 and n == 0:
+            yield f"__m256d {total} = _mm256_mul_pd({given});"
+        else:
+            yield f"{total} = _mm256_fmadd_pd({given}, {total});"
 
 
 def c_over(value: str, k: int) -> str:

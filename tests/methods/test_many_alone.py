@@ -270,7 +270,7 @@ def test_a_prepared_solver_of_many_starts_has_its_work_limit() -> None:
     scene = case_scene(5)
     starts = np.tile(scene.omega, (2, 1))
     ample, short = (prepare(scene, "taylor", effort=effort).many for effort in (1.0, 1e-3))
-    assert (ample(starts, 3e3)[1] == Statuses.COMPLETE).all()
+    assert (ample(starts, 3e3)[1] == Statuses.SENSITIVE).all()
     assert (short(starts, 3e3)[1] == Statuses.GAVE_UP).all()
 
 

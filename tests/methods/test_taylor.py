@@ -275,6 +275,41 @@ def test_growth_of_a_long_motion_does_not_lose_its_phase() -> None:
     assert found.growth == pytest.approx(shear, rel=0.1)
 
 
+@pytest.mark.parametrize(("case", "growth"), [(5, 900.0), (7, 110.0)])
+def test_growth_of_a_motion_that_becomes_fast_is_that_of_every_tolerance(
+    case: int, growth: float
+) -> None:
+    """The start does not show that the motion is long: the torque increases omega to 600 rad/s."""
+    for tolerance in (1e-3, 1e-6, 1e-9, 1e-12):
+        found = solve(case_scene(case), [300.0], "taylor", tolerance)
+        assert found.growth == pytest.approx(growth, rel=0.15), tolerance
+        # Only the beginning is integrated twice.
+        assert found.steps < found.evaluations < 1.05 * found.steps
+
+
+def test_a_long_motion_is_not_called_sensitive_by_chance() -> None:
+    found = solve(case_scene(7), [1000.0], "taylor", 1e-6)
+    assert found.ended == "complete"
+    assert found.growth == pytest.approx(222.0, rel=0.05)
+
+
+def test_variations_are_as_accurate_as_the_motion() -> None:
+    """Variations of a fixed order lost their phase in 190 000 steps: 1e-3 was exceeded unseen."""
+    wave = (-4.738442472713716, -5.436985716429409, 8.688557959572783), 0.8007463433344562
+    scene = Scene(
+        "",
+        (-1.1357864924906, 0.8281719570376277, 0.7690656766038253),
+        moments=(32.355947334924124, 13.540422433697994, 20.00696713406161),
+        torque=TorqueLaw(sines=[wave]),
+    )
+    time = [16849.658046512755]
+    truth = solve(scene, time, "taylor", 1e-12).omega
+    for tolerance in (1e-3, 1e-4):
+        found = solve(scene, time, "taylor", tolerance)
+        assert found.error is not None
+        assert np.abs(found.omega - truth).max() <= found.error * np.abs(truth).max()
+
+
 def test_growth_from_few_starts_is_seen() -> None:
     """Near the separatrix, the motion amplifies most from the few starts near the middle axis."""
     moments = (1.908871055132049, 1.6944745539067607, 0.5085885178521218)

@@ -94,7 +94,7 @@ def test_growth_of_several_times_is_the_largest_of_any(number: int) -> None:
     assert max(each) > 20.0 * each[-1]
     together = solve(of.scene, of.times, "taylor", of.tolerance).growth or 0.0
     # The growth is measured at the end of the block of steps that contains the time.
-    assert 0.8 * max(each) < together < 2.5 * max(each)
+    assert 0.7 * max(each) < together < 2.5 * max(each)
 
 
 def test_is_made_again_where_much_grows_and_hardly_else() -> None:
@@ -195,7 +195,9 @@ def test_growth_on_the_middle_axis_is_exponential() -> None:
 
 def test_growth_stands_where_the_way_is_too_long_to_measure_it_again() -> None:
     found = solve(Scene("", (0.0, 2.0, 0.0), BODY), [2e7], "taylor", 1e-6)
-    assert (found.ended, found.evaluations == found.steps) == ("sensitive", True)
+    assert found.ended == "sensitive"
+    # Only the beginning is integrated twice.
+    assert found.steps < found.evaluations < 1.01 * found.steps
 
 
 def test_growth_of_what_hardly_turns_is_one() -> None:

@@ -7,7 +7,7 @@ module taylor
   use problem, only: problem_t, request_t, solution_t
   use series, only: LONG
   use statuses, only: COMPLETE, GAVE_UP, SENSITIVE
-  use taylor_march, only: attempt_t, coupling_of, march, TOO_LONG
+  use taylor_march, only: A_PRECISE_STEP, attempt_t, coupling_of, march, TOO_LONG
   use taylor_rows, only: outcome_t, room_t
   use torque_noise, only: torque_noise_of, wave_rounding_of
   use torque_terms, only: wave_t, waves_of
@@ -121,7 +121,7 @@ contains
       ! If a perturbation grew so much, rounding chose the trajectory, which ends in another motion.
       growth = outcome%growth
       if (outcome%largest > CHOOSING) growth = outcome%largest
-      too_coarse = .not. attempt%precise .and. outcome%precise_steps > LONG
+      too_coarse = .not. attempt%precise .and. outcome%turned > LONG
       if (solution%status /= COMPLETE) exit
       if (outcome%finest .and. .not. too_coarse .and. (attempt%precise .or. growth <= planned)) exit
       again = growth > planned .or. too_coarse
@@ -134,7 +134,7 @@ contains
           error*max(SAFETY, SAFETY*growth/PLANNED_GROWTH) <= TRUSTED*request%tolerance) exit
       attempt%precise = attempt%precise .or. again
       ! Exit as well if a precise integration would take too many steps.
-      if (attempt%precise .and. outcome%precise_steps > most - spent) exit
+      if (attempt%precise .and. outcome%turned > A_PRECISE_STEP*(most - spent)) exit
       if (blurs) then
         ! Before the result is called sensitive: long steps may overestimate the amplification near
         ! the separatrix.
@@ -151,7 +151,7 @@ contains
     end do
     solution%steps = outcome%steps
     ! Errors grow in proportion to the rotation even where nothing amplifies them.
-    if (too_coarse) growth = max(growth, outcome%precise_steps)
+    if (too_coarse) growth = max(growth, outcome%turned)
     ! The factor for the attitude is known, and requires no precise integration.
     growth = growth*outcome%way
     blurred = ROUNDING*growth*(1.0_dp + real(solution%steps, dp)/WALK)

@@ -28,7 +28,7 @@ module taylor_march
   real(dp), parameter :: GROWING = 1.3_dp
   ! Radians about the body in a step. Perturbations rotate even where omega is steady.
   real(dp), parameter :: A_STEP = 60.0_dp
-  real(dp), parameter :: A_PRECISE_STEP = 2.0_dp
+  real(dp), parameter, public :: A_PRECISE_STEP = 2.0_dp
   ! If the local tolerance is below FINE, truncation errors of one sign would add up over many steps
   ! to more than rounding errors do. Shorter steps have none.
   real(dp), parameter :: A_FINE_STEP = 1.25_dp
@@ -280,7 +280,7 @@ contains
         end if
       end do
       call growths_of(attempt%precise, s%lanes, blocks, found%growth, found%largest)
-      found%precise_steps = coupling*now%scale*abs(t_end)/A_PRECISE_STEP
+      found%turned = coupling*now%scale*abs(t_end)
       found%scale = now%scale
       found%error = now%worst
       if (.not. maxval(abs(s%lanes(1, :))) <= found%error) found%error = maxval(abs(s%lanes(1, :)))

@@ -45,7 +45,7 @@ module taylor_rows
     real(dp) :: growth   ! error amplification until any requested time
     real(dp) :: largest  ! error amplification until any time
     real(dp) :: ahead    ! estimated steps to the end, if the work limit is exceeded
-    real(dp) :: precise_steps ! fewest steps to the end of a precise integration
+    real(dp) :: turned   ! largest rotation of perturbations, rad
     logical :: finest    ! whether the local tolerance is the smallest
     real(dp) :: way      ! further factor for the attitude, which an error of omega keeps rotating
     real(dp) :: scale = 0.0_dp ! largest |omega|, rad/s

@@ -183,12 +183,14 @@ contains
     blocks%steps = blocks%steps + 1
     blocks%has_row(blocks%closed + 1) = blocks%has_row(blocks%closed + 1) .or. with_row
     ! Near the separatrix, the amplification may be much larger at a row than where its block ends.
+    ! The largest before and after the row counts.
     if (precise .and. with_row) then
       n = (blocks%closed*blocks%steps_a_block + blocks%steps)/STEPS_BETWEEN_LOOKS
       if (blocks%looks < FIRST_LOOKS + n) then
         blocks%looks = blocks%looks + 1
         largest = bounded(lanes(2:, :))
-        blocks%at_rows = max(blocks%at_rows, growth_until(blocks%closed, largest, blocks))
+        blocks%at_rows = max(blocks%at_rows, growth_until(blocks%closed, largest, blocks), &
+                             growth_until(blocks%closed, UNIT, blocks))
       end if
     end if
     if (blocks%steps < blocks%steps_a_block) return

@@ -247,13 +247,11 @@ contains
         call two_sum((now%t), h + now%t_low, now%t, now%t_low)
         rest = (t_end - now%t) - now%t_low
         h = next
-        if (.not. attempt%precise) then
-          if (coupling*now%scale*abs(now%t) > attempt%turn_limit) then
-            ! The rotation so far, extrapolated in proportion to the square of the time.
-            found%ahead = (coupling*now%scale*abs(t_end))*abs(t_end/now%t)/A_FINE_STEP
-            solution%status = TOO_LONG
-            exit
-          end if
+        if (.not. attempt%precise .and. coupling*now%scale*abs(now%t) > attempt%turn_limit) then
+          ! The rotation so far, extrapolated in proportion to the square of the time.
+          found%ahead = (coupling*now%scale*abs(t_end))*abs(t_end/now%t)/A_FINE_STEP
+          solution%status = TOO_LONG
+          exit
         end if
         if (found%steps >= next_look) then
           if (real(found%steps, dp) >= attempt%most_steps) then

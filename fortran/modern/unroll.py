@@ -76,6 +76,7 @@ TURNS = LANES + 12
 MORE_TURNS = 2  # terms of the attitude beyond the order: the first of the truncation error
 HALF = TURNS + 4 * (MOST_ORDER + MORE_TURNS + 1)
 TURN = HALF + 4
+OTHERS = {1: (2, 3), 2: (1, 3), 3: (1, 2)}  # the other two axes
 # Signs of the parts of q (0, x, y, z), axis by axis.
 SIGNS = ("-1.0, 1.0, 1.0, -1.0", "-1.0, -1.0, 1.0, 1.0", "-1.0, 1.0, -1.0, 1.0")
 
@@ -449,9 +450,8 @@ def c_variations(order: int, wide: bool) -> Iterator[str]:
     two axes, and the terms of omega that they are multiplied by. Two orders are summed at once, so
     that each loaded term is used twice. Products with the newest terms are added last.
     """
-    pairs = {axis: [each for each in (1, 2, 3) if each != axis] for axis in (1, 2, 3)}
     yield f"const __m256d v1_0 = {load(LANES)}, v2_0 = {load(LANES + 4)}, v3_0 = {load(LANES + 8)};"
-    for axis, (u, v) in pairs.items():
+    for axis, (u, v) in OTHERS.items():
         yield f"const __m256d f{axis} = EACH(s[{RATES + axis - 1}]);"
         # Axis u is multiplied by the omega of axis v, and the other way round.
         for mine, other in ((u, v), (v, u)):
@@ -461,11 +461,12 @@ def c_variations(order: int, wide: bool) -> Iterator[str]:
     for k in range(1, order + 1, 2):
         yield from (line for j in (k - 1, k) if j for line in omega_factors(j, wide))
         for i in range(k):
-            for axis, m in ((axis, m) for axis in pairs for m in (k, k + 1)):
-                if m - 1 - i > 0:
-                    yield from older_product(axis, pairs[axis], m, i, wide)
+            for axis in OTHERS:
+                for m in (k, k + 1):
+                    if m - 1 > i:
+                        yield from older_product(axis, m, i, wide)
         for m in (k, k + 1):
-            for axis, (u, v) in pairs.items():
+            for axis, (u, v) in OTHERS.items():
                 value = f"_mm256_mul_pd(n{axis}{u}, v{u}_{m - 1})"
                 if m > 1:
                     older = f"FOLDED(e{axis}_{m})" if wide else f"e{axis}_{m}"
@@ -476,13 +477,13 @@ def c_variations(order: int, wide: bool) -> Iterator[str]:
                 yield f"const __m256d v{axis}_{m} = {value};"
                 yield f"sum{axis} = _mm256_add_pd(sum{axis}, v{axis}_{m});"
             yield from older_factors(m, wide)
-    yield from (f"_mm256_store_pd(s + {LANES + 4 * axis - 4}, sum{axis});" for axis in pairs)
+    yield from (f"_mm256_store_pd(s + {LANES + 4 * axis - 4}, sum{axis});" for axis in OTHERS)
 
 
 def older_factors(k: int, wide: bool) -> Iterator[str]:
     """Yield the registers of two axes that term k of the perturbations contributes to products."""
     if wide:
-        for axis, u, v in ((1, 2, 3), (2, 1, 3), (3, 1, 2)):
+        for axis, (u, v) in OTHERS.items():
             yield f"const __m512d vv{axis}_{k} = BOTH(v{u}_{k}, v{v}_{k});"
 
 
@@ -494,7 +495,7 @@ def omega_factors(j: int, wide: bool) -> Iterator[str]:
         )
         return
     yield f"const __m512d w_{j} = _mm512_broadcast_f64x4({load(4 * j)});"
-    for axis, u, v in ((1, 2, 3), (2, 1, 3), (3, 1, 2)):
+    for axis, (u, v) in OTHERS.items():
         places = ", ".join([str(v - 1)] * 4 + [str(u - 1)] * 4)
         yield (
             f"const __m512d ww{axis}_{j} = "
@@ -502,9 +503,9 @@ def omega_factors(j: int, wide: bool) -> Iterator[str]:
         )
 
 
-def older_product(axis: int, pair: list[int], m: int, i: int, wide: bool) -> Iterator[str]:
+def older_product(axis: int, m: int, i: int, wide: bool) -> Iterator[str]:
     """Yield the sum e for term m of an axis with the product of term i of the perturbations."""
-    u, v = pair
+    u, v = OTHERS[axis]
     j, total = m - 1 - i, f"e{axis}_{m}"
     if wide:
         given = f"vv{axis}_{i}, ww{axis}_{j}"

@@ -287,6 +287,14 @@ def test_growth_of_a_motion_that_becomes_fast_is_that_of_every_tolerance(
         assert found.steps < found.evaluations < 1.05 * found.steps
 
 
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-13])
+def test_a_motion_that_was_expected_to_be_longer_has_its_growth(tolerance: float) -> None:
+    """A torque that swings: the beginning lets expect more radians than the work limit allows."""
+    swing = TorqueLaw(cosines=[((0.0, 0.0, 2.7), 0.01)])
+    scene = Scene("", (1e-3, 1e-3, 0.0), moments=(1.0, 2.0, 2.7), torque=swing)
+    assert solve(scene, [1e4], "taylor", tolerance).growth == pytest.approx(11.1, rel=0.1)
+
+
 def test_a_long_motion_is_not_called_sensitive_by_chance() -> None:
     found = solve(case_scene(7), [1000.0], "taylor", 1e-6)
     assert found.ended == "complete"

@@ -113,7 +113,7 @@ contains
       call march(problem, request, attempt, room, waves, solution, outcome)
       spent = spent + real(outcome%steps, dp)
       if (solution%status == TOO_LONG) then
-        ! If a precise integration is likely to exceed the work limit, one that is not goes to the end.
+        ! If that is likely to exceed the work limit, an integration that is not precise follows.
         attempt%precise = outcome%ahead < most - spent
         attempt%turn_limit = huge(spent)
         cycle

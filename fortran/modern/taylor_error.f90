@@ -17,7 +17,8 @@ module taylor_error
   real(dp), parameter :: LEAST = tiny(1.0_dp)
   real(dp), parameter :: FIRST(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp] ! selects the first lane
   real(dp), parameter :: WORTH_A_LOOK = 1e6_dp ! amplification from which all blocks are checked
-  ! A larger norm would have no further meaning; the square of a product of two such is in range.
+  ! A larger norm or error would have no further meaning; the square of a product of two such is in
+  ! range.
   real(dp), parameter :: LARGEST = 1e75_dp
   real(dp), parameter :: UNIT(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, &
                                                0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
@@ -197,6 +198,7 @@ contains
     blocks%steps = 0
     blocks%closed = blocks%closed + 1
     blocks%derivatives(:, :, blocks%closed) = bounded(lanes(2:, :))
+    lanes(1, :) = bounded(lanes(1, :))
     if (precise) then
       call turn_axes(blocks%derivatives(:, :, blocks%closed), lanes)
     else
@@ -302,10 +304,10 @@ contains
   end function norm
 
   elemental real(dp) function bounded(x)
-    !! Limit an element of a derivative to LARGEST, which also replaces NaN.
+    !! Limit an element of a derivative, or an error, to LARGEST, which also replaces NaN.
     real(dp), intent(in) :: x
 
-    bounded = LARGEST
+    bounded = sign(LARGEST, x)
     if (abs(x) <= LARGEST) bounded = x
   end function bounded
 

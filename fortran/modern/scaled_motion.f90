@@ -12,7 +12,7 @@ module scaled_motion
   integer, parameter, public :: MOST_WAVES = 8
   real(dp), parameter, public :: FAST = 8.0_dp ! frequency of a fast wave over rate of the motion
   ! Steps for a radian of a wave that is resolved.
-  real(dp), parameter, public :: RESOLVED_STEPS = 0.7_dp
+  real(dp), parameter :: RESOLVED_STEPS = 0.7_dp
   real(dp), parameter :: SLOW = 1e-8_dp      ! rad; a wave of a smaller angle is linear to rounding
   real(dp), parameter :: WAVE_ERROR = 1.0_dp/2880.0_dp ! error of Simpson's rule over radians**4
 
@@ -35,7 +35,8 @@ module scaled_motion
     integer :: axes(3)       ! axis of the body for each unknown
   end type motion_t
 
-  public :: amplification, average, integral, reach_of, scaled, steps_for_waves, turned, versine
+  public :: amplification, average, integral, reach_of, scaled, steps_for_wave, steps_for_waves, &
+            turned, versine
 
 contains
 
@@ -203,16 +204,24 @@ contains
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: t_end        !! s
     real(dp), intent(in) :: aim          !! target error, relative
-    real(dp) :: wave         ! amplitude in the unknowns, times the time
     integer :: n
 
     steps_for_waves = 0.0_dp
     do n = 1, motion%resolved
-      wave = size_of(motion, n)*abs(t_end)
-      steps_for_waves = max(steps_for_waves, abs(motion%frequency(n)*t_end)* &
-                            max(RESOLVED_STEPS, sqrt(sqrt(WAVE_ERROR*wave/aim))))
+      steps_for_waves = max(steps_for_waves, &
+                            steps_for_wave(abs(motion%frequency(n)*t_end), &
+                                           size_of(motion, n)*abs(t_end), aim))
     end do
   end function steps_for_waves
+
+  pure real(dp) function steps_for_wave(angle, size, aim)
+    !! Return the number of steps that resolve a wave.
+    real(dp), intent(in) :: angle        !! over the whole time, rad
+    real(dp), intent(in) :: size         !! of its integral in the unknowns, times the time
+    real(dp), intent(in) :: aim          !! target error, relative
+
+    steps_for_wave = angle*max(RESOLVED_STEPS, sqrt(sqrt(WAVE_ERROR*size/aim)))
+  end function steps_for_wave
 
   pure real(dp) function size_of(motion, n)
     !! Return the size of the integral of wave n, 1/s.

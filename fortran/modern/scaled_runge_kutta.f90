@@ -8,7 +8,7 @@ module scaled_runge_kutta
   use problem, only: problem_t, request_t, solution_t
   use scaled_march, only: GAIN, march_constant, march_varying, marched_t
   use scaled_motion, only: amplification, average, FAST, integral, MOST_WAVES, motion_t, &
-                           reach_of, RESOLVED_STEPS, scaled, steps_for_waves
+                           reach_of, scaled, steps_for_wave, steps_for_waves
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED, SENSITIVE
   use torque_noise, only: torque_noise_of
   implicit none(type, external)
@@ -23,7 +23,7 @@ module scaled_runge_kutta
   ! The error after time T is about FIRST_GUESS (rate h)**4 rate T. The factor comes from the cases.
   real(dp), parameter :: FIRST_GUESS = 0.0022_dp
   real(dp), parameter :: LONGEST = 1e40_dp ! rad; far more than MOST_STEPS can cover
-  real(dp), parameter :: COARSEST = 0.004_dp ! for coarser targets, steps would be too long to judge
+  real(dp), parameter :: COARSEST = 3.5e-4_dp ! for coarser targets, steps would be too long to judge
   real(dp), parameter :: FARTHEST = 0.15_dp  ! largest gap of the longest steps, relative
   real(dp), parameter :: SHARE = 0.35_dp     ! target over tolerance: gaps may be small by chance
   ! Offset of the start of the longer steps, in errors of averaging; along no axis of amplification.
@@ -37,7 +37,10 @@ module scaled_runge_kutta
   real(dp), parameter :: VARYING = 1.7_dp    ! cost of a step under varying torque
   real(dp), parameter :: A_WAVE = 0.6_dp     ! cost of each wave in such a step
   real(dp), parameter :: WAVE_START = 12.0_dp ! cost of each wave before the first step
-  real(dp), parameter :: WORTH = 0.9_dp      ! largest cost to choose this method, over the series'
+  ! Square of the least frequency of a wave over the rate of the motion for which this method may be
+  ! faster, times the root of the target error. Steps are proportional to its fourth root.
+  real(dp), parameter :: PACE = 1.2_dp
+  real(dp), parameter :: WORTH = 0.6_dp      ! largest cost to choose this method, over the series'
   real(dp), parameter :: WEAK = 0.5_dp       ! error of averaging over the target
 
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
@@ -111,6 +114,7 @@ contains
     integer :: n
 
     aim = SHARE*request%tolerance
+    if (is_contest) aim = min(aim, COARSEST)
     omega = request%omega
     t_end = request%times(1)
     solution%status = REFUSED
@@ -232,21 +236,22 @@ contains
     cost_of_series = SERIES_START + radians*(SERIES_STEPS + SERIES_STEPS_A_BIT*bits)
   end function cost_of_series
 
-  pure logical function is_slower(problem, omega, time, aim, bits)
-    !! Return whether this method loses the contest. If the torque has waves, the radians that they
-    !! add to the motion are left out, so that the method may lose although the result is false.
-    !! Sines of one frequency, and very slow waves, cost more here than in `solve`. No scaled
-    !! unknowns are needed, because making them would take longer than the contest.
+  logical function is_slower(problem, omega, time, aim, bits)
+    !! Return whether this method loses the contest, as it does if no wave is fast. Very slow
+    !! waves cost more here than in `solve`. No scaled unknowns are needed, because making them would
+    !! take longer than the contest.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega(3)   !! rad/s
     real(dp), intent(in) :: time       !! s, from 0
     real(dp), intent(in) :: aim        !! target error, relative
     real(dp), intent(in) :: bits       !! bits of the target error
-    real(dp) :: c(3), root(3)
+    real(dp) :: c(3), root(3) ! squares of the rates per omega, and the rates
+    real(dp) :: fastest      ! frequency, rad/s
     real(dp) :: rate         ! largest rate of the torque in the unknowns, 1/s3
     real(dp) :: turn_0, turn ! as in solve, rad
     real(dp) :: both         ! squares of these two, summed
-    real(dp) :: frequencies(MOST_WAVES) ! of the sines, and of the cosines that differ, rad/s
+    real(dp) :: frequencies(MOST_WAVES) ! which differ, rad/s
+    real(dp) :: sizes(MOST_WAVES) ! of the integrals of their waves in the unknowns, rad
     real(dp) :: radians      ! of the motion and of the waves
     real(dp) :: resolved     ! number of the waves that are too slow to be averaged
     real(dp) :: steps        ! number of steps that resolve them
@@ -255,36 +260,47 @@ contains
     integer :: n, waves
 
     c = abs(problem%coefficients)
-    root = sqrt([c(2)*c(3), c(1)*c(3), c(1)*c(2)])
+    c = [c(2)*c(3), c(1)*c(3), c(1)*c(2)]
+    ! Most calls end here, after a few nanoseconds.
+    fastest = 0.0_dp
+    do n = 1, problem%n_sines
+      fastest = max(fastest, abs(problem%sines(4, n)))
+    end do
+    do n = 1, problem%n_cosines
+      fastest = max(fastest, abs(problem%cosines(4, n)))
+    end do
+    is_slower = fastest*fastest*sqrt(aim) <= PACE*max(c(1)*omega(1)**2, c(2)*omega(2)**2, &
+                                                      c(3)*omega(3)**2)
+    if (is_slower) return
+    root = sqrt(c)
     rate = max(root(1)*abs(problem%rate(1)), root(2)*abs(problem%rate(2)), &
                root(3)*abs(problem%rate(3)))
     turn_0 = time*max(root(1)*abs(omega(1)), root(2)*abs(omega(2)), root(3)*abs(omega(3)))
     turn = turn_0 + time*time*(max(root(1)*abs(problem%constant(1)), &
                                    root(2)*abs(problem%constant(2)), &
                                    root(3)*abs(problem%constant(3))) + 0.5_dp*time*rate)
-    waves = problem%n_sines
-    do n = 1, waves
-      frequencies(n) = problem%sines(4, n)
+    waves = 0
+    do n = 1, problem%n_sines
+      call add(problem%sines(:, n), 2.0_dp)
     end do
     do n = 1, problem%n_cosines
-      if (any(abs(frequencies(:waves) - problem%cosines(4, n)) <= 0.0_dp)) cycle
-      waves = waves + 1
-      frequencies(waves) = problem%cosines(4, n)
+      call add(problem%cosines(:, n), 1.0_dp)
     end do
     radians = 0.5_dp*(turn_0 + turn)
     resolved = 0.0_dp
     steps = 0.0_dp
     do n = 1, waves
-      f = abs(frequencies(n))*time
+      f = frequencies(n)*time
       radians = radians + WAVE_RADIAN*f
-      if (f > FAST*turn) cycle
+      if (f > FAST*turn) then
+        ! The error of averaging, nearly as `average` bounds it.
+        if (2.0_dp*(sizes(n)/f)*(2.0_dp*turn*(turn/f + sizes(n)) + sizes(n)) &
+            <= WEAK*aim*turn_0) cycle
+      end if
       resolved = resolved + 1.0_dp
-      steps = max(steps, RESOLVED_STEPS*f)
+      steps = max(steps, steps_for_wave(f, sizes(n), aim))
     end do
-    cost = WORTH*cost_of_series(radians, bits)
-    if (waves > 0 .or. rate > 0.0_dp) then
-      cost = (cost - WAVE_START*waves)/(VARYING + A_WAVE*resolved)
-    end if
+    cost = (WORTH*cost_of_series(radians, bits) - WAVE_START*waves)/(VARYING + A_WAVE*resolved)
     is_slower = steps > cost
     if (is_slower) return
     cost = max(0.0_dp, cost - LEAST_STEPS)
@@ -293,6 +309,30 @@ contains
     both = turn_0*turn_0 + turn*turn
     is_slower = FIRST_GUESS*(turn_0 + turn)*(both - turn_0*turn)*(both + turn_0*turn) &
                 > 6.0_dp*min(aim, COARSEST)*(cost*cost)**2
+
+  contains
+
+    subroutine add(wave, most)
+      !! Add a wave to those of the same frequency, and its reach to the turn.
+      real(dp), intent(in) :: wave(4)
+      real(dp), intent(in) :: most !! largest integral of its sine or cosine over an angle
+      real(dp) :: largest, size_of_wave
+      integer :: k
+
+      largest = max(root(1)*abs(wave(1)), root(2)*abs(wave(2)), root(3)*abs(wave(3)))
+      size_of_wave = time*(largest/abs(wave(4)))
+      turn = turn + min(most*size_of_wave, time*time*largest)
+      do k = 1, waves
+        if (abs(frequencies(k) - abs(wave(4))) <= 0.0_dp) exit
+      end do
+      if (k > waves) then
+        waves = k
+        frequencies(k) = abs(wave(4))
+        sizes(k) = 0.0_dp
+      end if
+      sizes(k) = sizes(k) + size_of_wave
+    end subroutine add
+
   end function is_slower
 
 end module scaled_runge_kutta

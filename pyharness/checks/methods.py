@@ -22,10 +22,9 @@ from pyharness.checks.judge import (
     reference_truth,
 )
 from pyharness.checks.selection import Selection
-from pyharness.checks.tolerances import OF_CASES, of_case
+from pyharness.checks.tolerances import FEW_DIGITS, OF_CASES, of_case
 from pyharness.compare.agreement import ulps
 from pyharness.compare.candidates import attitude_candidate, method_candidate, prepared_candidate
-from pyharness.methods.plan import FEW_DIGITS
 from pyharness.methods.problem import closed_form, normalized
 from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS
 from pyharness.methods.solve import finest

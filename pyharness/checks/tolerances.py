@@ -6,7 +6,6 @@ no bound on errors.
 
 import math
 
-from pyharness.methods.plan import FEW_DIGITS
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, REGISTRY, SCIPY_METHODS
 from pyharness.methods.scipy_ivp import steps_sum
@@ -20,6 +19,8 @@ from pyharness.theory.conditioning import Conditioning
 OF_CASES = (1e-3, 1e-6, 1e-9, 1e-12)
 _SCIPY_OF_CASES = (1e-6, 1e-9)
 _OF_SELF_TEST = 1e-9
+# The smallest tolerance at which `quick` is checked.
+FEW_DIGITS = 1e-7
 # A tolerance of medium size, and the tolerances that are tried if a finer one is not possible.
 MIDDLING = 1e-6
 _LADDER = (1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-7, MIDDLING, 1e-5, 1e-4, 1e-3)

@@ -13,14 +13,11 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 
 FINEST = REGISTRY["auto"].finest
-# For large tolerances Runge-Kutta may take fewer operations than a Taylor series. The kernel
-# chooses between the two.
+# Under a torque with fast waves, Runge-Kutta, which averages them, may take fewer operations than a
+# Taylor series, or may be the only one that can solve the scene. The kernel chooses between the two
+# down to the smallest tolerance at which that was seen.
 RK4_OR_TAYLOR = "quick or taylor"
-# Smallest tolerances at which Runge-Kutta is so often faster than the Taylor series that the kernel
-# forecasts the time of both. The second applies to a torque with waves, which may be so fast that
-# only Runge-Kutta, which averages them, can solve the scene.
-FEW_DIGITS = 1e-7
-_WAVES_DIGITS = 1e-9
+_FEW_DIGITS = 1e-9
 
 
 @dataclass(frozen=True)
@@ -96,7 +93,8 @@ def plan(
             isinstance(scene.torque, TorqueLaw)
             and scene.changing is None
             and not scene.torque.in_space
-            and tolerance >= (_WAVES_DIGITS if waves(scene) else FEW_DIGITS)
+            and waves(scene) > 0
+            and tolerance >= _FEW_DIGITS
         )
         # Runge-Kutta has no intermediate output.
         method = "closed-form" if form else RK4_OR_TAYLOR if few_digits and not rows else "taylor"

@@ -39,7 +39,7 @@ module scaled_runge_kutta
   real(dp), parameter :: WAVE_START = 12.0_dp ! cost of each wave before the first step
   ! Square of the least frequency of a wave over the rate of the motion for which this method may be
   ! faster, times the root of the target error. Steps are proportional to its fourth root.
-  real(dp), parameter :: PACE = 1.2_dp
+  real(dp), parameter :: PACE = 5.0_dp
   real(dp), parameter :: WORTH = 0.6_dp      ! largest cost to choose this method, over the series'
   real(dp), parameter :: WEAK = 0.5_dp       ! error of averaging over the target
 

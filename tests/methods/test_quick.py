@@ -177,7 +177,7 @@ def test_more_waves_than_there_is_room_for_are_left_to_the_series() -> None:
 
 @pytest.mark.parametrize(
     ("case", "tolerance", "method"),
-    [(5, 1e-3, "quick"), (5, 1e-5, "taylor"), (7, 1e-6, "quick"), (7, 1e-8, "taylor"),
+    [(5, 1e-3, "taylor"), (7, 1e-3, "quick"), (7, 1e-6, "quick"), (7, 1e-8, "taylor"),
      (6, 1e-3, "taylor")],
 )  # fmt: skip
 def test_auto_chooses_by_the_forecast(case: int, tolerance: float, method: str) -> None:
@@ -188,12 +188,11 @@ def test_auto_chooses_by_the_forecast(case: int, tolerance: float, method: str) 
     assert found.tobytes() == prepare(scene, method, tolerance)(scene.omega, 3.0).tobytes()
 
 
-def test_the_start_of_many_waves_is_in_the_forecast() -> None:
-    """Each wave that is not averaged costs Runge-Kutta as much as some steps before the first."""
-    waves = [((0.1, 0.2, -0.1), 1.0 + 0.1 * n) for n in range(4)]
-    start = (0.3, -0.4, 1.2)
-    for sines, method in (((), "quick"), (waves, "taylor")):
-        torque = TorqueLaw(constant=(1.0, 0.0, 2.0), sines=sines)
+def test_the_start_of_a_wave_is_in_the_forecast() -> None:
+    """A wave that is averaged costs Runge-Kutta as much as some steps before the first."""
+    start = (0.1, -0.1, 0.4)
+    for frequency, method in ((6.0, "taylor"), (60.0, "quick")):
+        torque = TorqueLaw(sines=[((1e-4, 2e-4, -1e-4), frequency)])
         solver = prepare(Scene("", start, moments=(40.0, 30.0, 20.0), torque=torque), "auto", 1e-3)
         solver(start, 1.0)
         assert solver.method == method

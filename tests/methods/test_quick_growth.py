@@ -6,6 +6,7 @@ all three lengths of `quick` agree. The scenes are drawn at random.
 
 import math
 from collections import Counter
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -24,6 +25,13 @@ def _called(scene: Scene, method: str, tolerance: float, time: float) -> tuple[S
     return solver, solver(np.array(scene.omega), time)
 
 
+def _shaken(scene: Scene) -> Scene:
+    """Return a scene with a fast and very weak wave, under which `auto` considers `quick`."""
+    rate = max(map(abs, scene.omega))
+    wave = tuple(1e-12 * each * rate**2 for each in scene.moments or ()), 200.0 * rate
+    return replace(scene, torque=replace(scene.torque, sines=(*scene.torque.sines, wave)))
+
+
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])
 @pytest.mark.parametrize("method", ["auto", "quick"])
 def test_complete_is_not_said_where_the_series_says_sensitive(
@@ -31,7 +39,8 @@ def test_complete_is_not_said_where_the_series_says_sensitive(
 ) -> None:
     scenes = timed_scenes("unstable", [25, round(-math.log10(tolerance))])
     seen: Counter[str] = Counter()
-    for number, (scene, time) in enumerate(islice(scenes, 150)):
+    for number, (calm, time) in enumerate(islice(scenes, 150)):
+        scene = _shaken(calm) if method == "auto" else calm
         series, _ = _called(scene, "taylor", tolerance, time)
         solver, found = _called(scene, method, tolerance, time)
         seen[f"{solver.method} {solver.status}"] += 1

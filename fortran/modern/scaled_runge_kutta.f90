@@ -237,9 +237,9 @@ contains
   end function cost_of_series
 
   logical function is_slower(problem, omega, time, aim, bits)
-    !! Return whether this method loses the contest, as it does if no wave is fast. Very slow
-    !! waves cost more here than in `solve`. No scaled unknowns are needed, because making them would
-    !! take longer than the contest.
+    !! Return whether this method loses the contest, as it does if no wave is fast. Very slow waves
+    !! cost more here than in `solve`. No scaled unknowns are needed, because making them would take
+    !! longer than the contest.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega(3)   !! rad/s
     real(dp), intent(in) :: time       !! s, from 0

@@ -29,7 +29,7 @@ def _shaken(scene: Scene) -> Scene:
     """Return a scene with a fast and very weak wave, under which `auto` considers `quick`."""
     rate = max(map(abs, scene.omega))
     wave = tuple(1e-12 * each * rate**2 for each in scene.moments or ()), 200.0 * rate
-    return replace(scene, torque=replace(scene.torque, sines=(*scene.torque.sines, wave)))
+    return replace(scene, torque=TorqueLaw(scene.law.constant, sines=[wave]))
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])

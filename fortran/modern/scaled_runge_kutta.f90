@@ -23,7 +23,8 @@ module scaled_runge_kutta
   ! The error after time T is about FIRST_GUESS (rate h)**4 rate T. The factor comes from the cases.
   real(dp), parameter :: FIRST_GUESS = 0.0022_dp
   real(dp), parameter :: LONGEST = 1e40_dp ! rad; far more than MOST_STEPS can cover
-  real(dp), parameter :: COARSEST = 3.5e-4_dp ! for coarser targets, steps would be too long to judge
+  ! For coarser targets, steps would be too long to judge.
+  real(dp), parameter :: COARSEST = 3.5e-4_dp
   real(dp), parameter :: FARTHEST = 0.15_dp  ! largest gap of the longest steps, relative
   real(dp), parameter :: SHARE = 0.35_dp     ! target over tolerance: gaps may be small by chance
   ! Offset of the start of the longer steps, in errors of averaging; along no axis of amplification.
@@ -320,7 +321,7 @@ contains
       integer :: k
 
       largest = max(root(1)*abs(wave(1)), root(2)*abs(wave(2)), root(3)*abs(wave(3)))
-      size_of_wave = time*(largest/abs(wave(4)))
+      size_of_wave = time*time*largest/max(1.0_dp, abs(wave(4)*time))
       turn = turn + min(most*size_of_wave, time*time*largest)
       do k = 1, waves
         if (abs(frequencies(k) - abs(wave(4))) <= 0.0_dp) exit

@@ -161,12 +161,17 @@ def chosen_scene(
         changes["step_size"] = number(options.step_size, "--step-size")
     if options.steps is not None:
         changes["steps"] = whole(options.steps, "--steps")
-    if abs(scene.attitude_length - 1.0) > NEAR_ONE:
-        warn(f"the attitude has {_norm(scene.attitude_length)}; it was normalised")
+    warn_of_attitude(scene)
     scene = checked_scene(replace(scene, **changes), any_axes, any_torque, any_state, changing)
     if scene.is_impossible:
         warn("no rigid body has these moments, one exceeds the sum of the others; run all the same")
     return scene
+
+
+def warn_of_attitude(scene: Scene) -> None:
+    """Print a warning if the attitude of a scene was not of norm 1, and therefore normalised."""
+    if abs(scene.attitude_length - 1.0) > NEAR_ONE:
+        warn(f"the attitude has {_norm(scene.attitude_length)}; it was normalised")
 
 
 def _norm(length: float) -> str:

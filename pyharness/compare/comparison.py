@@ -27,7 +27,7 @@ from pyharness.methods.registry import (
 from pyharness.methods.sensitivity import is_sensitive, motion_growth
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import check_steps
-from pyharness.model.errors import InputError, unknown
+from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable
 from pyharness.model.report import short
 from pyharness.model.scene import Scene, checked_scene
@@ -263,13 +263,16 @@ def compare_programs(
     >>> compare_programs(case_scene(2)).unexpected
     ()
     """
+    checked_scene(scene)
     listings = listings_for() if listings is None else listings
+    for each in listings:
+        if not isinstance(each, Listing):
+            raise InputError(f"listings: {kind_of(each)}; allowed: a list of Listing, as of subset")
     in_floats = checked_word(word, "python") == BINARY64
     has_fortran = in_floats or word in compiled_words()
     languages = IMPLEMENTATIONS if has_fortran else ("python",)
     for listing, language in itertools.product(listings, languages):
         check_steps(scene, listing.program, work_of(word, language), effort)
-    checked_scene(scene)
     scene = replace(scene, attitude=(scene.attitude or IDENTITY) if attitude else None)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
     programs = []

@@ -65,6 +65,8 @@ def compare_methods(
     ()
     """
     checked_scene(scene, any_state=True)
+    if isinstance(methods, str):
+        raise InputError(f"methods is text; allowed: a list of names, as in ['{methods}']")
     attitude = attitude or scene.torque.needs_attitude
     tolerances = {name: _tolerance_of_method(name, tolerance) for name in methods}
     if not tolerances:

@@ -36,7 +36,7 @@ from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
-from pyharness.model.values import Number, Numbers, number, number_list
+from pyharness.model.values import Number, Numbers, check_flag, number, number_list
 from pyharness.model.waves import with_merged_waves
 from pyharness.scenes.rescaled import (
     has_ordinary_rows,
@@ -132,14 +132,15 @@ def solve(
            [6. , 6. , 6. ]])
     """
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
+    check_flag("attitude", attitude)
+    check_flag("dense_output", dense_output)
     if not isinstance(method, str) or method not in METHODS:
         raise unknown("method", method, METHODS)
     chosen = METHODS[method]
     tolerance = requested_tolerance(method, tolerance)
     if chosen.is_fixed_step and tolerance != 1.0:
         raise InputError(
-            f"tolerance is {tolerance:g}; {method} has a fixed step and no tolerance; give "
-            "none, or 1"
+            f"tolerance is {tolerance:g}; {method} has a fixed step and no tolerance; give none"
         )
     if not chosen.finest <= tolerance <= 1.0:
         raise InputError(

@@ -43,9 +43,11 @@ def taylor(
         n_attitudes=n_attitudes, attitudes=joint, effort=work,
     )  # fmt: skip
     if status == GAVE_UP:
-        count = "1 step" if steps == 1 else f"{steps} steps"
+        # After one step it is a forecast.
+        how = "would exceed" if steps == 1 else "exceeded"
+        count = "" if steps == 1 else f" after {steps} steps"
         raise TimedError(
-            f"taylor exceeded its work limit before t = {{time}} s after {count}; "
+            f"taylor {how} its work limit before t = {{time}} s{count}; "
             + advice("use a shorter time or a larger tolerance", effort, work[1]),
             times[n_rows],
         )

@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
+    from pyharness.model.dense_output import DenseOutput
     from pyharness.model.scene import Scene
     from pyharness.model.trajectory import Trajectory
 
+_SMOOTH = 1000  # points of a line that is drawn through dense output
 # In HTML, the first and the last so many rows are shown.
 _SHOWN = 3
 
@@ -45,6 +47,7 @@ class Conversions(SciPyNames):
     error: float | None
     tolerance: float | None
     scene: "Scene | None"
+    sol: "DenseOutput | None"
 
     def to_pandas(self) -> "DataFrame":
         """Return the rows as a DataFrame of pandas.
@@ -144,8 +147,9 @@ class Conversions(SciPyNames):
         Returns
         -------
         matplotlib.axes.Axes
-            The diagram, with a legend and with units at its axes. Its lines are in ascending order
-            of time.
+            The diagram, with a legend and with units at its axes. Its lines connect the rows in
+            ascending order of time. With dense output they are smooth, from `sol.t_min` to
+            `sol.t_max`.
 
         Raises
         ------
@@ -169,10 +173,13 @@ class Conversions(SciPyNames):
         elif not isinstance(ax, Axes):
             raise InputError(f"plot: ax is {kind_of(ax)}; allowed: an Axes of matplotlib, or none")
         order = np.argsort(self.time, kind="stable")
-        marker = "o" if len(order) == 1 else ""
+        times, omega = self.time[order], self.omega[order]
+        if self.sol is not None:
+            times = np.union1d(times, np.linspace(self.sol.t_min, self.sol.t_max, _SMOOTH))
+            omega = self.sol(times)[:3].T
+        marker = "o" if len(times) == 1 else ""
         for axis in range(3):
-            label = rf"$\omega_{axis + 1}$"
-            ax.plot(self.time[order], self.omega[order, axis], marker=marker, label=label)
+            ax.plot(times, omega[:, axis], marker=marker, label=rf"$\omega_{axis + 1}$")
         ax.set_xlabel("time (s)")
         ax.set_ylabel("angular velocity (rad/s)")
         ax.legend()

@@ -1,5 +1,6 @@
 """Access to the compiled Fortran extension, and the status integers that its kernels return."""
 
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -7,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.codes import Statuses
+from pyharness.model.distribution import DISTRIBUTION
 from pyharness.model.errors import NotBuiltError
 from pyharness.model.torque_law import Wave
 
@@ -22,12 +24,30 @@ def extension() -> ModuleType:
     try:
         from pyharness import _kernels
     except ImportError as error:
-        raise NotBuiltError(
-            "the Fortran extension is not built; run 'make compare' in the checkout, or "
-            "'pip install .' with a Fortran compiler (meanwhile: --implementation python)"
-        ) from error
+        raise NotBuiltError(_why_missing()) from error
     module: ModuleType = _kernels
     return module
+
+
+def _why_missing() -> str:
+    """Return why the extension is missing, and what to do."""
+    from importlib.metadata import PackageNotFoundError, distribution
+
+    here = Path(__file__).parents[1]
+    try:
+        installed = Path(str(distribution(DISTRIBUTION).locate_file(here.name)))
+    except PackageNotFoundError:
+        installed = here
+    # Python takes the folder in which it is started before any installed package.
+    if installed != here and any(installed.glob("_kernels.*")):
+        return (
+            f"this is the source folder {here}, which is not built; the installed package is in "
+            f"{installed}; leave the source folder, or use the command pyharness"
+        )
+    return (
+        "the Fortran extension is not built; run 'make compare' in the checkout, or "
+        "'pip install .' with a Fortran compiler (meanwhile: --implementation python)"
+    )
 
 
 def columns(waves: tuple[Wave, ...], kind: type = float) -> NDArray[Any]:

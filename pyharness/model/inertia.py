@@ -79,7 +79,10 @@ def symmetric_matrix(where: str, values: object) -> Matrix:
     finite numbers, symmetric up to rounding.
     """
     allowed = "allowed: three rows of three finite numbers, kg m2"
-    given = [three(where, row) for row in number_list(where, values, allowed)]
+    rows = list(number_list(where, values, allowed))
+    if any(map(np.isscalar, rows)) and not any(isinstance(row, str) for row in rows):
+        raise InputError(f"{where}: numbers instead of rows; {allowed}; for three moments: moments")
+    given = [three(where, row) for row in rows]
     if len(given) != 3:
         raise InputError(f"{where}: {len(given)} rows; {allowed}")
     largest = max(abs(x) for row in given for x in row)

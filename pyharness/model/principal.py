@@ -8,7 +8,7 @@ import numpy as np
 
 from pyharness.model.attitude import IDENTITY, product, quaternion_of_axes
 from pyharness.model.inertia import Exact, PrincipalFrame, nearest_float, principal_frame
-from pyharness.model.scene import Scene, Triple
+from pyharness.model.scene import Scene, Triple, checked_scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.model.waves import exact_law
@@ -82,6 +82,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
            [-0.707,  0.707,  0.   ],
            [ 0.   ,  0.   ,  1.   ]])
     """
+    checked_scene(scene, True, True, True, True)
     if scene.inertia is None:
         return scene, np.eye(3)
     frame = principal_frame(scene.inertia)

@@ -42,9 +42,9 @@ FULL_INERTIA = (
     "scene of pyharness.principal"
 )
 STATE_TORQUE = (
-    "the scene's torque is a function, and this needs a TorqueLaw: constant, linear and sinusoidal "
-    "terms of time; allowed for functions: solve, prepare, solve_many, compare_methods, and the "
-    "verbs run and compare with --method, plan, prove, stress, and sweep with a method"
+    "the scene's torque depends on the state, and this needs a TorqueLaw: constant, linear and "
+    "sinusoidal terms of time; allowed: solve, prepare, solve_many, compare_methods, and the verbs "
+    "run and compare with --method auto, plan, prove, stress, and sweep with a method"
 )
 CHANGING = (
     "the scene's inertia changes with time, and this takes a constant one; allowed for a changing "

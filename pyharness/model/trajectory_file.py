@@ -42,6 +42,7 @@ AXES = "axes"  # an array without rows, shape (3, 3)
 # For all events: their number for each function, their times, and the states there.
 EVENTS = ("event_counts", "event_times", "event_states")
 SENSITIVITIES = "sensitivities"  # columns of all parameters; the header has their names and numbers
+_OTHERS = (".csv", ".json", ".md", ".toml", ".tsv", ".txt", ".xlsx", ".xml")
 MOST_FUNCTIONS = 10_000  # of events; each has arrays of its own
 _TAPED = "The torque was recorded from a function. Its operations are in the header."
 
@@ -56,6 +57,12 @@ def checked_path(path: object) -> str:
 def save(found: "Trajectory", path: str | os.PathLike[str]) -> None:
     """Write a trajectory to the file `path`, as `Trajectory.save` describes it."""
     name = checked_path(path)
+    ending = os.path.splitext(name)[1].lower()
+    if ending in _OTHERS:
+        raise InputError(
+            f"trajectory file '{name}' would be no {ending[1:]} file; allowed: a name that ends in "
+            ".npz (as text: np.savetxt, or to_pandas)"
+        )
     check_writable(name, "trajectory file")
     write_files({name: file_content(found)}, "trajectory file")
 

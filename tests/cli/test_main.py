@@ -11,6 +11,7 @@ import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -276,6 +277,18 @@ def test_extension_that_can_not_be_imported_says_how_to_build(
     monkeypatch.setitem(sys.modules, "pyharness._kernels", None)
     monkeypatch.delattr("pyharness._kernels", raising=False)
     with pytest.raises(NotBuiltError, match="make compare"):
+        extension.extension()
+
+
+def test_source_folder_that_hides_the_installed_package_is_named(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "_kernels.so").touch()
+    monkeypatch.setitem(sys.modules, "pyharness._kernels", None)
+    monkeypatch.delattr("pyharness._kernels", raising=False)
+    installed = SimpleNamespace(locate_file=lambda name: tmp_path)
+    monkeypatch.setattr("importlib.metadata.distribution", lambda name: installed)
+    with pytest.raises(NotBuiltError, match=r"the installed package is in .* leave the source"):
         extension.extension()
 
 

@@ -61,6 +61,20 @@ def test_check_describes_a_scene_or_says_what_is_wrong(
     path.write_text("[body]\nmoment = [1, 2, 3]\n[initial]\nomega = [1, 2, 3]\n")
     assert main(["scene", "check", str(path)]) == 2
     assert "did you mean 'moments'?" in capsys.readouterr().err
+    path.write_text(
+        "[body]\nmoments = [1, 2, 3]\n[initial]\nomega = [1, 2, 3]\nattitude = [2, 0, 0, 0]\n"
+    )
+    assert main(["scene", "check", str(path)]) == 0
+    assert "the attitude has the norm 2" in capsys.readouterr().err
+
+
+def test_new_does_not_replace_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "mine.toml"
+    assert main(["scene", "new", "--out", str(path)]) == 0
+    path.write_text("mine")
+    assert main(["scene", "new", "--out", str(path)]) == 2
+    assert "exists; give another name" in capsys.readouterr().err
+    assert path.read_text() == "mine"
 
 
 @pytest.mark.parametrize(

@@ -234,6 +234,10 @@ def test_opaque_torque_and_other_arithmetics_are_refused_in_a_line(tmp_path: Pat
     assert list(tmp_path.iterdir()) == []
     replace(found, scene=None).save(path)
     assert load(path).omega.tobytes() == found.omega.tobytes()
+    with pytest.raises(
+        InputError, match=r"would be no csv file; allowed: a name that ends in .npz"
+    ):
+        found.save(tmp_path / "found.CSV")
     other = replace(found, exact=np.array([[1]], dtype=object))
     with pytest.raises(InputError, match="another arithmetic than binary64"):
         other.save(tmp_path / "other.npz")

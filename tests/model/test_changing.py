@@ -141,7 +141,7 @@ INERTIA = ChangingInertia([FIRST, RATE])
         ([FIRST, [[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]], ", power 1: not symmetric"),
         ([RATE], "at time 0: its least principal moment is"),
         ([FIRST, RATE, 1e308 * np.eye(3)], "a coefficient of the derivative overflows"),
-        (FIRST, "at time 0: a number; allowed: three numbers"),
+        (FIRST, "at time 0: numbers instead of rows; allowed: three rows"),
         (5.0, "a number; allowed: a list of 1 to 10 matrices"),
     ],
 )

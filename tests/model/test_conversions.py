@@ -70,7 +70,7 @@ def test_endings_are_sentences() -> None:
     )
     assert (overflowed().success, overflowed().status) == (False, -1)
     assert overflowed().message == (
-        "Omega overflowed; the rows end before the first omega that is not finite."
+        "Omega or the torque became infinite or not a number at the start; the rows end before."
     )
 
 
@@ -163,6 +163,9 @@ def test_diagram_is_drawn_where_the_user_wants_it(pyplot: Any) -> None:
     given = Figure().subplots()
     assert solved().plot(given) is given
     assert overflowed().plot(ax=given) is given
+    smooth = solve(case_scene(5), [2.0], dense_output=True).plot(Figure().subplots()).lines[0]
+    assert np.ptp(np.asarray(smooth.get_xdata())) == 2.0
+    assert len(np.asarray(smooth.get_xdata())) >= 1000
     assert pyplot.get_fignums() == []
     with pytest.raises(InputError, match=r"^plot: ax is a number; allowed: an Axes of matplotlib"):
         solved().plot(3.0)  # type: ignore[arg-type]

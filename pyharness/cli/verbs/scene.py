@@ -1,6 +1,7 @@
 """The verb `scene`: write a scene file to begin with, check one, or print the schema of all."""
 
 import argparse
+import os
 
 from pyharness.cli import options as shared
 from pyharness.dynamics.scene_reader import read_scene
@@ -66,6 +67,8 @@ def run(options: argparse.Namespace) -> int:
     if action != "new":
         shared.refuse(options, f"scene {action}", ("case",))
     shared.check_outputs(options)
+    if action == "new" and options.out is not None and os.path.isfile(options.out):
+        raise InputError(f"scene new: '{options.out}' exists; give another name, or delete it")
     if action == "check":
         _check(options)
     elif action == "schema":
@@ -81,5 +84,6 @@ def run(options: argparse.Namespace) -> int:
 
 def _check(options: argparse.Namespace) -> None:
     scene = read_scene(options.file)
+    shared.warn_of_attitude(scene)
     record = scene_record(scene)
     shared.show(Report("scene", [heading(scene)], record=lambda: {"scene": record}), options)

@@ -45,6 +45,7 @@ def test_a_new_scene_file_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "q0" in other
     assert VALIDATOR.is_valid(tomllib.loads(other))
     assert scene_of(tomllib.loads(other), "x").torque.needs_attitude
+    path = tmp_path / "case-3.toml"
     printed(capsys, "new", "--case", "3", "--out", str(path))
     assert read_scene(path).omega == case_scene(3).omega
 

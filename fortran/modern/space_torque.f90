@@ -259,7 +259,7 @@ contains
       end if
       call two_sum((t(1)), h + t(2), t(1), t(2))
       rest = (t_end - t(1)) - t(2)
-      call check_steps(found%steps, t(1), rest, limit, found%ahead, solution%status)
+      call check_steps(found%steps, t(1), rest, .false., limit, found%ahead, solution%status)
       if (solution%status /= COMPLETE) return
     end do
   end subroutine march

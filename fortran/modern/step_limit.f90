@@ -36,11 +36,12 @@ contains
                          max(1_int64, int(0.5_dp*min(COUNTABLE, most_steps), int64)), 0.0_dp)
   end function limit_of
 
-  subroutine check_steps(steps, t, rest, limit, ahead, status)
+  subroutine check_steps(steps, t, rest, is_cut, limit, ahead, status)
     !! Check the limit after a step, if it is time to. The status becomes GAVE_UP if the limit is
     !! exceeded, now or by forecast, and INTERRUPTED after Ctrl-C.
     integer(int64), intent(in) :: steps        !! so far
     real(dp), intent(in) :: t, rest            !! time reached, time to go, s
+    logical, intent(in) :: is_cut              !! whether a breakpoint cut the last step
     type(step_limit_t), intent(inout) :: limit
     real(dp), intent(inout) :: ahead           !! forecast of all steps
     integer, intent(inout) :: status
@@ -60,7 +61,7 @@ contains
     power = merge(min(3.0_dp, power), 1.0_dp, power > GROWING)
     ahead = real(steps, dp)*(1.0_dp + abs(rest/t))**power
     if (real(steps, dp) >= limit%most_steps &
-        .or. (steps == 1 .and. ahead > HOPELESS*limit%most_steps)) then
+        .or. (steps == 1 .and. .not. is_cut .and. ahead > HOPELESS*limit%most_steps)) then
       status = GAVE_UP
     else if (interrupt_raised() /= 0) then
       status = INTERRUPTED

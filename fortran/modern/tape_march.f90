@@ -201,7 +201,7 @@ contains
       rest = (t_end - t(1)) - t(2)
       s%h = factor*s%h
       if (abs(s%h) > abs(rest)) s%h = rest
-      call check_steps(found%steps, t(1), rest, limit, found%ahead, solution%status)
+      call check_steps(found%steps, t(1), rest, arrives, limit, found%ahead, solution%status)
       if (solution%status /= COMPLETE) exit
     end do
     call weigh()
@@ -271,8 +271,17 @@ contains
     end function fitting_lanes
 
     real(dp) function largest_terms()
-      !! Return the largest of the first terms of omega.
-      largest_terms = min(huge(s%h), maxval(abs(s%a(1:4, FIRST_UNKNOWN:FIRST_UNKNOWN + 2))))
+      !! Return the largest of the first terms of omega for a step that ends at the next breakpoint.
+      real(dp) :: part
+      integer :: k
+
+      part = min(1.0_dp, abs(to_stop/s%h))
+      largest_terms = 0.0_dp
+      do k = 1, 4
+        largest_terms = max(largest_terms, part**k &
+                            *maxval(abs(s%a(k, FIRST_UNKNOWN:FIRST_UNKNOWN + 2))))
+      end do
+      largest_terms = min(huge(s%h), largest_terms)
     end function largest_terms
 
     subroutine weigh()

@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 
 from pyharness.dynamics.rates import rates
+from pyharness.methods.stepper import step_lengths
 from pyharness.model.array_type import Array
 from pyharness.model.chebyshev import nodes
 from pyharness.model.dense_output import NODES, POINTS, TO_COEFFICIENTS, DenseOutput, Pieces
@@ -37,6 +38,7 @@ _DIVIDED = 8.0
 _MOST_PARTS = 64  # into which an interval is divided at once
 _MOST_PIECES = 200_000
 _RADIANS = 2.0  # of rotation in an interval; first guess
+_SHORT = 0.25  # a shorter part of an interval than the largest gap of its nodes could hide
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,11 +118,19 @@ def state_pieces(
         return _of_fixed_steps(scene, ends, rows, partial(rates, scene))
     own = [max(finest, part * tolerance) for part in (_NODE_TOLERANCE, _LARGEST_NODE_TOLERANCE)]
     rough = tolerance + _OWN_ROUNDING * (found.growth or 0.0)
-    return _fitted(_first_edges(scene, found, ends), rows, tolerance, own, rough)
+    edges = _first_edges(scene, found, ends, tolerance)
+    return _fitted(edges, rows, tolerance, own, rough)
 
 
-def _first_edges(scene: Scene, found: Trajectory, ends: list[float]) -> list[float]:
-    """Return the ends of the first intervals (s), among which are all changes of tables."""
+def _first_edges(
+    scene: Scene, found: Trajectory, ends: list[float], tolerance: float
+) -> list[float]:
+    """Return the ends of the first intervals (s), among which are all changes of tables.
+
+    A torque may act for so short a time that it hardly shows at the few nodes of an interval, but
+    it shows in the steps of a Taylor series. An interval with a short step is divided where its
+    steps end.
+    """
     tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
     inner = {time for time in (tape.breaks if tape else ()) if ends[0] < time < ends[-1]}
     bounds = sorted({*ends, *inner})
@@ -131,7 +141,21 @@ def _first_edges(scene: Scene, found: Trajectory, ends: list[float]) -> list[flo
     for low, high in itertools.pairwise(bounds):
         count = max(1, math.ceil((high - low) * share))
         edges += np.linspace(low, high, count + 1)[:-1].tolist()
-    return [*edges, bounds[-1]]
+    edges.append(bounds[-1])
+    if tape is None and scene.changing is None:
+        return edges
+    attitude = found.attitude is not None or scene.torque.needs_attitude
+    steps: dict[float, float] = {}
+    for end in ends:
+        steps |= step_lengths(scene, attitude, end, tolerance, bounds)[0]
+    step_ends = np.array(sorted(steps))
+    lengths = np.array([steps[each] for each in step_ends])
+    more: list[float] = []
+    for low, high in itertools.pairwise(edges):
+        within = slice(*np.searchsorted(step_ends, [low, high]))
+        if lengths[within].min(initial=math.inf) < _SHORT * (high - low):
+            more += step_ends[within].tolist()
+    return sorted({*edges, *more})
 
 
 def _fitted(

@@ -40,6 +40,7 @@ _MOST_PIECES = 100_000  # that are divided at the same time
 _BLOCK = 4_000  # polynomials whose roots are isolated together
 _SHIFT = 2.0**-26  # relative difference of an argument, by which a derivative is estimated
 _ROUNDING = 2.0**-50  # of the arguments of a function
+_STATE_ROUNDING = 2.0**-46  # of polynomials of the state, over their largest values
 # A double root is known at best to the error of omega, relative to omega.
 _COARSEST = 1e-10
 _POLISHES = 3
@@ -262,6 +263,9 @@ def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
         | _have_one_extremum(g, solution, roots, noise)
         | (gap <= 8.0 * np.spacing(np.abs(time[1:])))
     )
+    is_jump = (roots.change != 0) & (roots.slope == 0.0)
+    between = np.flatnonzero(is_jump[:-1] & is_jump[1:] & ~is_same)
+    is_same[between] = _have_any_sign(g, solution, (time[:-1] + 0.5 * gap)[between])
     group = np.concatenate([[0], np.cumsum(~is_same)])
     total = np.zeros(group[-1] + 1, dtype=int)
     np.add.at(total, group, roots.change)
@@ -269,9 +273,31 @@ def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
     begin = np.flatnonzero(np.diff(group, prepend=-1))
     chosen, size = begin.copy(), np.diff(begin, append=count)
     ends = (*solution.pieces.edges[[0, -1]].tolist(), 0.0)
+    # A jump there and back, both by rounding, is no change of sign.
+    is_event = (change != 0) | ~np.minimum.reduceat(is_jump, begin)
     for k in np.flatnonzero(size > 1):
         chosen[k] = _chosen(roots, np.arange(begin[k], begin[k] + size[k]), change[k], ends)
-    return _with_extrema(g, solution, replace(roots.only(chosen), change=change), ends)
+    merged = replace(roots.only(chosen), change=change).only(is_event)
+    return _with_extrema(g, solution, merged, ends)
+
+
+def _have_any_sign(g: EventFunction, solution: Solution, times: Array) -> Index:
+    """Return at which times rounding errors of the state decide the sign of a function.
+
+    Where a function jumps, its own values do not show it.
+    """
+    found: Index = np.zeros(len(times), dtype=bool)
+    if not times.size:
+        return found
+    states = solution.states(times)
+    is_negative = solution.values(g, times, states) < 0.0
+    largest = np.abs(states[:, :3]).max(axis=1)
+    for k in range(states.shape[1]):
+        for side in (-1.0, 1.0):
+            moved = states.copy()
+            moved[:, k] += side * _STATE_ROUNDING * (largest if k < 3 else 1.0)
+            found |= (solution.values(g, times, moved) < 0.0) != is_negative
+    return found
 
 
 def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:

@@ -10,6 +10,7 @@ import numpy as np
 from pyharness.methods.gauss_state import GaussState, step_counts
 from pyharness.methods.problem import normalized, trajectory_of
 from pyharness.methods.sensitivity import is_sensitive, motion_growth, torque_noise
+from pyharness.methods.stepper import step_lengths
 from pyharness.model.effort import Integrator, advice, waves
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import COMPLETE, OVERFLOW, SENSITIVE, extension
@@ -54,6 +55,8 @@ def gauss(stages: int) -> Integrator:
         start = max(scale, kernel.pushed)
         lengths = _lengths(times)
         step, spent, reached = _first_step(kernel.rate, float(lengths.min())), 0, 0.0
+        if isinstance(scene.torque, StateTorque):
+            step = _shortened(step, scene, scene.torque, times[-1], tolerance)
         most = kernel.most
         more = 1.0  # estimated steps of the final solution over the steps of the next solution
         pace = 2.0 * stages  # right-hand sides per step
@@ -218,6 +221,23 @@ def _lengths(times: Sequence[float]) -> Array:
     lengths = np.abs(np.diff(np.array(times, dtype=float), prepend=0.0))
     found: Array = lengths[lengths > 0.0]
     return found
+
+
+def _shortened(
+    step: float, scene: Scene, torque: StateTorque, end: float, tolerance: float
+) -> float:
+    """Return a step (s), halved until no step of a Taylor series is shorter.
+
+    Two solutions with long steps may agree because neither of them sees a short pulse. If the
+    series does not reach `end` (s), because the torque is singular, the step is not halved.
+    """
+    breaks = [] if torque.tape is None else torque.tape.breaks
+    attitude = scene.attitude is not None
+    found, is_whole = step_lengths(scene, attitude, end, tolerance, [*breaks, end])
+    least = min(found.values(), default=step)
+    if not is_whole or least >= step:
+        return step
+    return math.ldexp(step, -math.ceil(math.log2(step / least)))
 
 
 def _trajectory(times: Sequence[float], rows: Array, *more: Any) -> Trajectory:

@@ -24,6 +24,8 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Trajectory
 
+# Largest tolerance of the derivatives of one period, and smallest tolerance of any.
+_OF_PERIOD, _FINEST = 1e-13, 1e-15
 # Change of omega in a period, relative, from which on the derivatives of the period are used.
 _VARIES = 1e-2
 _METHODS = ("auto", "taylor", "closed-form")
@@ -83,6 +85,9 @@ def sensitivities_at(
     if not names:
         return {}
     times, attitude = found.time, found.attitude is not None
+    # Near the separatrix, an error of omega as large as the distance from it would lead to the
+    # derivatives of another motion.
+    tolerance = max(_FINEST, tolerance / max(1.0, found.growth or 1.0))
     # Only a closed form takes no evaluations.
     is_closed = not found.evaluations and not attitude and set(names) <= _PERIODIC
     period = _period(scene) if is_closed else 0.0
@@ -154,6 +159,8 @@ def _by_periods(
     whole = np.floor(times / period)
     rest = times - whole * period
     inner, place = np.unique(np.append(np.clip(rest, 0.0, period), period), return_inverse=True)
+    # The error of one period is repeated in every other one.
+    tolerance = min(tolerance, _OF_PERIOD)
     columns, rows, starts = _by_series(
         scene, (OMEGA0, *(x for x in names if x != OMEGA0)), False, inner, tolerance, effort
     )

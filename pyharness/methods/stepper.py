@@ -3,11 +3,13 @@
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
+from pyharness.dynamics.system import with_constant_body
 from pyharness.methods.recorded import kernel_tape
 from pyharness.methods.taylor_step import LONGEST_TRIAL, Step, taylor_step
 from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
@@ -19,8 +21,9 @@ from pyharness.model.tape import FLOATS, Tape, evaluate
 from pyharness.model.trajectory import Array
 from pyharness.model.values import finite, number, three_floats, tolerance_of
 
-_FINEST = 1e-14
+_FINEST = 1e-14  # smallest tolerance of a step
 _DEFAULT = 1e-9
+_MOST_STEPS = 200_000  # whose lengths are listed
 
 
 class Stepper:
@@ -275,6 +278,27 @@ class Stepper:
             return self._breaks[place] if place < len(self._breaks) else None
         place = bisect_left(self._breaks, self._time)
         return self._breaks[place - 1] if place else None
+
+
+def step_lengths(
+    scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
+) -> tuple[dict[float, float], bool]:
+    """Return the steps (s) of a Taylor series from time 0 to `end`, and whether it reaches `end`.
+
+    The steps are given by their ends and lengths. Those that end at one of the `bounds`, which may
+    have cut them, are not included. A series ends before a singularity, and after too many steps.
+    """
+    if scene.changing is not None:
+        scene = with_constant_body(scene)
+    stepper = Stepper(scene, max(tolerance, _FINEST), attitude=attitude)
+    found: dict[float, float] = {}
+    with suppress(ArithmeticError):
+        while abs(stepper.time) < abs(end) and stepper.steps < _MOST_STEPS:
+            before = stepper.time
+            after = stepper.step(end - before)
+            if after not in bounds:
+                found[after] = abs(after - before)
+    return found, stepper.time == end
 
 
 def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:

@@ -16,7 +16,7 @@ from pyharness.model.state_torque import law_of, replayed
 from pyharness.model.symbols import SYMBOLS
 from pyharness.model.tape import TIME, Operation, Table
 from pyharness.model.trajectory import Array
-from pyharness.torques import damping, in_space, pulses, table
+from pyharness.torques import damping, in_space, pulses, table, wheels
 from pyharness.truth.reference import reference
 
 SOURCE = np.random.default_rng(80)
@@ -310,3 +310,28 @@ def test_solve_agrees_with_the_reference(name: str, body: dict[str, Any]) -> Non
     before, after = reference(scene, times[2::-1]), reference(scene, times[3:])
     wanted = np.concatenate([before.omega[::-1], after.omega])
     assert np.abs(found.omega - wanted).max() < 1e-10 * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize("duration", [1e-2, 1e-5, 1e-7])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_short_pulse_on_a_body_at_rest_sets_its_scale(duration: float, side: float) -> None:
+    """The pulse, extended to the end, would have let expect a much larger omega."""
+    push = tuple(each / duration for each in (1e-3, 2e-3, 1e-3))
+    start = 1.0 if side > 0.0 else -1.0 - duration
+    torque = pulses([start], [duration], push) + wheels((30.0, 20.0, 10.0))
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(4.0, 3.0, 2.0), torque=torque)
+    truth = reference(scene, [side * 10.0]).omega
+    for tolerance in (1e-3, 1e-6, 1e-12):
+        found = solve(scene, [side * 10.0], tolerance=tolerance)
+        error = np.abs(found.omega - truth).max() / np.abs(truth).max()
+        assert found.error is not None
+        assert error <= found.error <= tolerance
+
+
+@pytest.mark.parametrize("duration", [1e-6, 1e-8])
+def test_first_step_that_a_pulse_cuts_forecasts_nothing(duration: float) -> None:
+    torque = pulses([0.0], [duration], (1e-3 / duration, 0.0, 0.0))
+    scene = Scene("", (0.1, 0.2, 0.3), moments=(4.0, 3.0, 2.0), torque=torque)
+    found = solve(scene, [100.0], tolerance=1e-9)
+    assert (found.ended, found.steps < 100) == ("complete", True)
+    assert np.abs(found.omega - reference(scene, [100.0]).omega).max() < 1e-9

@@ -307,3 +307,13 @@ def test_dense_output_and_events_use_the_method() -> None:
     truth = solve(SCENE, found.t_events[0], "taylor").omega
     assert len(truth) > 5
     assert np.abs(truth[:, 0]).max() < 1e-8
+
+
+@pytest.mark.parametrize("width", [1e-4, 1e-3, 1e-2])
+def test_torque_in_a_narrow_range_of_omega_is_not_passed_over(width: float) -> None:
+    def bump(t: Any, w: Any) -> Any:
+        return [0.0 * t, 0.0 * t, -1e-4 * np.exp(-(((w[0] - 0.1) / width) ** 2))]
+
+    scene = Scene("", (0.3, 0.2, 1.1), moments=(3.0, 2.0, 1.2), torque=bump)
+    with pytest.raises(InputError, match=r"changes too (fast|much)"):
+        solve(scene, [3000.0], "averaged", 1e-9)

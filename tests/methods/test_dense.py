@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, case_scene, solve, torques
+from pyharness.events import crosses
 from pyharness.methods import dense
 from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.trajectory import Trajectory
@@ -289,3 +290,38 @@ def test_the_nodes_are_more_accurate_than_the_tolerance(possible: float) -> None
         return
     dense.state_pieces(scene, found, rows, 1e-6, 1e-15)
     assert used[-1] == pytest.approx(0.75e-6 if possible else 0.25e-6)
+
+
+@pytest.mark.parametrize("width", [1e-4, 2e-3, 3e-2])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_short_excursion_shows_in_polynomials_and_events(width: float, side: float) -> None:
+    """A torque there and back: omega is 0.5 + exp(-x^2), and the rows know nothing of it."""
+    middle = 4.3 * side
+
+    def torque(t: Any, w: Any) -> Any:
+        x = (t - middle) / width
+        return [0.0 * t, 0.0 * t, -2.0 / width * x * np.exp(-x * x)]
+
+    scene = Scene("ball", (0.0, 0.0, 0.5), moments=(1.0, 1.0, 1.0), torque=torque)
+    found = solve(scene, [10.0 * side], tolerance=1e-9, dense_output=True, events=crosses(3, 1.0))
+    assert found.sol is not None
+    assert found.t_events is not None
+    times = middle + width * np.linspace(-3.0, 3.0, 101)
+    wanted = 0.5 + np.exp(-(((times - middle) / width) ** 2))
+    assert np.abs(found.sol(times)[2] - wanted).max() < 1e-8
+    away = width * math.sqrt(math.log(2.0))
+    crossed = np.sort(found.t_events[0])
+    assert crossed == pytest.approx([middle - away, middle + away], abs=1e-7 * width)
+
+
+def test_changing_inertia_has_steps_too() -> None:
+    moments = ChangingMoments([[2.0, 0.01], [3.0], [4.0]])
+
+    def torque(t: Any, w: Any) -> Any:
+        x = (t - 5.0) / 1e-3
+        return [0.0 * t, 0.0 * t, -1e3 * x * np.exp(-x * x)]
+
+    scene = Scene("", (0.1, 0.2, 0.5), moments=moments, torque=torque)
+    found = solve(scene, [10.0], tolerance=1e-9, dense_output=True)
+    assert found.sol is not None
+    assert found.sol(5.0)[2] == pytest.approx(solve(scene, [5.0]).omega[0, 2], abs=1e-8)

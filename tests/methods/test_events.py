@@ -407,3 +407,31 @@ def test_message_of_a_ready_event(make: Callable[[], object], message: str) -> N
     with pytest.raises(InputError) as raised:
         make()
     assert str(raised.value).startswith(message)
+
+
+@pytest.mark.parametrize("rate", [1e-3, 1e-4, 1e-6])
+def test_jump_where_omega_is_slow_is_one_event(rate: float) -> None:
+    """Rounding errors of omega lead there and back across the jump, for as long as they count."""
+
+    def jump(t: float, w: Array) -> float:
+        return 1.0 if w[0] > 1.0 + 3.3 * rate else -1.0
+
+    jump.terminal = 2  # type: ignore[attr-defined]
+    torque = TorqueLaw((rate, 0.0, 0.0))
+    scene = Scene("ball", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
+    found = solve(scene, [5.0, 10.0], events=jump)
+    assert found.ended == "complete"
+    assert found.t_events is not None
+    assert found.t_events[0] == pytest.approx([3.3], abs=1e-8)
+
+
+def test_jumps_are_the_crossings_of_their_level() -> None:
+    generator = np.random.default_rng(20261125)
+    for _ in range(40):
+        moments = tuple(np.sort(generator.uniform(1.0, 2.0, 3)).tolist())
+        scene = Scene("", tuple(generator.normal(size=3).tolist()), moments=moments)
+        level = float(solve(scene, generator.uniform(1.0, 19.0)).omega[0, 1])
+        both = [lambda t, w, a=level: np.sign(w[1] - a), crosses(2, level)]
+        found = solve(scene, 20.0, events=both).t_events
+        assert found is not None
+        assert found[0] == pytest.approx(found[1], abs=1e-6)

@@ -1,5 +1,6 @@
 """Gauss collocation under torques that depend on the state."""
 
+import math
 from contextlib import suppress
 from random import Random
 from typing import Any
@@ -164,3 +165,17 @@ def test_steps_end_where_a_table_changes() -> None:
         assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.3)
         found = solve(scene, times, "gauss-4", 1e-12)
         assert np.abs(found.omega - truth.omega).max() < 3e-12
+
+
+@pytest.mark.parametrize("method", ["gauss-2", "gauss-4", "gauss-8"])
+@pytest.mark.parametrize("width", [0.02, 0.05, 0.2])
+def test_two_solutions_do_not_agree_by_missing_a_pulse(method: str, width: float) -> None:
+    def pulse(t: Any, w: Any) -> Any:
+        return [0.0 * t, 0.0 * t, np.exp(-(((t - 3.3) / width) ** 2)) / width]
+
+    scene = Scene("ball", (0.3, -0.2, 1.0), moments=(1.0, 1.0, 1.0), torque=pulse)
+    found = solve(scene, [10.0], method, tolerance=1e-6)
+    error = abs(found.omega[0, 2] - (1.0 + math.sqrt(math.pi)))
+    assert found.error is not None
+    assert error <= 10.0 * found.error + 1e-13
+    assert error <= 3e-6

@@ -465,3 +465,14 @@ def test_the_truth_of_this_file_is_known_for_a_sphere() -> None:
     found = slopes(sphere, [3.0], "omega0", "moments", "torque.constant")
     assert found["torque.constant"][0, 0, 0] == pytest.approx(1.5, rel=1e-14)
     assert found["moments"][0, 0, 0] == pytest.approx(-0.4 * 3.0 / 4.0, rel=1e-13)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-6])
+def test_few_digits_near_the_separatrix_are_of_the_same_motion(tolerance: float) -> None:
+    """A tolerance above the distance from the separatrix led to the derivatives of another one."""
+    scene = Scene("", (1e-5, 1.0, -1e-5), moments=(1.5, 1.7, 1.9))
+    found = solve(scene, [2000.0], tolerance=tolerance, sensitivities=["omega0"])
+    assert found.ended == "complete"
+    assert found.sensitivities is not None
+    # From mpmath's elliptic functions with 60 digits.
+    assert np.abs(found.sensitivities["omega0"]).max() == pytest.approx(48.57, abs=0.01)

@@ -2,9 +2,10 @@
 
 The solution is a polynomial on each of many intervals. A function of it is approximated by
 polynomials on the same intervals, which are divided until the approximation has converged, and all
-roots of these polynomials are isolated. Roots between steps are therefore found however near to
-each other they are, and so are double roots. Where a function is not smooth, the intervals become
-tiny, and sign changes between their nodes are found.
+roots of these polynomials are isolated. Roots of a smooth function are therefore found however near
+to each other they are, and so are double roots. Where a function is not smooth, the intervals
+become tiny, and sign changes between their nodes are found. A change that is undone before the next
+node of an interval is not seen.
 """
 
 import math

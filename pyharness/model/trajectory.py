@@ -71,7 +71,8 @@ class Trajectory(Mechanics, Conversions):
     velocity : ndarray, shape (n, 3), or None
         Translational velocity along the body axes, m/s. None if it was not computed.
     steps, evaluations : int
-        The number of steps, and the number of evaluations of the right-hand side.
+        The number of steps, and the number of evaluations of the right-hand side. SciPy's methods
+        and the reference count their rows as steps.
     ended : {"complete", "sensitive", "stopped", "overflow", "event"}
         How the integration ended. "stopped" means that the Lipschitz test ended it. After an
         "overflow" the rows end before the first omega that is not finite. "sensitive" means that

@@ -243,7 +243,7 @@ def test_numbers_of_readme_and_reconstruction_are_those_of_runs_and_cards() -> N
     told = _document("README.md")
     assert f"stops at step {printed.stop.step} because a translational *velocity*" in told
     assert printed.stop.variable.startswith("V")
-    assert "errors are a million times those of the corrected program" in told
+    assert "errors of omega are a million times the corrected program's" in told
     # Those of the home page are held by tests/edition/test_story.py.
     assert f"after {MECHANISM['stopped']['step']} steps" in told
     cards = sum(len(deck(each).cards) for each in PROGRAMS)

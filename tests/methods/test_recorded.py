@@ -325,7 +325,7 @@ def test_a_table_is_solved_like_the_law_that_it_equals() -> None:
 
 def test_work_limit() -> None:
     scene = scene_of(lambda t, omega: [np.sin(omega[0] * t), 0.0, 0.0])
-    with pytest.raises(InputError, match=r"taylor exceeded its work limit before t = .*effort"):
+    with pytest.raises(InputError, match=r"taylor would exceed its work limit before t = .*effort"):
         solve(scene, 1e6, effort=1e-4)
 
 

@@ -294,7 +294,7 @@ def test_giving_up_says_what_would_do() -> None:
         InputError, match=r"taylor exceeded its work limit before t = 300 s .*--effort"
     ):
         solve(PUSHED, [1.0, 300.0], attitude=True, effort=1e-4)
-    with pytest.raises(InputError, match="after 1 step; "):
+    with pytest.raises(InputError, match=r"would exceed its work limit before t = 1e\+09 s; "):
         solve(PUSHED, [1e9], attitude=True)
     # The speed grows with time, and with it the number of steps per second of time.
     with pytest.raises(InputError, match=r"--effort") as refused:

@@ -105,8 +105,6 @@ contains
     real(dp) :: faint        ! allowed error of averaging, rad/s
     real(dp) :: left_out     ! error of averaging, in the unknowns
     real(dp) :: far          ! weight of the second gap in the error
-    real(dp) :: radians      ! of the motion and of the waves
-    real(dp) :: cost         ! in steps under constant torque
     real(dp) :: bits         ! bits of the target error
     real(dp) :: exponent     ! integral of the logarithmic norm over time
     real(dp) :: bound        ! of the norm of the state-transition matrix
@@ -152,17 +150,6 @@ contains
       n_steps = max(n_steps, steps_for_waves(motion, t_end, aim))
     end if
     if (is_contest) then
-      if (motion%waves > 0) then
-        radians = 0.5_dp*(turn_0 + turn)
-        do n = 1, motion%waves
-          radians = radians + WAVE_RADIAN*abs(motion%frequency(n)*t_end)
-        end do
-        cost = n_steps*(VARYING + A_WAVE*motion%resolved) + WAVE_START*motion%waves
-        if (cost > WORTH*cost_of_series(radians, bits)) then
-          solution%status = REFUSED
-          return
-        end if
-      end if
       if (KEPT*abs(start(2)*t_end) > LOG_2*(BITS_KEPT - bits)) then
         solution%status = REFUSED
         return

@@ -33,6 +33,7 @@ from pyharness.model.report import short
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.shown import short_repr
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
+from pyharness.model.values import boolean
 from pyharness.original.compiled_in_word import compiled_words
 from pyharness.original.programs import (
     BINARY64,
@@ -264,6 +265,8 @@ def compare_programs(
     ()
     """
     checked_scene(scene)
+    may_stop = boolean("may_stop", may_stop)
+    attitude = boolean("attitude", attitude)
     listings = listings_for() if listings is None else listings
     for each in listings:
         if not isinstance(each, Listing):

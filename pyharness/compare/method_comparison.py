@@ -15,6 +15,7 @@ from pyharness.methods.sensitivity import motion_growth
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.values import boolean
 from pyharness.truth.bounded import bound_of
 from pyharness.truth.reference import reference
 
@@ -65,6 +66,7 @@ def compare_methods(
     ()
     """
     checked_scene(scene, any_state=True)
+    attitude = boolean("attitude", attitude)
     if isinstance(methods, str):
         raise InputError(f"methods is text; allowed: a list of names, as in ['{methods}']")
     attitude = attitude or scene.torque.needs_attitude

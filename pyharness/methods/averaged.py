@@ -186,8 +186,8 @@ class _Run:
         own = float(self._relative(step).sum())
         if not missed <= 4.0 * own + max(_EXACT_FLOOR, self.tolerance / count):
             raise TimedError(
-                "averaged: at t = {time} s the torque changes too fast with omega; allowed: a "
-                "smoother torque, or another method",
+                "averaged: at t = {time} s the torque changes too fast as a function of omega; "
+                "allowed: a smoother torque, or another method",
                 time,
             )
 

@@ -14,7 +14,7 @@ from pyharness.methods.solver import PREPARED, Solver
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import unknown
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.values import Number
+from pyharness.model.values import Number, boolean
 from pyharness.model.waves import with_merged_waves
 
 if TYPE_CHECKING:
@@ -97,6 +97,7 @@ def prepare(
     array([-0.958924,  0.283662, 10.      ])
     """
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
+    attitude = boolean("attitude", attitude)
     if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)
     tolerance = requested_tolerance(method, tolerance)

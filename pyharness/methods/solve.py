@@ -36,7 +36,7 @@ from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
-from pyharness.model.values import Number, Numbers, check_flag, number, number_list
+from pyharness.model.values import Number, Numbers, boolean, number, number_list
 from pyharness.model.waves import with_merged_waves
 from pyharness.scenes.rescaled import (
     has_ordinary_rows,
@@ -132,8 +132,8 @@ def solve(
            [6. , 6. , 6. ]])
     """
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
-    check_flag("attitude", attitude)
-    check_flag("dense_output", dense_output)
+    attitude = boolean("attitude", attitude)
+    dense_output = boolean("dense_output", dense_output)
     if not isinstance(method, str) or method not in METHODS:
         raise unknown("method", method, METHODS)
     chosen = METHODS[method]

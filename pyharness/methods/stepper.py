@@ -19,7 +19,7 @@ from pyharness.model.state_torque import StateTorque, of_law, torque_of
 from pyharness.model.symbols import MOST_OPERATIONS, Recorder
 from pyharness.model.tape import FLOATS, Tape, evaluate
 from pyharness.model.trajectory import Array
-from pyharness.model.values import finite, number, three_floats, tolerance_of
+from pyharness.model.values import boolean, finite, number, three_floats, tolerance_of
 
 _FINEST = 1e-14  # smallest tolerance of a step
 _DEFAULT = 1e-9
@@ -92,6 +92,7 @@ class Stepper:
     def __init__(
         self, scene: Scene, tolerance: float = _DEFAULT, *, attitude: bool = False
     ) -> None:
+        attitude = boolean("attitude", attitude)
         self._time = 0.0
         self._steps = 0
         self._tolerance = tolerance_of(tolerance, _FINEST)
@@ -291,12 +292,13 @@ def step_lengths(
     if scene.changing is not None:
         scene = with_constant_body(scene)
     stepper = Stepper(scene, max(tolerance, _FINEST), attitude=attitude)
+    cuts = frozenset(bounds)
     found: dict[float, float] = {}
     with suppress(ArithmeticError):
         while abs(stepper.time) < abs(end) and stepper.steps < _MOST_STEPS:
             before = stepper.time
             after = stepper.step(end - before)
-            if after not in bounds:
+            if after not in cuts:
                 found[after] = abs(after - before)
     return found, stepper.time == end
 

@@ -41,8 +41,8 @@ def _why_missing() -> str:
     # Python takes the folder in which it is started before any installed package.
     if installed != here and any(installed.glob("_kernels.*")):
         return (
-            f"this is the source folder {here}, which is not built; the installed package is in "
-            f"{installed}; leave the source folder, or use the command pyharness"
+            f"Python imported the source folder {here}, which is not built; the installed package "
+            f"is {installed}; run from another folder, or use the command pyharness"
         )
     return (
         "the Fortran extension is not built; run 'make compare' in the checkout, or "

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pyharness.model.diagonal import diagonalised
 from pyharness.model.errors import InputError
 from pyharness.model.values import Matrix as Matrix
-from pyharness.model.values import Triple, number_list, three
+from pyharness.model.values import Triple, converted, number_list, three
 
 Exact = tuple[Fraction, Fraction, Fraction]
 Array = NDArray[np.float64]
@@ -80,7 +80,7 @@ def symmetric_matrix(where: str, values: object) -> Matrix:
     """
     allowed = "allowed: three rows of three finite numbers, kg m2"
     rows = list(number_list(where, values, allowed))
-    if any(map(np.isscalar, rows)) and not any(isinstance(row, str) for row in rows):
+    if any(isinstance(converted(row), float) for row in rows):
         raise InputError(f"{where}: numbers instead of rows; {allowed}; for three moments: moments")
     given = [three(where, row) for row in rows]
     if len(given) != 3:

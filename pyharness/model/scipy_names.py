@@ -83,10 +83,8 @@ class SciPyNames:
         if self.ended == "event":
             return "A terminal event ended the integration; the rows end before it or at it."
         if self.ended == "overflow":
-            end = f"after t = {short(self.time[-1])} s" if len(self.time) else "at the start"
-            return (
-                f"Omega or the torque became infinite or not a number {end}; the rows end before."
-            )
+            last = f"the last row is at t = {self.time[-1]:g} s" if len(self.time) else "no row"
+            return f"Omega or the torque became infinite or NaN; {last}."
         if self.ended != "sensitive":
             return "The integration reached all requested times."
         by = "" if self.growth is None else f", amplified by {short(self.growth)},"

@@ -60,8 +60,8 @@ def save(found: "Trajectory", path: str | os.PathLike[str]) -> None:
     ending = os.path.splitext(name)[1].lower()
     if ending in _OTHERS:
         raise InputError(
-            f"trajectory file '{name}' would be no {ending[1:]} file; allowed: a name that ends in "
-            ".npz (as text: np.savetxt, or to_pandas)"
+            f"trajectory file '{name}': the file is an archive of NumPy; allowed: a name that ends "
+            "in .npz; for text, use np.savetxt or to_pandas"
         )
     check_writable(name, "trajectory file")
     write_files({name: file_content(found)}, "trajectory file")

@@ -53,12 +53,6 @@ def converted(value: object) -> float | str:
         return kind_of(value)
 
 
-def check_flag(name: str, value: object) -> None:
-    """Raise InputError, which names the argument, unless `value` is True or False."""
-    if type(value).__name__ not in ("bool", "bool_"):  # bool_ is NumPy's
-        raise InputError(f"{name} is {value!r}; allowed: True, False")
-
-
 def is_no_number(value: object) -> bool:
     """Return whether a value is of a type that is rejected even if float() accepts the value.
 

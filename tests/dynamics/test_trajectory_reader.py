@@ -235,7 +235,7 @@ def test_opaque_torque_and_other_arithmetics_are_refused_in_a_line(tmp_path: Pat
     replace(found, scene=None).save(path)
     assert load(path).omega.tobytes() == found.omega.tobytes()
     with pytest.raises(
-        InputError, match=r"would be no csv file; allowed: a name that ends in .npz"
+        InputError, match=r"is an archive of NumPy; allowed: a name that ends in .npz"
     ):
         found.save(tmp_path / "found.CSV")
     other = replace(found, exact=np.array([[1]], dtype=object))

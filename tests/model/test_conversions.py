@@ -69,9 +69,7 @@ def test_endings_are_sentences() -> None:
         "3.3e3 1/s."
     )
     assert (overflowed().success, overflowed().status) == (False, -1)
-    assert overflowed().message == (
-        "Omega or the torque became infinite or not a number at the start; the rows end before."
-    )
+    assert overflowed().message == ("Omega or the torque became infinite or NaN; no row.")
 
 
 def test_frame_has_every_quantity_with_its_unit() -> None:

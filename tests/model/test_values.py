@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import pyharness
 from pyharness import (
     InputError,
     Listing,
@@ -357,3 +358,56 @@ def test_long_double_of_more_range_is_too_large() -> None:
         solver((1.0, 2.0, np.longdouble("1e400")), 1.0)
     with pytest.raises(InputError, match="too large for binary64"):
         solver((1.0, 2.0, 3.0), np.longdouble("1e400"))
+
+
+# Without types, for arguments of wrong ones.
+_UNTYPED: Any = pyharness
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (
+            lambda s: _UNTYPED.solve(s, 1.0, attitude="no"),
+            "attitude is text; allowed: True or False",
+        ),
+        (
+            lambda s: _UNTYPED.solve(s, 1.0, dense_output=None),
+            "dense_output is nothing; allowed: True or",
+        ),
+        (
+            lambda s: _UNTYPED.prepare(s, attitude=1),
+            "attitude is a whole number; allowed: True or False",
+        ),
+        (lambda s: _UNTYPED.Stepper(s, attitude="no"), "attitude is text; allowed: True or False"),
+        (
+            lambda s: _UNTYPED.compare_methods(s, attitude="no"),
+            "attitude is text; allowed: True or False",
+        ),
+        (
+            lambda s: _UNTYPED.compare_methods(s, "auto"),
+            r"methods is text; allowed: a list .*\['auto'\]",
+        ),
+        (
+            lambda s: _UNTYPED.compare_programs(s, may_stop=1),
+            "may_stop is a whole number; allowed: True or",
+        ),
+        (
+            lambda s: _UNTYPED.compare_programs(s, "original"),
+            "listings: text; allowed: a list of Listing",
+        ),
+        (lambda s: _UNTYPED.compare_programs(3), "scene is a whole number; it must be a Scene"),
+        (lambda s: _UNTYPED.principal(None), "scene is nothing; it must be a Scene"),
+        (
+            lambda s: _UNTYPED.Scene("", s.omega, inertia=(4.0, 3.0, 2.0)),
+            "for three moments: moments",
+        ),
+    ],
+)
+def test_wrong_kinds_of_arguments_are_refused(call: Callable[[Scene], Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        call(case_scene(3))
+
+
+def test_truth_values_of_numpy_are_accepted() -> None:
+    assert _UNTYPED.solve(case_scene(3), 1.0, attitude=np.True_).attitude is not None

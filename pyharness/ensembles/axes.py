@@ -17,8 +17,8 @@ from pyharness.model.values import finite, integer
 
 Floats = NDArray[np.float64]
 
-# Largest number of values on one axis; it is limited because all values are in memory at once.
-MOST_VALUES = 100_000_000
+# Largest number of values on one axis. All of them are in memory at once, and in one file.
+MOST_VALUES = 30_000_000
 SPACINGS = ("linear", "log")
 # Random distributions, each with the keys of a sweep file that give its parameters.
 DRAWS = {

@@ -6,6 +6,7 @@ of a file in the store. A file that was exchanged with another one, or that belo
 store, therefore fails the check.
 """
 
+import errno
 import hashlib
 import os
 import shutil
@@ -179,7 +180,21 @@ def clear(folder: Path, name: str) -> None:
         path.unlink(missing_ok=True)
 
 
-def place(folder: Path, name: str, content: bytes) -> None:
+def place_checksums(
+    label: Label, part: str, folder: Path, names: Sequence[str], limit: int, checksums: str
+) -> None:
+    """Write the file `checksums`, for files of a store that were written just now.
+
+    The arguments are those of `check_files`. Raise OSError if one of the files is damaged.
+    """
+    try:
+        content = checksum_text(label, part, folder, names, limit)
+    except DamageError as damage:
+        raise OSError(errno.EIO, f"{damage}, though it was written now") from None
+    _place(folder, checksums, content)
+
+
+def _place(folder: Path, name: str, content: bytes) -> None:
     """Write `content` to the file `name` in `folder`, so that the file is never incomplete.
 
     `folder` is the folder of a sweep's results. The content is written to a temporary file, which

@@ -3,7 +3,6 @@
 import contextlib
 import math
 import os
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -45,21 +44,36 @@ def bytes_per_scene(sweep: Sweep) -> int:
     return sum(empty(asked, 1).nbytes for asked in sweep.reductions)
 
 
+def _bytes_per_chunk(sweep: Sweep, block: int) -> int:
+    """Return the bytes of a chunk's files, which fill whole blocks, with its checksums."""
+    scenes = math.prod(sweep.chunk_shape)
+    sizes = [empty(asked, 1).nbytes * scenes for asked in sweep.reductions]
+    return block * sum(-(-size // block) for size in (*sizes, 1))
+
+
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
     """Return the bytes that the missing chunks need on disk, and the memory (bytes) of all workers.
 
     A chunk is a block of the sweep's grid of scenes. `missing` is the number of missing chunks,
     `path` the folder of the results, and `workers` the number of processes. Raise InputError if the
-    free disk space or half of the machine's memory is too small, or if there are too many chunks.
+    disk or half of the machine's memory is too small, or if there are too many chunks.
     The check allocates no arrays, so that it takes no noticeable time even for the largest grid.
     """
-    n_bytes = sweep.n_scenes * bytes_per_scene(sweep) * missing // sweep.n_chunks
+    disk = os.statvfs(Path(path).absolute().parent)
+    n_bytes = missing * _bytes_per_chunk(sweep, disk.f_frsize)
     shown = f"{short_count(sweep.n_scenes)} scenes in {short_count(sweep.n_chunks)} chunks"
-    free = shutil.disk_usage(Path(path).absolute().parent).free
+    free = disk.f_bavail * disk.f_frsize
     if n_bytes > free:
         raise InputError(
             f"{shown} take up to {byte_count(n_bytes)}, and {byte_count(free)} are free where "
             f"'{path}' is; use a smaller grid, or fewer reductions"
+        )
+    n_files = missing * (len(sweep.reductions) + 1)
+    # Some file systems have no limit, and report 0.
+    if disk.f_files and n_files > disk.f_favail:
+        raise InputError(
+            f"{shown} take {n_files} files, and {disk.f_favail} more can be made where '{path}' "
+            "is; give a larger chunk, or fewer reductions"
         )
     if sweep.n_chunks > _MOST_CHUNKS:
         raise InputError(

@@ -13,13 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.ensembles.checksums import (
-    DamageError,
-    Label,
-    checksum_text,
-    place,
-    read_bounded,
-)
+from pyharness.ensembles.axes import MOST_VALUES
+from pyharness.ensembles.checksums import DamageError, Label, place_checksums, read_bounded
 from pyharness.ensembles.fields import units_of
 from pyharness.ensembles.reductions import REDUCTIONS, empty
 from pyharness.ensembles.sweep import Sweep
@@ -29,7 +24,8 @@ from pyharness.model.schema import SCHEMAS
 
 CHECKSUMS = "checksums"  # the group of the checksums in a store; no array may have this name
 METADATA = f"{CHECKSUMS}/metadata"
-LARGEST_METADATA = 1 << 28  # bytes
+# In bytes: the values of the longest axis, to which compression may add a little.
+LARGEST_METADATA = 65536 + 9 * MOST_VALUES
 _HEAD = re.compile(
     r"# pyharness sweep store, schema (\d{1,9}), version (\S+), sweep ([0-9a-f]{64}), metadata"
 )
@@ -122,8 +118,8 @@ def _fill(sweep: Sweep, folder: Path) -> None:
         # They are therefore made, and Zarr's warning is suppressed.
         warnings.filterwarnings("ignore", "Consolidated metadata", UserWarning)
         zarr.consolidate_metadata(folder)
-    text = checksum_text(label(sweep), "metadata", folder, metadata_files(sweep), LARGEST_METADATA)
-    place(folder, METADATA, text)
+    files = metadata_files(sweep)
+    place_checksums(label(sweep), "metadata", folder, files, LARGEST_METADATA, METADATA)
 
 
 def _fill_group(group: Any, sweep: Sweep) -> None:

@@ -39,6 +39,7 @@ _SOLVE = (
 CHUNK = 100_000
 _MOST_IN_CHUNK = 1_000_000
 _MOST_AXES = 12
+_LONGEST_NAME = 240  # bytes; most file systems take 255
 # Methods that propagate the attitudes of many bodies.
 _WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
 
@@ -96,6 +97,7 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, str
         raise InputError(f"chunk is {chunk}; allowed: 1 to {_MOST_IN_CHUNK} scenes")
     digest = hashlib.sha256(text.encode() + more).hexdigest()
     sweep = Sweep(name, scene, axes, solver, reductions, chunk, text, digest)
+    _check_names(sweep)
     _check_reductions(sweep)
     _check_solvers(sweep)
     return sweep
@@ -212,6 +214,15 @@ def _check_axes(axes: tuple[Axis, ...], scene: Scene, solver: Solver) -> None:
             )
         if field == "lipschitz" and solver.program is None:
             raise InputError(f"axis {field} has no meaning without a program")
+
+
+def _check_names(sweep: Sweep) -> None:
+    for name in (*(axis.field for axis in sweep.axes), *(each.name for each in sweep.reductions)):
+        if len(name.encode()) > _LONGEST_NAME:
+            raise InputError(
+                f"{name:.40}... has {len(name.encode())} bytes; allowed: {_LONGEST_NAME}, because "
+                "a folder of the store has this name"
+            )
 
 
 def _check_reductions(sweep: Sweep) -> None:

@@ -10,6 +10,7 @@ import time
 import tracemalloc
 import warnings
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,11 @@ import numpy as np
 import pytest
 
 from pyharness.ensembles import run, store, store_layout
+from pyharness.ensembles.axes import MOST_VALUES
 from pyharness.ensembles.chunk import solve_chunk
 from pyharness.ensembles.executors import engine
 from pyharness.ensembles.forecast import forecast
-from pyharness.ensembles.run import run_sweep
+from pyharness.ensembles.run import check_size, run_sweep
 from pyharness.ensembles.store import opened
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
@@ -213,6 +215,30 @@ def test_forecast_has_the_time_of_files(tmp_path: Path, monkeypatch: pytest.Monk
     assert [each.name for each in tmp_path.iterdir()] == ["sweep.toml"]
 
 
+@dataclass(frozen=True)
+class Disk:
+    """The numbers of a file system that `os.statvfs` returns."""
+
+    f_frsize: int
+    f_bavail: int
+    f_files: int
+    f_favail: int
+
+
+def test_file_of_the_longest_axis_is_within_its_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Zstandard adds at most 1/256 to what it can't compress; a larger file is an error in a line.
+
+    The limit of the file is compared as the metadata are written, and as they are read.
+    """
+    assert 8 * MOST_VALUES * 257 // 256 + 1024 < store_layout.LARGEST_METADATA
+    monkeypatch.setattr(store_layout, "LARGEST_METADATA", 100)
+    with pytest.raises(InputError, match="can't have more than 100, though it was written now"):
+        run_sweep(read_sweep(written(tmp_path, text(TILT))), str(tmp_path / "store"))
+    assert [each.name for each in tmp_path.iterdir()] == ["sweep.toml"]
+
+
 def test_what_neither_disk_nor_memory_holds_is_refused_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -222,9 +248,19 @@ def test_what_neither_disk_nor_memory_holds_is_refused_at_once(
     )
     sweep = read_sweep(written(tmp_path, text(long)))
     assert sweep.n_scenes == 10**15
-    with pytest.raises(InputError, match=r"1e\+15 scenes .* take up to 25 PB"):
+    with pytest.raises(InputError, match=r"1e\+15 scenes .* take up to 25.1 PB"):
         run_sweep(sweep, str(tmp_path / "store"))
-    small = read_sweep(written(tmp_path, text(TILT)))
+    # Each chunk has four files, and each of them takes a block of the disk.
+    top = 'chunk = 1\nreductions = ["end", "status", "growth"]'
+    small = read_sweep(written(tmp_path, text(TILT.replace("count = 6", "count = 1000"), top=top)))
+    disk = Disk(f_frsize=4096, f_bavail=4000, f_files=10, f_favail=4000)
+    assert check_size(small, str(tmp_path), 1, 1000)[0] == 4000 * 4096
+    for spare, words in (("f_bavail", "16.4 MB, and 16.4 MB are free"), ("f_favail", "4000 files")):
+        full = replace(disk, **{spare: 3999})
+        monkeypatch.setattr(os, "statvfs", lambda path, full=full: full)
+        with pytest.raises(InputError, match=words):
+            run_sweep(small, str(tmp_path / "store"))
+    monkeypatch.undo()
     monkeypatch.setattr(os, "sysconf", lambda name: 10)
     with pytest.raises(InputError, match="of memory at once"):
         run_sweep(small, str(tmp_path / "store"))

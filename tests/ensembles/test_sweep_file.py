@@ -14,6 +14,11 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene_file import case_scene
 from tests.ensembles.sweeps import BASE, PROGRAM, SQUARE, TILT, text, written
 
+CONSTANT = "k" * 224
+EXPRESSION = f"""{BASE}[scene.torque]
+expression = ["-{CONSTANT}*w1", "0", "0"]
+constants = {{ {CONSTANT} = 1.0 }}
+"""
 MISTAKES = {
     text(): "axis is missing",
     text('[[axis]]\nfield = "omega.4"\nvalues = [1.0]'): "did you mean 'omega.",
@@ -57,6 +62,13 @@ MISTAKES = {
     text(TILT, '[[axis]]\nfield = "torque.constant.1"\nvalues = [0.1]',
          top='reductions = ["drift"]'): "needs a scene without torque",
     text(TILT, top="chunk = 0"): "chunk is 0",
+    # The limits of the store: a file of the axis above 270 MB, and the name of a folder.
+    text('[[axis]]\nfield = "tilt"\ndraw = "sphere"\nseed = 1\ncount = 40000000'):
+        "count 40000000; allowed: 1 to 30000000",
+    text(TILT, top=f'reductions = [{{name = "end", as = "{"é" * 121}"}}]'):
+        "242 bytes; allowed: 240",
+    text(f'[[axis]]\nfield = "torque.constants.{CONSTANT}"\nvalues = [1.0]',
+         scene=EXPRESSION): "241 bytes; allowed: 240",
     text(TILT, "[solve]\ntolerance = 1e-20"): "tolerance is 1e-20",
     text(TILT, '[solve]\nmethod = "tailor"'): "did you mean 'taylor'?",
     text(TILT, "[solve]\nt_end = 0.0"): "t_end is 0",

@@ -4,6 +4,7 @@ A file may come from anyone. Therefore nothing in it is executed or unpickled, n
 than the file, and every value is checked.
 """
 
+import hashlib
 import io
 import itertools
 import json
@@ -28,12 +29,14 @@ from pyharness.model.tape_record import tape_of
 from pyharness.model.trajectory import ENDINGS, STOP_VARIABLES, Array, Stop, Trajectory
 from pyharness.model.trajectory_file import (
     AXES,
+    DIGEST,
     EVENTS,
     KIND,
     MOST_FUNCTIONS,
     ROWS,
     SENSITIVITIES,
     TEXTS,
+    add_entry,
     checked_path,
 )
 from pyharness.model.values import three_floats
@@ -62,8 +65,9 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
     Raises
     ------
     InputError
-        If the file can't be read, was not written by `Trajectory.save`, is damaged, is of a version
-        that this version does not read, or is larger than a quarter of this machine's memory.
+        If the file can't be read, was not written by `Trajectory.save`, was changed afterwards, is
+        damaged, is of a version that this version does not read, or is larger than a quarter of
+        this machine's memory.
 
     Examples
     --------
@@ -78,7 +82,7 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
     content = read_input(name, where, memory // 4, _WRITTEN)
     damaged = InputError(f"{where}: not a trajectory, or damaged; give {_WRITTEN}")
     try:
-        header = json.loads(_text(_arrays(content, ["header"]), "header"))
+        header = json.loads(_text(_arrays(content, ["header"])[0], "header"))
         if header["kind"] != KIND:
             raise ValueError("another kind of file")
     except Exception:  # the packages that read archives raise errors of many types
@@ -86,9 +90,15 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
     # Another version may have other arrays.
     check_schema(where, "trajectory file", header.get("schema"), "take a version that reads it")
     try:
-        arrays = _arrays(content)
+        arrays, digest = _arrays(content)
+        is_intact = DIGEST in arrays and _text(arrays, DIGEST) == digest
     except Exception:
         raise damaged from None
+    if not is_intact:
+        raise InputError(
+            f"{where}: was changed after it was written, or has no digest (SHA-256) of its "
+            f"content; give {_WRITTEN}"
+        )
     try:
         return _trajectory(arrays, header, where)
     except InputError as error:
@@ -98,9 +108,12 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
         raise InputError(f"{where}: a value is missing or damaged; give {_WRITTEN}") from None
 
 
-def _arrays(content: bytes, names: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the arrays of some names in the content of a file, or all arrays if none is given."""
-    found = {}
+def _arrays(content: bytes, names: Sequence[str] = ()) -> tuple[dict[str, Any], str]:
+    """Return the arrays of some names in the content of a file, or all if none is given.
+
+    The second value is the digest of these arrays without `DIGEST`.
+    """
+    found, digest = {}, hashlib.sha256()
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         allowed = {f"{name}.npy" for name in (*TEXTS, *ROWS, AXES, *EVENTS, SENSITIVITIES)}
         entries = [archive.getinfo(f"{name}.npy") for name in names] or archive.infolist()
@@ -108,9 +121,12 @@ def _arrays(content: bytes, names: Sequence[str] = ()) -> dict[str, Any]:
             allowed.remove(each.filename)  # an error if the name is unknown, or occurs twice
             if each.compress_type != zipfile.ZIP_STORED or each.file_size > len(content):
                 raise ValueError("an entry is compressed")
-            # This compares the data with their checksum.
-            found[each.filename.removesuffix(".npy")] = _array(archive.read(each))
-    return found
+            data = archive.read(each)
+            name = each.filename.removesuffix(".npy")
+            if name != DIGEST:
+                add_entry(digest, each.filename, data)
+            found[name] = _array(data)
+    return found, digest.hexdigest()
 
 
 def _array(data: bytes) -> Any:

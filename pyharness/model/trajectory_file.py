@@ -2,9 +2,10 @@
 
 A file is a ZIP archive of arrays in NumPy's format, as `numpy.savez` writes it. The array `header`
 is a JSON text with the attributes that are no arrays, and with the schema number. The array `scene`
-is the text of a scene file.
+is the text of a scene file, and `sha256` that of the digest of all other arrays.
 """
 
+import hashlib
 import io
 import json
 import os
@@ -28,7 +29,8 @@ if TYPE_CHECKING:
     from pyharness.model.trajectory import Trajectory
 
 KIND = "pyharness trajectory"  # in the header of each file
-TEXTS = ("header", "scene")
+DIGEST = "sha256"  # the last array
+TEXTS = ("header", "scene", DIGEST)
 # For each array the kind of its numbers, and the shape of a row.
 ROWS: dict[str, tuple[str, tuple[int, ...]]] = {
     "time": ("f8", ()),
@@ -109,13 +111,28 @@ def file_content(found: "Trajectory") -> bytes:
         none = np.zeros((len(found.time), width, 0))
         arrays[SENSITIVITIES] = np.concatenate([none, *columns.values()], axis=2)
     arrays["header"] = json.dumps(header)
-    buffer = io.BytesIO()
+    return archive_of(arrays)
+
+
+def archive_of(arrays: dict[str, Any]) -> bytes:
+    """Return the bytes of an archive of arrays, with their digest."""
+    buffer, digest = io.BytesIO(), hashlib.sha256()
     with zipfile.ZipFile(buffer, "w") as archive:
-        for name, array in arrays.items():
+        for name in [*(each for each in arrays if each != DIGEST), DIGEST]:
+            array = digest.hexdigest() if name == DIGEST else arrays[name]
+            entry = io.BytesIO()
+            np.lib.format.write_array(entry, np.asanyarray(array), allow_pickle=False)
+            add_entry(digest, f"{name}.npy", entry.getbuffer())
             # An entry without a date has the same bytes in every run.
             with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as file:
-                np.lib.format.write_array(file, np.asanyarray(array), allow_pickle=False)
+                file.write(entry.getbuffer())
     return buffer.getvalue()
+
+
+def add_entry(digest: Any, name: str, data: bytes | memoryview) -> None:
+    """Add the name, length and bytes of an entry of an archive to a digest of hashlib."""
+    digest.update(f"{name} {len(data)}\n".encode())
+    digest.update(data)
 
 
 def _moments_record(moments: Any) -> Any:

@@ -37,7 +37,7 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.symbols import MOST_OPERATIONS
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Trajectory
-from pyharness.model.trajectory_file import file_content
+from pyharness.model.trajectory_file import archive_of, file_content
 from pyharness.torques import damping, gravity_gradient, recorded
 from tests.dynamics.test_terms import INERTIA
 from tests.methods.test_work import GENTLE, TIMES, TORQUES, scene_with, switched, written
@@ -280,13 +280,15 @@ def test_file_is_replaced_completely_or_not_at_all(
     assert load(path).ended == "sensitive"
 
 
-def _content(change: Callable[[dict[str, Any]], Any], **writing: Any) -> bytes:
+def _content(change: Callable[[dict[str, Any]], Any], compressed: bool = False) -> bytes:
     """Return the content of a file whose arrays were changed before they are written."""
     with np.load(io.BytesIO(file_content(with_attitude(scene_with(written, True))))) as file:
         arrays = dict(file)
     change(arrays)
+    if not compressed:
+        return archive_of(arrays)
     buffer = io.BytesIO()
-    (np.savez_compressed if writing.get("compressed") else np.savez)(buffer, **arrays)
+    np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()
 
 
@@ -419,6 +421,62 @@ def test_foreign_file_is_refused_in_a_line(
     assert list(tmp_path.iterdir()) == [path]
 
 
+def _edited(arrays: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    """Return arrays with other values, and the digest as it was."""
+    return {**arrays, **{name: change(arrays[name].copy()) for name, change in changes.items()}}
+
+
+def _nan(omega: Any) -> Any:
+    omega[-1] = np.nan
+    return omega
+
+
+EDITED: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {
+    "a NaN": lambda arrays: _edited(arrays, omega=_nan),
+    "a bit": lambda arrays: _edited(arrays, omega=lambda each: np.nextafter(each, 9.0)),
+    "unordered times": lambda arrays: _edited(arrays, time=lambda each: np.roll(each, 1)),
+    "fewer rows": lambda arrays: _edited(
+        arrays, time=lambda each: each[:-1], omega=lambda each: each[:-1],
+        attitude=lambda each: each[:-1],
+    ),
+    "another ending": lambda arrays: _edited(
+        arrays, header=lambda each: np.array(str(each).replace("complete", "sensitive"))
+    ),
+    "another scene": lambda arrays: _edited(
+        arrays, scene=lambda each: np.array(str(each).replace("omega = [", "omega = [1"))
+    ),
+    "another error": lambda arrays: _edited(
+        arrays, header=lambda each: np.array(json.dumps({**json.loads(str(each)), "error": 0.0}))
+    ),
+    "no attitude": lambda arrays: {x: y for x, y in arrays.items() if x != "attitude"},
+    "another order": lambda arrays: dict(sorted(arrays.items())),
+    "no digest": lambda arrays: {x: y for x, y in arrays.items() if x != "sha256"},
+    "another digest": lambda arrays: {**arrays, "sha256": np.array("0" * 64)},
+    "digest of numbers": lambda arrays: {**arrays, "sha256": np.zeros(64)},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EDITED)
+def test_file_that_was_edited_is_refused_in_a_line(name: str, tmp_path: Path) -> None:
+    """Every array of the file is valid, but not that of the trajectory which was saved."""
+    path = tmp_path / "found.npz"
+    with_attitude(scene_with(GENTLE)).save(path)
+    with np.load(path) as file:
+        arrays = dict(file)
+    np.savez(path, **arrays)
+    load(path)
+    edited = EDITED[name](arrays)
+    assert list(edited) != list(arrays) or any(
+        edited[each].tobytes() != array.tobytes() for each, array in arrays.items()
+    )
+    np.savez(path, **edited)
+    with pytest.raises(InputError) as caught:
+        load(path)
+    reason = "not a trajectory, or damaged" if "numbers" in name else "was changed after it was"
+    assert str(caught.value).startswith(f"trajectory file '{path}': {reason}")
+    assert str(caught.value).endswith("; give a file that Trajectory.save wrote")
+
+
 def test_file_of_another_version_is_not_called_damaged(tmp_path: Path) -> None:
     """A later version may write other arrays."""
     path = tmp_path / "found.npz"
@@ -502,7 +560,7 @@ def test_wrong_value_of_the_header_is_refused(name: str, value: Any, tmp_path: P
     with np.load(io.BytesIO(file_content(solve(case_scene(5), [1.0])))) as file:
         arrays = dict(file)
     header = json.dumps(json.loads(str(arrays["header"])) | {name: value})
-    np.savez(tmp_path / "found.npz", **{**arrays, "header": np.array(header)})
+    (tmp_path / "found.npz").write_bytes(archive_of({**arrays, "header": header}))
     with pytest.raises(InputError, match=r"^trajectory file '\S+': (a value is missing|moments)"):
         load(tmp_path / "found.npz")
 
@@ -526,7 +584,7 @@ def test_each_value_of_the_header_is_checked(tmp_path: Path) -> None:
             for key in place[:-1]:
                 inner = inner[key]
             inner[place[-1]] = hostile
-            np.savez(path, **{**arrays, "header": np.array(json.dumps(changed))})
+            path.write_bytes(archive_of({**arrays, "header": json.dumps(changed)}))
             try:
                 found = load(path)
             except InputError as refusal:
@@ -559,7 +617,7 @@ def test_torque_of_a_file_reads_only_what_is_there(tmp_path: Path) -> None:
     def written_with(operations: Any, outputs: Any) -> None:
         torque = {**first, "operations": operations, "outputs": outputs}
         changed = {**header, "scene": {**header["scene"], "torque": torque}}
-        np.savez(path, **{**arrays, "header": np.array(json.dumps(changed))})
+        path.write_bytes(archive_of({**arrays, "header": json.dumps(changed)}))
 
     zero = [[0.0, []]] * 3
     written_with([["sqrt", [0]]], zero)

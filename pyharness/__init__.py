@@ -4,10 +4,12 @@ The programs are from a thesis. The package has them as printed and as corrected
 results, and solves Euler's equations by other methods.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
+# Type checkers take this name for true. Nothing is imported here, because Ctrl-C is not handled yet
+# while a command imports the package.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from pyharness import events as events
     from pyharness import interchange as interchange
     from pyharness import torques as torques
@@ -115,7 +117,9 @@ _MODULES = ("events", "interchange", "torques")
 # would accept any attribute name.
 if not TYPE_CHECKING:
 
-    def __getattr__(name: str) -> Any:
+    def __getattr__(name: str) -> object:
+        from importlib import import_module
+
         for room, names in _SUBMODULES.items():
             if name in names:
                 return getattr(import_module(f"pyharness.{room}"), name)

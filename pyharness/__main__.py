@@ -1,7 +1,8 @@
 """The entry point of `python -m pyharness` and of the command `pyharness`."""
 
+# The module `signal` would import others first, for some 10 ms.
+import _signal as signal  # type: ignore[import-not-found]  # noqa: PLC2701
 import os
-import signal
 
 
 def _leave(*_: object) -> None:

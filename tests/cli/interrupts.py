@@ -102,12 +102,12 @@ def _judged(code: int, errors: str, was_running: bool, sent: signal.Signals) -> 
     if sent == signal.SIGKILL:
         return "killed" if code == -signal.SIGKILL else f"CODE {code}"
     # Until the interpreter has read the first file of this project, the project can't handle the
-    # signal. The process then dies by the signal, or with a traceback that has no file of the
+    # signal. The process then dies by the signal, or with an error that names no file of the
     # project.
     if code == -signal.SIGINT and not errors:
         return "interpreter's"
-    if "Traceback" in errors:
-        ours = re.search(r'File ".*/pyharness/(?!__init__)[\w/]+\.py"', errors)
+    if "Traceback" in errors or "KeyboardInterrupt" in errors:
+        ours = re.search(r'File ".*/pyharness/[\w/]+\.py"', errors)
         return "TRACEBACK" if ours else "interpreter's"
     # The forecast of a sweep is a line by itself.
     lines = [line for line in errors.splitlines() if " scenes in " not in line]

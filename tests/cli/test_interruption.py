@@ -119,6 +119,38 @@ def test_what_is_left_to_the_resource_tracker_is_removed_without_a_word() -> Non
     assert not Path(f"/dev/shm/sem.{found.stdout.strip().removeprefix('/')}").exists()
 
 
+# A command that interrupts itself when it begins to import a module.
+IMPORTS = """
+import os, runpy, sys
+_, module, *sys.argv[1:] = sys.argv
+
+def interrupt(event, given):
+    if event == "import" and given[0] == module:
+        os.kill(os.getpid(), 2)
+
+sys.addaudithook(interrupt)
+runpy.run_module("pyharness", run_name="__main__", alter_sys=True)
+"""
+
+
+@pytest.mark.parametrize(
+    "module", ["typing", "enum", "pyharness.cli", "argparse", "numpy", "numpy.random"]
+)
+def test_interrupt_during_an_import_ends_in_a_line(module: str) -> None:
+    """Without -S, the interpreter itself imports the first two modules for an editable install."""
+    bare = ["-S"] if module in {"typing", "enum"} else []
+    with hearing():
+        found = subprocess.run(
+            [sys.executable, *bare, "-c", IMPORTS, module, "compare", "--case", "3"],
+            env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]) if bare else ""},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    assert (found.returncode, found.stdout) == (130, "")
+    assert found.stderr == "pyharness: interrupted\n"
+
+
 def test_commands_interrupted_at_random_moments_end_in_a_line() -> None:
     verbs = ["compare", "verify", "here", "processes", "dask"]
     for each in trials(5, 4.0, 2, signal.SIGINT, verbs):

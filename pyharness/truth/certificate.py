@@ -19,6 +19,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.truth.certificate_checker import (
     FORMAT,
+    MOST_BITS,
     SCALE_BITS,
     Expansion,
     NotProvedError,
@@ -114,7 +115,11 @@ def prove(
             found = Enclosure(tuple(times), tuple(run.omega), _WORDS, len(run.steps))
             return Proof(found, run)
         wanted += _decades(excess) + 1.0
-    raise InputError(f"prove: the motion amplifies errors too much for {digits} digits; use fewer")
+    raise _many_digits(digits)
+
+
+def _many_digits(digits: int) -> InputError:
+    return InputError(f"prove: the motion amplifies errors too much for {digits} digits; use fewer")
 
 
 def _decades(x: Fraction) -> float:
@@ -158,6 +163,8 @@ class _Run:
         self._clock = max(_LENGTH_BITS + 12, self._times[-1].denominator.bit_length())
         needed = math.ceil(digits / math.log10(2.0)) + _GUARD_BITS
         self._bits = max(self._clock, needed + _GUARD_BITS + self._order.bit_length())
+        if self._bits > MOST_BITS:
+            raise _many_digits(goal)
         self._most = self._bits - needed  # bits of the last terms
         rows = System(record, self._bits, self._clock, [1, 1, 1]).rows
         scales = scales_of([Fraction(terms[0], common) for common, terms in rows])

@@ -2,7 +2,8 @@
 
 The program needs nothing but Python, and takes nothing from the program that found the proof. It
 computes with integers, and with fractions of integers where it reads numbers. Its arguments are
-files of certificates; its exit status is 1 unless all of them hold.
+files of certificates. It prints the scenes and rows that they prove; its exit status is 1 unless
+all of them hold.
 
 The equations are y' = f(t, y) for the angular velocity omega, and for the sines and cosines of the
 torque. In a step of the length h, the solution is approximated by a polynomial p(s), s from 0 to 1,
@@ -18,15 +19,18 @@ The norm of an error of omega is sqrt(sum (e_i / scale_i)**2), with scales in un
 """
 
 import json
+import re
 import sys
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import accumulate
-from math import isqrt, lcm
+from math import isfinite, isqrt, lcm
 from operator import mul
 from typing import Any
 
 FORMAT = "pyharness-certificate-2"
+MOST_BITS = 12_000
+LONG, LARGEST = re.compile("[-+.0-9eE/]{4301}"), 1 << 28  # a number, characters of a file
 SCALE_BITS = 20
 UNIT = 1 << 64  # the factor by which an error grows in a step is an integer over this number
 
@@ -150,10 +154,6 @@ class System:
             raise NotProvedError("the solution may leave the tube")
         return radius, wave_radius
 
-    def place(self, seconds: float, time: int, h: int) -> Fraction:
-        """Return the place of a time (s) in a step from `time` on: 0 to 1 if it is inside."""
-        return (Fraction(seconds) * (1 << self.clock) - time) / h
-
     def ball(
         self, series: Sequence[list[int]], place: Fraction, radius: int
     ) -> tuple[list[int], Fraction]:
@@ -185,38 +185,54 @@ def exponential(x: int) -> int:
     return total + term  # the rest of the series is less than its last term
 
 
-def check_row(row: dict[str, Any], bits: int, middle: Sequence[int], radius: Fraction) -> None:
-    """Check that a row contains the ball of a step at its time; the ball is over 2**bits."""
-    for text, x in zip(row["omega"], middle, strict=True):
-        if abs(Fraction(text) * (1 << bits) - x) + radius > Fraction(row["radius"]) * (1 << bits):
-            raise NotProvedError(f"the row at {row['time']} s does not contain the solution")
+# The parts of a certificate: a tuple for a list of this length, a list for one of any length, a set
+# of types. Numbers of which binary64 would not have all digits are texts.
+NUMBER = re.compile("-?[0-9]+([./][0-9]+)?")
+WHOLE, REAL, TEXT, EXACT = {int}, {int, float}, {str, NUMBER}, {int, float, NUMBER}
+THREE, WAVES = (REAL,) * 3, [((REAL,) * 3, REAL)]
+TORQUE = {"constant": THREE, "rate": THREE, "sines": WAVES, "cosines": WAVES}
+SCENE = {"name": TEXT, "omega": THREE, "torque": TORQUE}
+FORM: Any = {"format": TEXT, "bits": WHOLE, "clock": WHOLE, "order": WHOLE, "scales": (WHOLE,) * 3}
+FORM |= {"steps": [(WHOLE, WHOLE, WHOLE, (WHOLE,) * 3)]}
+FORM |= {"rows": [{"time": REAL, "omega": ({NUMBER},) * 3, "radius": REAL}]}
+
+
+def fits(value: Any, form: Any) -> bool:
+    """Return whether a part of a certificate has the keys, lengths and types of its form."""
+    if type(form) is dict:
+        same = type(value) is dict and {*value} == {*form}
+        return same and all(fits(value[key], form[key]) for key in form)
+    if type(form) is set:
+        kind = NUMBER if type(value) is str and NUMBER.fullmatch(value) else type(value)
+        return kind in form and (kind is not float or isfinite(value))
+    parts = form * len(value) if type(form) is list and type(value) is list else form
+    return type(value) is list and len(value) == len(parts) and all(map(fits, value, parts))
 
 
 def check(certificate: dict[str, Any]) -> int:
     """Return the number of steps of a certificate; raise NotProvedError if it does not hold."""
-    if certificate["format"] != FORMAT:
-        raise NotProvedError(f"its format is not {FORMAT}")
-    bits, clock, order = (certificate[each] for each in ("bits", "clock", "order"))
-    scene, scales, rows = certificate["scene"], certificate["scales"], [*certificate["rows"]]
-    whole = [bits, clock, order, *scales]
-    for h, tube, stated, after in certificate["steps"]:
-        whole += [h, tube, stated, *after]
-    positive = min(*scales, *map(Fraction, scene.get("moments", [1]))) > 0
-    ordered = rows == sorted(rows, key=lambda row: abs(row["time"]))
-    if not rows or not ordered or len({*scene} - {"name"}) != 3 or len(scene["torque"]) != 4:
-        raise NotProvedError("it has no rows in order, or its scene has keys that are not checked")
-    if any(type(x) is not int for x in whole) or not (positive and 0 < clock <= bits and order > 1):
-        raise NotProvedError("a number is not an integer, or not in its range")
-    system = System(scene, bits, clock, scales)
-    middle = [int(Fraction(x) * (1 << bits)) for x in scene["omega"]]
-    waves = [0, 1 << bits] * len(system.frequencies)
+    scene = certificate["scene"]
+    body = "coefficients" if "coefficients" in scene else "moments"
+    if not fits(certificate, {**FORM, "scene": {**SCENE, body: (EXACT,) * 3}}):
+        raise NotProvedError("a key, or the length or type of a value, is not allowed")
+    bits, clock, order, scales = (certificate[x] for x in ("bits", "clock", "order", "scales"))
+    rows, least = [*certificate["rows"]], min(*scales, *map(Fraction, scene.get("moments", [1])))
+    ranged = 0 < clock <= bits <= MOST_BITS and 1 < order <= bits and least > 0
+    if not (ranged and rows and certificate["format"] == FORMAT):
+        raise NotProvedError("its format or a number is not allowed, or it has no rows")
+    system, unit = System(scene, bits, clock, scales), 1 << bits
+    middle = [int(Fraction(x) * unit) for x in scene["omega"]]
+    waves = [0, unit] * len(system.frequencies)
     radius, wave_radius, time = system.norm([1, 1, 1]), 0, 0
     for number, (h, tube, stated, after) in enumerate(certificate["steps"], 1):
         try:
             expansion = system.expand([*middle, *waves], time, h, order)
             radius, wave_radius = system.radii(radius, wave_radius, expansion, tube, h)
-            while rows and 0 <= (place := system.place(rows[0]["time"], time, h)) <= 1:
-                check_row(rows.pop(0), bits, *system.ball(expansion[0], place, radius))
+            while rows and 0 <= (place := (Fraction(rows[0]["time"]) * 2**clock - time) / h) <= 1:
+                row, (center, size) = rows.pop(0), system.ball(expansion[0], place, radius)
+                away = max(abs(Fraction(row["omega"][i]) * unit - x) for i, x in enumerate(center))
+                if away + size > Fraction(row["radius"]) * unit:
+                    raise NotProvedError(f"row at {row['time']} s does not contain the solution")
             ends = [sum(each) for each in expansion[0]]
             moved = [x - y for x, y in zip(ends[:3], after, strict=True)]
             if radius + system.norm(moved) > stated:
@@ -229,21 +245,33 @@ def check(certificate: dict[str, Any]) -> int:
     return len(certificate["steps"])
 
 
-def check_file(name: str) -> tuple[int | None, str]:
-    """Return the number of steps of a certificate, or None if it fails, and why it fails."""
+def check_file(name: str) -> tuple[dict[str, Any] | None, str]:
+    """Return a certificate that holds, or None if it fails, and why it fails."""
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        return dict(pairs) if len(dict(pairs)) == len(pairs) else {"a key occurs twice": None}
+
     try:
         with open(name, encoding="ascii") as file:
-            return check(json.load(file)), ""
+            text = file.read(LARGEST)
+        if LONG.search(text):
+            raise NotProvedError("a number has more than 4300 characters")
+        check(found := json.loads(text, object_pairs_hook=unique))
+        return found, ""
     except Exception as why:
         return None, f"{type(why).__name__}: {why}"
 
 
 def main(names: Sequence[str]) -> int:
-    """Check certificates in files, and print a line for each; return 1 if one does not hold."""
+    """Check certificates in files, and print what they prove; return 1 if one does not hold."""
     found = [(name, *check_file(name)) for name in names]
-    for name, steps, why in found:
-        print(f"{name}: not proved: {why}" if steps is None else f"{name}: proved, {steps} steps")
-    return int(any(steps is None for _, steps, _ in found))
+    for name, proved, why in found:
+        lines = [f"not proved: {why}"]
+        if proved is not None:
+            lines = [f"proved, {len(proved['steps'])} steps; omega within the radius, in rad/s:"]
+            lines += map(json.dumps, (proved["scene"], *proved["rows"]))
+        print(f"{name}:", "\n  ".join(lines))
+    return int(any(proved is None for _, proved, _ in found))
 
 
 if __name__ == "__main__":

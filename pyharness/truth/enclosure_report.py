@@ -1,5 +1,6 @@
 """The reports of the verb `prove`: enclosures of a solution, and checked certificates."""
 
+import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -32,15 +33,7 @@ def enclosure_report(scene: Scene, digits: int, found: Enclosure) -> Report:
         [
             f"proved by {found.how}{steps}. The true value differs from a value by at most its "
             "radius:",
-            Table(
-                [
-                    Column("time", lambda x: f"{x:.6g}", unit="s"),
-                    Column("quantity", left=True),
-                    Column("value", left=True),
-                    Column("radius", short),
-                ],
-                [[time, name, value, radius] for time, name, value, radius, _ in lines],
-            ),
+            _table([lines]),
         ],
     ]
     columns = [
@@ -81,15 +74,17 @@ def _lines(row: dict[str, Any]) -> list[list[Any]]:
     return lines
 
 
-def certificates_report(found: Sequence[tuple[str, int | None, str]]) -> Report:
-    """Return the report of checked certificates.
+def certificates_report(found: Sequence[tuple[str, dict[str, Any] | None, str]]) -> Report:
+    """Return the report of checked certificates, with the scenes and rows that they prove.
 
-    Each of `found` has the name of a file, the number of its steps or None if the certificate does
-    not hold, and the reason why not.
+    Each of `found` has the name of a file, the certificate or None if it does not hold, and the
+    reason why not.
     """
-    rows = [
-        [name, "proved", steps, "-"] if steps is not None else [name, "not proved", None, why]
-        for name, steps, why in found
+    verdicts = [
+        [name, "not proved", None, why]
+        if proved is None
+        else [name, "proved", len(proved["steps"]), "-"]
+        for name, proved, why in found
     ]
     columns = [
         Column("certificate", left=True),
@@ -97,14 +92,34 @@ def certificates_report(found: Sequence[tuple[str, int | None, str]]) -> Report:
         Column("steps"),
         Column("reason", left=True, fit="wrap"),
     ]
+    text: list[Section] = [[Table(columns, verdicts)]]
+    for name, proved, _ in found:
+        if proved is not None:
+            lines = [_lines(row) for row in proved["rows"]]
+            text.append([f"{name} proves, of {json.dumps(proved['scene'])}:", _table(lines)])
     return Report(
         "prove",
-        [[Table(columns, rows)]],
+        text,
         record=lambda: {
             "certificates": [
-                {"file": name, "proved": steps is not None, "steps": steps, "reason": why}
-                for name, steps, why in found
+                {
+                    **{"file": name, "proved": proved is not None},
+                    **{"steps": steps, "reason": why},
+                    **{key: proved and proved[key] for key in ("scene", "rows")},
+                }
+                for (name, proved, why), (_, _, steps, _) in zip(found, verdicts, strict=True)
             ]
         },
-        data=Table(columns, rows),
+        data=Table(columns, verdicts),
     )
+
+
+def _table(lines: Sequence[Sequence[Sequence[Any]]]) -> Table:
+    """Return the table of the lines of each row, without their units."""
+    columns = [
+        Column("time", lambda x: f"{x:.6g}", unit="s"),
+        Column("quantity", left=True),
+        Column("value", left=True),
+        Column("radius", short),
+    ]
+    return Table(columns, [line[:4] for row in lines for line in row])

@@ -88,9 +88,11 @@ def test_certificate_is_written_and_verified(printed: Printed) -> None:
     assert [each["omega"] for each in record["rows"]] == [each["omega"] for each in found["rows"]]
     assert "proved" in printed("prove --check new.json")
     verdict = valid(printed("prove --check new.json --format json"))["certificates"]
-    assert verdict == [
-        {"file": "new.json", "proved": True, "steps": len(record["steps"]), "reason": ""}
-    ]
+    facts = {"file": "new.json", "proved": True, "steps": len(record["steps"]), "reason": ""}
+    assert verdict == [{**facts, "scene": record["scene"], "rows": record["rows"]}]
+    shown = printed("prove --check new.json")
+    assert all(x in shown for row in record["rows"] for x in row["omega"])
+    assert json.dumps(record["scene"]) in " ".join(shown.split())
     lines = printed("prove --check new.json --format csv").splitlines()
     assert lines[-1].startswith("new.json,proved")
 

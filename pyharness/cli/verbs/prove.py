@@ -80,4 +80,4 @@ def _check(options: argparse.Namespace) -> int:
         shared.progress(number, len(names), name)
         found.append((name, *check_file(name)))
     shared.show(certificates_report(found), options)
-    return int(any(steps is None for _, steps, _ in found))
+    return int(any(proved is None for _, proved, _ in found))

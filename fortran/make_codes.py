@@ -1,7 +1,7 @@
-"""Write the constants that Python and the kernels share.
+"""Write the constants that Python and the kernels share: make_codes.py SOURCE FOLDER.
 
-The constants of each class are written as a Fortran module, or those of the operations as a C
-header.
+Each class becomes a Fortran module in a file of its own, since Meson records one module a file. C
+gets a header. A file is written only if it changes, so that only its users are compiled again.
 """
 
 import runpy
@@ -10,24 +10,26 @@ from collections.abc import Iterator
 from pathlib import Path
 
 
-def modules(source: str) -> str:
-    """Return the text of the Fortran modules for the classes in pyharness/model/codes.py."""
-    classes = [each for each in runpy.run_path(source).values() if isinstance(each, type)]
-    return "".join(f"{line}\n" for each in classes for line in _module(each))
+def written(source: str) -> dict[str, str]:
+    """Return the text of each file, by its name, for the classes in pyharness/model/codes.py."""
+    classes = {
+        name: {each: value for each, value in vars(codes).items() if each.isupper()}
+        for name, codes in runpy.run_path(source).items()
+        if isinstance(codes, type)
+    }
+    texts = {
+        f"{name.lower()}.f90": "\n".join(_module(name.lower(), numbers))
+        for name, numbers in classes.items()
+    }
+    # The other statuses include OVERFLOW, a macro of some math.h.
+    for_c = classes["Operations"] | {"COMPLETE": classes["Statuses"]["COMPLETE"]}
+    listed = ", ".join(f"{name} = {value}" for name, value in for_c.items())
+    return texts | {"codes.h": f"enum {{ {listed} }};"}
 
 
-def header(source: str) -> str:
-    """Return the text of a C header with the operations of tapes."""
-    codes = runpy.run_path(source)["Operations"]
-    numbers = (f"{each} = {value}" for each, value in vars(codes).items() if each.isupper())
-    return f"enum {{ {', '.join(numbers)} }};\n"
-
-
-def _module(codes: type) -> Iterator[str]:
-    name = codes.__name__.lower()
+def _module(name: str, numbers: dict[str, int | float]) -> Iterator[str]:
     yield f"module {name}"
     yield "  !! Written by fortran/make_codes.py; pyharness/model/codes.py says what is what."
-    numbers = {each: value for each, value in vars(codes).items() if each.isupper()}
     if any(isinstance(value, float) for value in numbers.values()):
         yield "  use, intrinsic :: iso_fortran_env, only: real64"
     yield "  implicit none(type, external)"
@@ -40,6 +42,13 @@ def _module(codes: type) -> Iterator[str]:
     yield f"end module {name}"
 
 
+def main(source: str, folder: str) -> None:
+    """Write the files that have changed, or are missing, to `folder`."""
+    for name, text in written(source).items():
+        target = Path(folder, name)
+        if not target.exists() or target.read_text() != f"{text}\n":
+            target.write_text(f"{text}\n")
+
+
 if __name__ == "__main__":
-    write = header if sys.argv[2].endswith(".h") else modules
-    Path(sys.argv[2]).write_text(write(sys.argv[1]))
+    main(*sys.argv[1:])

@@ -102,6 +102,10 @@ def many_as_written(folder: Path) -> Callable[..., tuple[Array, Array, NDArray[n
 def _compiled(
     folder: Path, kernels: Sequence[str], changes: Mapping[str, tuple[str, str]]
 ) -> ctypes.CDLL:
+    maker = [sys.executable, str(_FORTRAN / "make_codes.py"), codes.__file__, str(folder)]
+    subprocess.run(maker, check=True)
+    command = [COMPILER, "-shared", "-fPIC", "-O1", "-o", "loops.so"]
+    command += sorted(path.name for path in folder.glob("*.f90"))
     sources = ["kinds.f90", "interruption.f90", "../tests/never_interrupted.f90", *kernels]
     for source in sources:
         text = (_FORTRAN / source).read_text()
@@ -110,8 +114,5 @@ def _compiled(
             assert text.count(old) == 1, old
             text = text.replace(old, new)
         (folder / Path(source).name).write_text(text)
-    maker = [sys.executable, str(_FORTRAN / "make_codes.py"), codes.__file__, "codes.f90"]
-    subprocess.run(maker, cwd=folder, check=True)
-    command = [COMPILER, "-shared", "-fPIC", "-O1", "-o", "loops.so", "codes.f90"]
     subprocess.run([*command, *(Path(each).name for each in sources)], cwd=folder, check=True)
     return ctypes.CDLL(str(folder / "loops.so"))

@@ -139,8 +139,13 @@ def compiled(level: str, folder: Path) -> str:
     unroll = [sys.executable, str(FORTRAN / "modern/unroll.py"), level, target]
     subprocess.run([*unroll, *given], cwd=folder, check=True)
     codes = [sys.executable, str(FORTRAN / "make_codes.py"), str(ROOT / "pyharness/model/codes.py")]
-    subprocess.run([*codes, "codes.f90"], cwd=folder, check=True)
-    for source in ("codes.f90", *(str(FORTRAN / f"{name}.f90") for name in COMMON)):
+    subprocess.run([*codes, "."], cwd=folder, check=True)
+    for source in (
+        "methods.f90",
+        "series.f90",
+        "statuses.f90",
+        *(str(FORTRAN / f"{name}.f90") for name in COMMON),
+    ):
         gfortran(folder, "-O2", "-c", source)
     gfortran(folder, *flags(level), "-S", target, "-o", "bodies.s")
     return (folder / "bodies.s").read_text()

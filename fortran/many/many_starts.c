@@ -9,6 +9,8 @@
 #define NPY_TARGET_VERSION NPY_2_0_API_VERSION
 #include <numpy/arrayobject.h>
 
+#include "codes.h"
+
 /* The type of solve_packed_many in api_many.f90. */
 typedef void kernel(const double *packed, const int *n_packed, const int *n, const double *omega0,
                     const int *n_times, const double *times, int *given_up, double *omega,
@@ -61,7 +63,7 @@ static int enter(const many_starts *self, PyArrayObject *packed, int n, const do
   const double *numbers = PyArray_DATA(packed);
   int given_up = 0, raised = 0, is_complete = 1;
   self->address(numbers, &n_packed, &n, start, &n_times, times, &given_up, omega, status, &raised);
-  for (int i = 0; i < n && is_complete; i++) is_complete = status[i] == 0;
+  for (int i = 0; i < n && is_complete; i++) is_complete = status[i] == COMPLETE;
   return is_complete;
 }
 

@@ -22,7 +22,6 @@ enum { SIDE_BY_SIDE = 2 };
 typedef double lanes __attribute__((vector_size(8 * SIDE_BY_SIDE)));
 typedef long long bits __attribute__((vector_size(8 * SIDE_BY_SIDE)));
 
-enum { COMPLETE = 0 };                        /* as in codes.py */
 enum { LEAST_ORDER = 8, MOST_ORDER = 27, TERMS = MOST_ORDER + 1 };
 enum { MANY = 3 };                            /* factors of a product that may not show early */
 enum { FEW_TERMS = 5 };                       /* of values amid a step */

@@ -12,6 +12,7 @@
 #define NPY_TARGET_VERSION NPY_2_0_API_VERSION
 #include <numpy/arrayobject.h>
 
+#include "codes.h"
 #include "pyharness.h"
 
 /* The type of solve_packed in api.f90, for three numbers; or of solve_packed_attitude, for
@@ -52,8 +53,6 @@ typedef struct {
   Py_ssize_t room;
   Py_ssize_t latest; /* index of the last call's ending */
 } bound_kernel;
-
-enum { COMPLETE = 0 }; /* one of the statuses */
 
 /* Largest deviation of a squared norm from 1 with which a quaternion is used without
    normalisation. */

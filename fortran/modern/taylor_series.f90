@@ -11,8 +11,8 @@ module taylor_series
 
   integer, parameter, public :: MORE_TURNS = 2
 
-  ! A column of four numbers fills a register; the fourth is not used. The C that unroll.py writes
-  ! (taylor_terms_*.c) depends on this layout.
+  ! A column of four numbers fills a register; the fourth is not used. layout.py reads this
+  ! declaration for the C that unroll.py writes (taylor_terms_*.c).
   type, bind(c), public :: series_t
     real(c_double) :: terms(4, 0:MOST_ORDER) !! coefficient times step**k, rad/s
     real(c_double) :: torque(4, MOST_ORDER)  !! what the torque adds to the terms, rad/s

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 
+import layout
 from unroll_many import attitude_sums, many_steps, paired
 
 MODULES = (
@@ -51,7 +52,7 @@ MODULES = (
     "lanes_runge_kutta",
     "many_programs",
 )
-LEAST_ORDER, MOST_ORDER = 12, 24
+LEAST_ORDER, MOST_ORDER = layout.ORDERS.LEAST_ORDER, layout.ORDERS.MOST_ORDER
 ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)
 ORDER_CARRIED = 7
 # The two factors of the products in equations 13-15, and the arrays in which the plain code stores
@@ -68,14 +69,10 @@ PLACES = {
 CORRECTIONS = {k: float(Fraction(1, k) - Fraction(1.0 / k)) for k in (3, 5, 6)}
 WIDE, LAG = 10, 2  # order from which sums are over all axes at once; newest terms not in them
 # Offsets of the members of series_t, in numbers.
-TORQUE = 4 * (MOST_ORDER + 1)
-RATES = TORQUE + 4 * MOST_ORDER
-CHANGE = RATES + 4
-LANES = CHANGE + 4  # perturbations, four numbers an axis
-TURNS = LANES + 12
-MORE_TURNS = 2  # terms of the attitude beyond the order: the first of the truncation error
-HALF = TURNS + 4 * (MOST_ORDER + MORE_TURNS + 1)
-TURN = HALF + 4
+TERMS, TORQUE, RATES, CHANGE, LANES, TURNS, HALF, TURN = (
+    layout.OFFSETS[name]
+    for name in ("terms", "torque", "factors", "change", "lanes", "turns", "half", "turn")
+)
 OTHERS = {1: (2, 3), 2: (1, 3), 3: (1, 2)}  # the other two axes
 # Signs of the parts of q (0, x, y, z), axis by axis.
 SIGNS = ("-1.0, 1.0, 1.0, -1.0", "-1.0, -1.0, 1.0, 1.0", "-1.0, 1.0, -1.0, 1.0")
@@ -90,7 +87,9 @@ def main(level: str, target: str, *sources: str) -> None:
         file = Path(target).stem
         texts = (Path(source).read_text() for source in sources)
         written = "".join(fortran_source(text, level, file) for text in texts)
-    Path(target).write_text(written)
+    # What did not change is not compiled again.
+    if not Path(target).exists() or Path(target).read_text() != written:
+        Path(target).write_text(written)
 
 
 # ---- The recurrence -----------------------------------------------------------------------------
@@ -339,7 +338,7 @@ def c_source(level: str) -> Iterator[str]:
 
 def c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
     """Yield the statements for omega, mixed with those for the attitude, which wait less."""
-    yield f"const __m256d f = {load(RATES)}, t0 = {load(0)};"
+    yield f"const __m256d f = {load(RATES)}, t0 = {load(TERMS)};"
     yield "const __m256d a0 = TURNED_ONCE(t0), b0 = TURNED_TWICE(t0);"
     if with_attitude:
         yield f"const __m256d half = {load(HALF)};"
@@ -354,7 +353,7 @@ def c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
         if not term:
             continue
         k = int(term[1])
-        yield f"_mm256_store_pd(s + {4 * k}, t{k});"
+        yield f"_mm256_store_pd(s + {TERMS + 4 * k}, t{k});"
         if k < order:
             yield f"const __m256d a{k} = TURNED_ONCE(t{k}), b{k} = TURNED_TWICE(t{k});"
         if k == 5:
@@ -455,7 +454,8 @@ def c_variations(order: int, wide: bool) -> Iterator[str]:
         yield f"const __m256d f{axis} = EACH(s[{RATES + axis - 1}]);"
         # Axis u is multiplied by the omega of axis v, and the other way round.
         for mine, other in ((u, v), (v, u)):
-            yield f"const __m256d n{axis}{mine} = _mm256_mul_pd(f{axis}, EACH(s[{other - 1}]));"
+            factor = f"EACH(s[{TERMS + other - 1}])"
+            yield f"const __m256d n{axis}{mine} = _mm256_mul_pd(f{axis}, {factor});"
     yield "__m256d sum1 = v1_0, sum2 = v2_0, sum3 = v3_0;"
     yield from older_factors(0, wide)
     for k in range(1, order + 1, 2):
@@ -491,10 +491,11 @@ def omega_factors(j: int, wide: bool) -> Iterator[str]:
     """Yield the registers that term j of omega contributes to products."""
     if not wide:
         yield from (
-            f"const __m256d w{axis}_{j} = EACH(s[{4 * j + axis - 1}]);" for axis in (1, 2, 3)
+            f"const __m256d w{axis}_{j} = EACH(s[{TERMS + 4 * j + axis - 1}]);"
+            for axis in (1, 2, 3)
         )
         return
-    yield f"const __m512d w_{j} = _mm512_broadcast_f64x4({load(4 * j)});"
+    yield f"const __m512d w_{j} = _mm512_broadcast_f64x4({load(TERMS + 4 * j)});"
     for axis, (u, v) in OTHERS.items():
         places = ", ".join([str(v - 1)] * 4 + [str(u - 1)] * 4)
         yield (

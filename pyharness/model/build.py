@@ -22,12 +22,16 @@ OPTIONAL = {
 """Distributions that are needed for a part of the package only, with that part."""
 
 INFLUENCES = (
-    "CC", "CFLAGS", "COLUMNS", "DASK_CONFIG", "FC", "FFLAGS", "GOTO_NUM_THREADS", "LANG", "LC_ALL",
-    "LD_LIBRARY_PATH", "LD_PRELOAD", "MKL_NUM_THREADS", "MPLBACKEND", "NO_COLOR",
-    "NPY_DISABLE_CPU_FEATURES", "OMP_NUM_THREADS", "OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE",
-    "PYTHONHASHSEED", "PYTHONHOME", "PYTHONOPTIMIZE", "PYTHONPATH", "PYTHONUTF8",
+    "CC", "CFLAGS", "COLUMNS", "CPPFLAGS", "DASK_CONFIG", "FC", "FFLAGS", "GOTO_NUM_THREADS",
+    "LANG", "LC_ALL", "LDFLAGS", "LD_LIBRARY_PATH", "LD_PRELOAD", "MKL_NUM_THREADS", "MPLBACKEND",
+    "NO_COLOR", "NPY_DISABLE_CPU_FEATURES", "OMP_NUM_THREADS", "OPENBLAS_CORETYPE",
+    "OPENBLAS_L2_SIZE", "PYTHONHASHSEED", "PYTHONHOME", "PYTHONOPTIMIZE", "PYTHONPATH",
+    "PYTHONUTF8",
 )  # fmt: skip
 """Variables of the environment that may change results, output, or what is imported or built."""
+
+AS_WRITTEN = "as written"
+"""What `Installation.arithmetic` is unless an option or a library changes the arithmetic."""
 
 _LEVELS = ("plain", "avx2", "avx512")
 
@@ -84,9 +88,10 @@ class Installation:
     `folder` is the folder of the package, and `installer` the program that installed it, with the
     word ``editable`` for an editable installation. `processor` is the name of the processor,
     `cores` the number of cores that this process may use, and `instructions` the set of
-    instructions that the kernels use. `instructions` is None if the extension is not built.
-    `packages` has the version of each package, None if it is missing. `environment` has the
-    variables of `INFLUENCES` that are set.
+    instructions that the kernels use. `arithmetic` says what disturbs the arithmetic of the
+    kernels, else ``as written``. Both are None if the extension is not built. `packages` has the
+    version of each package, None if it is missing. `environment` has the variables of `INFLUENCES`
+    that are set.
     """
 
     folder: str
@@ -94,6 +99,7 @@ class Installation:
     processor: str
     cores: int
     instructions: str | None
+    arithmetic: str | None
     packages: dict[str, str | None]
     environment: dict[str, str]
 
@@ -107,6 +113,7 @@ def installation() -> Installation:
         processor=_processor(),
         cores=len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else _cores(),
         instructions=_instructions(),
+        arithmetic=_arithmetic(),
         packages={name: _version(name) for name in (*REQUIRED, *OPTIONAL)},
         environment={name: os.environ[name] for name in INFLUENCES if name in os.environ},
     )
@@ -138,6 +145,21 @@ def _instructions() -> str | None:
         return None
     # The best set is chosen when the extension is loaded; this call repeats the choice.
     return _LEVELS[int(choose_instructions(len(_LEVELS) - 1))]
+
+
+def _arithmetic() -> str | None:
+    """Return what disturbs the arithmetic of the kernels, tested by a compiled function."""
+    try:
+        from pyharness._kernels import arithmetic_faults
+    except ImportError:
+        return None
+    is_changed, is_flushed = arithmetic_faults((5.0, 0.0, float("nan"), sys.float_info.min))
+    faults = []
+    if is_changed:
+        faults.append("results may be wrong: built with an option such as -Ofast; build without")
+    if is_flushed:
+        faults.append("subnormal numbers become 0: a library was linked with -ffast-math")
+    return "; ".join(faults) or AS_WRITTEN
 
 
 def machine(packages: Iterable[str]) -> dict[str, str]:
@@ -192,6 +214,7 @@ def doctor_report(build: Build, here: Installation) -> Report:
         "platform": build.platform,
         "processor": f"{here.processor}, {here.cores} cores",
         "instructions": here.instructions or "unknown, for nothing is built",
+        "arithmetic": here.arithmetic or "unknown, for nothing is built",
     }
     for name in REQUIRED:
         rows[name] = here.packages[name] or f"missing: 'pip install {name}'"

@@ -1,9 +1,11 @@
 """The command line: contracts, exit codes, and every mistake answered in one line."""
 
 import csv
+import ctypes
 import json
 import math
 import os
+import platform
 import re
 import shlex
 import subprocess
@@ -316,6 +318,33 @@ def test_doctor_prints_what_a_bug_report_needs(
     for name, text in found["packages"].items():
         assert f"{name:18s}{text or 'missing'}" in out
     assert Path(found["folder"]).samefile(Path(build.__file__).parents[1])
+
+
+def test_doctor_fails_if_the_arithmetic_is_not_as_written(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pyharness._kernels.arithmetic_faults", lambda numbers: (1, 0))
+    assert main(["doctor"]) == 1
+    assert "arithmetic        results may be wrong: built with" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(
+    sys.platform != "linux" or platform.machine() != "x86_64", reason="sets a register of x86-64"
+)
+def test_doctor_sees_that_subnormal_numbers_become_0() -> None:
+    """As in a process that has loaded a library linked with -ffast-math."""
+    assert build.installation().arithmetic == build.AS_WRITTEN
+    library, kept = ctypes.CDLL("libm.so.6"), ctypes.create_string_buffer(32)
+    library.fegetenv(kept)
+    changed = ctypes.create_string_buffer(kept.raw, 32)
+    changed[29] = bytes([kept.raw[29] | 0x80])  # flush to zero, in the control register of SSE
+    library.fesetenv(changed)
+    try:
+        found = build.installation().arithmetic
+    finally:
+        library.fesetenv(kept)
+    assert found == "subnormal numbers become 0: a library was linked with -ffast-math"
+    assert build.installation().arithmetic == build.AS_WRITTEN
 
 
 def _python(*arguments: str) -> subprocess.CompletedProcess[str]:

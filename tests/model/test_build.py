@@ -3,6 +3,7 @@
 import importlib.util
 import os
 import platform
+import runpy
 import shutil
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import pytest
 from pyharness import _build  # noqa: PLC2701
 from pyharness.model import extension
 from pyharness.model.build import build
+from tests.as_written import COMPILER
 from tests.instruction_sets import LEVELS
 
 ROOT = Path(__file__).parent.parent.parent
@@ -84,6 +86,51 @@ def test_an_editable_install_in_build_isolation_is_refused(tmp_path: Path) -> No
     (line,) = refused.stdout.splitlines()
     assert "'make .venv/ready'" in line
     assert "pip install --no-build-isolation --editable ." in line
+
+
+@pytest.mark.external
+@pytest.mark.skipif(_build.COMPILER != "gcc", reason="the options are those of gcc")
+@pytest.mark.parametrize("source", ["arithmetic.c", "arithmetic.f90"])
+@pytest.mark.parametrize(
+    "flags",
+    ["-O3 -ffp-contract=fast -fno-trapping-math", "-Ofast", "-ffinite-math-only",
+     "-freciprocal-math", "-fno-signed-zeros"],
+)  # fmt: skip
+def test_flags_that_change_the_arithmetic_are_found(source: str, flags: str) -> None:
+    fault = runpy.run_path(str(ROOT / "fortran/check_arithmetic.py"))["fault"]
+    compiler = "cc" if source.endswith("c") else COMPILER
+    found = fault(str(ROOT / "fortran" / source), [compiler, "-O2", *flags.split()])
+    assert (found is None) == ("-ffp-contract" in flags), found
+    assert found is None or f"{flags}' removes or reorders operations" in found
+
+
+@pytest.mark.external
+def test_arithmetic_that_can_not_be_tested_is_no_fault(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The test program may lack a library of the compiler that the kernels do not need."""
+    fault = runpy.run_path(str(ROOT / "fortran/check_arithmetic.py"))["fault"]
+    source = tmp_path / "fails.c"
+    source.write_text("int main(void) { return 127; }\n")
+    assert fault(str(source), ["cc"]) is None
+    assert "its arithmetic is not tested" in capsys.readouterr().out
+    source.write_text("int main(\n")
+    assert "'cc' does not compile" in fault(str(source), ["cc"])
+
+
+@pytest.mark.external
+@pytest.mark.skipif(_build.COMPILER != "gcc", reason="the options are those of gcc")
+@pytest.mark.parametrize("variable", ["CFLAGS", "FFLAGS"])
+def test_a_build_with_such_flags_is_refused_in_one_line(variable: str, tmp_path: Path) -> None:
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    done = subprocess.run(
+        ["meson", "setup", str(tmp_path / "build"), str(ROOT)], cwd=tmp_path, check=False,
+        env=os.environ | {"PATH": path, variable: "-Ofast"}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 1
+    (line,) = (each for each in done.stdout.splitlines() if "ERROR" in each)
+    assert "-Ofast" in line.partition("' removes or reorders operations")[0]
+    assert "leave out options such as -Ofast, -ffast-math" in line
 
 
 @pytest.mark.external

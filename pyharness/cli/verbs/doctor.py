@@ -3,7 +3,7 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.model.build import build, doctor_report, installation
+from pyharness.model.build import AS_WRITTEN, build, doctor_report, installation
 
 FORMATS = ("table", "json")
 OPTIONS = {
@@ -15,9 +15,10 @@ EXAMPLE = "doctor"
 def run(options: argparse.Namespace) -> int:
     """Print how this installation was built, the machine, and the versions of all packages.
 
-    Return exit status 3 if the extension, which is the compiled Fortran code, is not built, else 0.
+    Return exit status 3 if the extension, which is the compiled Fortran code, is not built, 1 if
+    its arithmetic is not as written, else 0.
     """
     shared.check_outputs(options)
-    found = build()
-    shared.show(doctor_report(found, installation()), options)
-    return 0 if found.extension else 3
+    found, here = build(), installation()
+    shared.show(doctor_report(found, here), options)
+    return int(here.arithmetic != AS_WRITTEN) if found.extension else 3

@@ -1,6 +1,6 @@
 """The problem that all solvers of `bench --ensemble` solve, and our own of these solvers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -120,6 +120,13 @@ class EnsembleContender(Contender):
     threads: tuple[int, ...] = (1, 2)
     torque_free: bool = False  # whether the contender solves only bodies without torque
     attitude: bool = False  # whether the contender can compute attitudes
+    # Several ways to prepare the solver, by a note. All are timed, and the fastest counts.
+    variants: Mapping[str, EnsembleMaker] = field(default_factory=dict, kw_only=True)
+
+    @property
+    def ways(self) -> Mapping[str, EnsembleMaker]:
+        """Return all ways to prepare the solver, by their notes; a single way has none."""
+        return self.variants or {"": self.prepare}
 
 
 def draw(seed: str, n: int) -> list[EnsembleLoad]:

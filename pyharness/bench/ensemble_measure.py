@@ -7,9 +7,10 @@ because other work of the machine can only lengthen it. Calls on one core are ti
 time.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import product
 from time import perf_counter, process_time
 
 import numpy as np
@@ -56,6 +57,7 @@ class Rate:
     bodies: int  # number of bodies in a call
     seconds: float  # the shortest time of a call
     error: float  # largest relative error of omega in the sample
+    note: str = ""  # the fastest variant of a solver that has several
 
     @property
     def bodies_a_second(self) -> float:
@@ -183,16 +185,26 @@ def measure_ensembles(
                     found.refused.append((task.place, each.name, "no setting reaches it"))
                     continue
                 shown = None if each.setting == "none" else setting
-                for threads in each.threads:
-                    load, run = _enough(each.prepare, task.load, setting, threads, least)
+                for threads, (note, prepare) in product(each.threads, each.ways.items()):
+                    load, run = _enough(prepare, task.load, setting, threads, least)
                     row = partial(
                         Rate, load.name, task.target, each.name, threads, shown, load.n,
-                        error=task.error(run()),
+                        error=task.error(run()), note=note,
                     )  # fmt: skip
                     yield Call(run, clock_of(threads), row)
 
-    found.rows.extend(timed(tasks, calls, progress, _BATCH, ROUNDS, min, SLOW))
+    found.rows.extend(_fastest(timed(tasks, calls, progress, _BATCH, ROUNDS, min, SLOW)))
     return found
+
+
+def _fastest(rows: Iterable[Rate]) -> Iterable[Rate]:
+    """Return the fastest variant of each solver, in the order of the rows."""
+    found: dict[tuple[object, ...], Rate] = {}
+    for row in rows:
+        place = (row.load, row.target, row.method, row.threads)
+        if place not in found or row.rate > found[place].rate:
+            found[place] = row
+    return found.values()
 
 
 def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:

@@ -20,6 +20,8 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 
+# Bodies of a batch. heyoka recommends 4 even if a register has 8 numbers, which is slower.
+BATCHES = (4, 8, 16)
 _BLOCK = 4096  # bodies whose arrays fit into the cache
 
 
@@ -27,9 +29,21 @@ def ensemble_peers() -> list[EnsembleContender]:
     """Return all third-party solvers in the benchmark `bench --ensemble`, installed or not."""
     one = EnsembleContender
     blocks, alone = partial(compiled.numba_rk4, True), partial(compiled.numba_rk4, False)
+    batches, ensembles = (
+        {f"batches of {size}": partial(prepare, size=size) for size in BATCHES}
+        for prepare in (heyoka_batch, _heyoka_ensemble)
+    )
     return [
-        one("heyoka-batch", "tolerance", heyoka_batch, (1,), attitude=True, package="heyoka"),
-        one("heyoka-ensemble", "tolerance", _heyoka_ensemble, package="heyoka"),
+        one(
+            "heyoka-batch",
+            "tolerance",
+            heyoka_batch,
+            (1,),
+            attitude=True,
+            package="heyoka",
+            variants=batches,
+        ),
+        one("heyoka-ensemble", "tolerance", _heyoka_ensemble, package="heyoka", variants=ensembles),
         one("numba-blocks-rk4", "steps", blocks, package="numba"),
         one("numba-bodies-rk4", "steps", alone, package="numba"),
         one("jax-rk4", "steps", compiled.jax_rk4, (0,), package="jax"),
@@ -39,17 +53,17 @@ def ensemble_peers() -> list[EnsembleContender]:
     ]
 
 
-def heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
+def heyoka_batch(
+    load: EnsembleLoad, setting: float, threads: int, size: int = BATCHES[0]
+) -> Callable[[], Array]:
     """Return a function that integrates all bodies of a load with one heyoka batch integrator.
 
     A load is a set of bodies with their initial omegas and torques. For each batch of bodies in
     turn, the function sets the state and the torque of the integrator. It returns omega of the
     bodies at the end time of the load (rad/s), shape (n, 3), or the attitudes, shape (n, 4), of a
-    load that requests them. `setting` is the tolerance, and `threads` has no effect.
+    load that requests them. `setting` is the tolerance, `size` the number of bodies in a batch, and
+    `threads` has no effect.
     """
-    import heyoka
-
-    size = heyoka.recommended_simd_size()
     of_state = isinstance(load.scene.torque, StateTorque)
     scene = load.scene if of_state else None
     with_attitude = load.attitude0 is not None
@@ -76,10 +90,11 @@ def heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[[
     return run
 
 
-def _heyoka_ensemble(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
+def _heyoka_ensemble(
+    load: EnsembleLoad, setting: float, threads: int, size: int = BATCHES[0]
+) -> Callable[[], Array]:
     import heyoka
 
-    size = heyoka.recommended_simd_size()
     integrator = _integrator(load.torque is not None, setting, size)
     starts, torques = _batches(load.omega0, size), _batches(load.acceleration, size)
 

@@ -1,6 +1,7 @@
 """The report of `bench --terms`: run times and ratios for torques that depend on the state."""
 
 import statistics
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -241,9 +242,17 @@ def _notes(found: Terms) -> list[str]:
             f"{found.many.bodies} bodies: each way has its coarsest tolerance with which the "
             "error of omega of the first 200 bodies is at most the one named, against solve at "
             f"1e-15, on one core. Initial omegas at random, seed {found.many.seed}."
+            + _batches(found.many)
         )
     refused = grouped((name, why, place) for place, name, why in found.many.refused)
     return lines + not_measured(found.single) + refused
+
+
+def _batches(rates: Rates) -> str:
+    """Return how often each size of heyoka's batches was the fastest, as a sentence."""
+    counts = Counter(row.note for row in rates.rows if row.method == MANY_HEYOKA)
+    told = ", ".join(f"{note} ({n} of {counts.total()})" for note, n in counts.most_common())
+    return f" heyoka's fastest: {told}." if told else ""
 
 
 def _data(found: Terms) -> Table:
@@ -255,7 +264,7 @@ def _data(found: Terms) -> Table:
     kinds = {load.label: load.kinds[0] for load in found.single.workloads}
     rows += [
         [kinds[each.load], each.load, HORIZONS[0], each.bodies, each.method, each.setting,
-         each.seconds, each.error, None, ""]
+         each.seconds, each.error, None, each.note]
         for each in found.many.rows
     ]  # fmt: skip
     return numbers("kind torque horizon bodies method setting seconds error preparing note", rows)

@@ -4,6 +4,9 @@ import csv
 import io
 import json
 import re
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +18,18 @@ from pyharness.bench import ensemble_measure as measuring
 from pyharness.bench.contenders import Contender
 from pyharness.bench.ensemble_contenders import (
     EnsembleContender,
+    EnsembleLoad,
     draw,
     own_ensembles,
     with_attitudes,
 )
 from pyharness.bench.ensemble_growth import memory
-from pyharness.bench.ensemble_measure import Rate
+from pyharness.bench.ensemble_measure import Rate, Rates
 from pyharness.bench.ensemble_peers import ensemble_peers
-from pyharness.bench.ensemble_report import ours_over
+from pyharness.bench.ensemble_report import Ensembles, ensemble_report, ours_over
 from pyharness.cli.main import main
+from pyharness.model.trajectory import Array
+from pyharness.views.render import render
 from tests.issue_limit import IDLE, independent
 
 Capture = pytest.CaptureFixture[str]
@@ -55,8 +61,8 @@ def test_contender_comes_to_the_truth(contender: EnsembleContender) -> None:
             continue
         rows = [0, 1, 63, 64, 69]
         wanted = load.part(rows).ends()
-        for threads in contender.threads:
-            run = contender.prepare(load, SETTINGS[contender.setting], threads)
+        for threads, prepare in product(contender.threads, contender.ways.values()):
+            run = prepare(load, SETTINGS[contender.setting], threads)
             run()  # the second call must start from the initial conditions again
             np.testing.assert_allclose(run()[rows], wanted, rtol=0.0, atol=2e-8)
 
@@ -93,6 +99,23 @@ def test_ratio_is_of_ours_on_as_many_cores() -> None:
     ]  # fmt: skip
     assert [ours_over(rows, row) for row in rows] == [2.0, 1.0, 1.0, 5.0, 10.0]
     assert ours_over(rows[3:], rows[3]) is None
+
+
+@pytest.mark.usefixtures("hurried")
+def test_the_fastest_variant_counts() -> None:
+    taylor = next(each for each in own_ensembles() if each.name == "taylor")
+
+    def slowly(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
+        run = taylor.prepare(load, setting, threads)
+        return lambda: (sum(range(200_000)), run())[1]
+
+    both = {"of 4": slowly, "of 8": taylor.prepare, "of 16": slowly}
+    contender = replace(taylor, threads=(1,), variants=both)
+    rows = measuring.measure_ensembles(draw("a", 9)[:1], [contender], "a").rows
+    assert [(row.target, row.note) for row in rows] == [(1e-6, "of 8"), (1e-12, "of 8")]
+    # The report says which it is.
+    shown = render(ensemble_report(Ensembles(Rates("a", 9, rows), [], []), [], "bench"), "table")
+    assert shown.count("taylor, of 8 ") == 2
 
 
 COMMAND = ["bench", "--ensemble", "--bodies", "10", "--seed", "1", "--peers", "numpy,scipy"]

@@ -145,8 +145,10 @@ def _terms(with_heyoka: bool = True) -> Terms:
                 Row(load, "heyoka", "tolerance", 1e-9, factor * 2e-6, 1e-10, None, "", 0.05),
                 Row(load, "heyoka", "tolerance", 1e-16, factor * 4e-6, 1e-15, None, "", 0.04),
             ]
-    for method, seconds in (("taylor", 1.0), ("heyoka-batch", 2.0))[: 1 + with_heyoka]:
-        rates.append(Rate("damping", 1e-6, method, 1, 1e-6, 1000, seconds, 1e-7))
+    for method, seconds, note in (("taylor", 1.0, ""), ("heyoka-batch", 2.0, "batches of 8"))[
+        : 1 + with_heyoka
+    ]:
+        rates.append(Rate("damping", 1e-6, method, 1, 1e-6, 1000, seconds, 1e-7, note))
     return Terms(Finding(loads, rows, [], {}, {}), Rates("seed", 1000, rates))
 
 
@@ -175,6 +177,7 @@ def test_the_report_has_times_ratios_and_preparation() -> None:
     wanted = ["damping", "10", "2.00", "4.00", "2.00", "4.00", "4.00", "2.00", "4.00", "4.00"]
     assert line.split() == [*wanted, "1", "40", "500"]
     assert "Ready terms: 1000 bodies, T = 10 s" in shown
+    assert "heyoka's fastest: batches of 8 (1 of 1)." in " ".join(shown.split())
     without = render(term_report(_terms(False), ["heyoka"], "pyharness bench --terms"), "table")
     assert "ratio" not in without.replace("Geometric", "")
     assert "compile" not in without

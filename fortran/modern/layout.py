@@ -1,4 +1,4 @@
-"""What the C of unroll.py shares with Fortran: the orders, and the layout of series_t."""
+"""The orders, and the layout of series_t, that the C of unroll.py shares with Fortran."""
 
 import re
 import runpy

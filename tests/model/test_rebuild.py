@@ -1,4 +1,4 @@
-"""What is written and compiled anew when a constant, or the type that C shares, changes."""
+"""The files that are written and compiled anew when a constant or series_t changes."""
 
 import json
 import os

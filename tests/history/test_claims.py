@@ -127,10 +127,25 @@ def test_programs_and_methods_disagree_about_the_conclusion(judged: dict[str, Ju
         assert (found.original.verdict, found.corrected.verdict) == (REPRODUCED, FALSE)
         assert found.original.numbers["of 5 cases, won by collocation"] == 5
         # Case 7, whose cards nobody has, is shown and does not count.
-        assert found.original.numbers["case 7: error of collocation over that of Runge-Kutta"] > 1.0
+        assert found.original.numbers[f"case 7: {_LARGER}"] > 1.0
     lab = Laboratory(True)
     assert methods.superior(lab, [2, 7], []).verdict == IN_PART
     assert methods.superior(lab, [7], [2]).verdict == FALSE
+
+
+_LARGER = "larger error of collocation over that of Runge-Kutta"
+
+
+def test_ratio_to_runge_kutta_is_that_of_the_worse_collocation_program() -> None:
+    """In Case 7 the four-term program alone is far below the range that the story tells."""
+    lab, found = Laboratory(False), judgement("abstract-superior")
+    for case in range(2, 8):
+        two, four, third = (lab.error(program, case) for program in PROGRAMS)
+        ratio = found.corrected.numbers[f"case {case}: {_LARGER}"]
+        assert ratio == max(two, four) / third
+    assert two / third > 80.0 > 3.0 > four / third
+    for identity in ("abstract-superior", "vi-superior"):
+        assert "the larger" in claim(identity)["truth"]
 
 
 def test_kinds_are_counted_apart_and_judged_as_what_they_are(

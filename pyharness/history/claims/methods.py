@@ -48,8 +48,8 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
     `lab` runs the programs; only the steps that all three programs ran are compared. A case counts
     if the errors of both collocation programs are below the error of the Runge-Kutta program. The
     verdict is "reproduced" if all `cases` count, "reproduced in part" if some do, otherwise
-    "false". The error ratios of the cases in `shown` are reported too, but do not affect the
-    verdict. An error is the largest error of any omega component against the reference solution.
+    "false". The ratios, of the larger collocation error, of the cases in `shown` are reported too,
+    but do not affect the verdict. An error is the largest error of any omega component against the reference solution.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):
@@ -59,7 +59,7 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
         two, four, third = (distance(run.omega[:common], truth) for run in runs)
         wins += case in cases and max(two, four) < third
         ratio = max(two, four) / third
-        numbers[f"case {case}: error of collocation over that of Runge-Kutta"] = ratio
+        numbers[f"case {case}: larger error of collocation over that of Runge-Kutta"] = ratio
     numbers[f"of {len(cases)} cases, won by collocation"] = wins
     return graded(numbers, wins == len(cases), wins > 0, FALSE)
 

@@ -18,6 +18,7 @@ from pyharness.history.ablation import CaseEffects, effects_of, entries, entry
 from pyharness.history.cards_report import scan_report
 from pyharness.history.claims.ledger import judgement, judgements
 from pyharness.history.claims.report import kinds_table
+from pyharness.history.claims.rules import COLLOCATION
 from pyharness.history.claims.stories import prose
 from pyharness.history.limits import limit
 from pyharness.history.text_digest import text_digest
@@ -89,8 +90,11 @@ def values() -> dict[str, Any]:
             "moment": _number("v1-rigid-bodies", "corrected", "case 6: *"),
         },
         "operations": {
-            "two_term": _number("v3-twice-the-time", "original", "two-term: over *, as written"),
-            "four_term": _number("v3-twice-the-time", "original", "four-term: over *, as written"),
+            f"{_name(program)}{key}": _number(
+                "v3-twice-the-time", "original", f"{program}: {ratio} *, as written"
+            )
+            for program in COLLOCATION
+            for key, ratio in (("", "over"), ("_time", "time over"))
         },
         "machine": _machine(),
         "tables": {

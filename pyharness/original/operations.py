@@ -8,7 +8,7 @@ Operations in subscripts, jumps, ABS and WRITE are not counted.
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from pyharness.model.listing import Listing
@@ -21,10 +21,13 @@ _IF = re.compile(r"IF\((\w+)\.EQ\.(\d+)\)(.*)")
 _TEST = re.compile(r"IF\((.*)\.GT\.(.*)\)GOTO8")
 _CALL = re.compile(r"CALLLEQT1F\(A,M,N,")
 _TARGET = re.compile(r"(\w+?)(?:\(([\w,]+)\))?=(.*)")
+ALIKE = {"+": 1, "-": 1, "*": 1, "/": 1}
 
 
 class Count(NamedTuple):
     """The number of additions, subtractions, multiplications and divisions in a program's step.
+
+    With unit times it is the time that these operations take one after the other.
 
     Attributes
     ----------
@@ -42,13 +45,13 @@ class Count(NamedTuple):
 class _Counter:
     """A counter of the operations in a step, which stores the result of each distinct operation."""
 
-    def __init__(self) -> None:
-        self.written = 0
+    def __init__(self, times: Mapping[str, int]) -> None:
+        self.times, self.written = times, 0
         self.known: dict[tuple[Any, ...], _Number] = {}
         self.constants: dict[float, _Number] = {}
 
     def operate(self, name: str, left: Any, right: Any) -> "_Number":
-        self.written += 1
+        self.written += self.times[name]
         key = (name, _identity(left), _identity(right))
         if key not in self.known:
             x, y = _value(left), _value(right)
@@ -126,11 +129,12 @@ class _Array(defaultdict[tuple[int, ...], Any]):
         return self[subscripts]
 
 
-def operations_per_step(listing: Listing) -> Count:
+def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> Count:
     """Return the number of arithmetic operations of a listing's program in its first step.
 
     The result is a `Count`. A listing is a program with a choice of its defects. The scene is the
-    case of Table 1 of the thesis that is on the published cards of the program.
+    case of Table 1 of the thesis that is on the published cards of the program. `times` has the
+    weight of each operation, for example its unit time on a machine.
     """
     statements = list(_statements(deck_text(listing)))
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))
@@ -138,14 +142,14 @@ def operations_per_step(listing: Listing) -> Count:
     assert label is not None
     end = next(n for n, (name, _) in enumerate(statements) if name == label[1])
     names: dict[str, Any] = {"ABS": abs, "SQRT": lambda x: x}
-    before = _Counter()
+    before = _Counter(times)
     _run(statements[:begin], names, before)
-    counter = _Counter()
+    counter = _Counter(times)
     for name, value in names.items():
         names[name] = _moved(value, counter)
     names[label[2]] = 1
     _run(statements[begin + 1 : end], names, counter)
-    return Count(counter.written, len(counter.known))
+    return Count(counter.written, sum(times[name] for name, _, _ in counter.known))
 
 
 def _moved(value: Any, counter: _Counter) -> Any:

@@ -23,7 +23,7 @@ from pyharness.history.claims.ledger import (
     judgement,
     outcome,
 )
-from pyharness.history.claims.report import KINDS, explanation, kinds_table
+from pyharness.history.claims.report import KINDS, claims_report, explanation, kinds_table
 from pyharness.history.claims.verdicts import (
     FALSE,
     IN_PART,
@@ -192,6 +192,25 @@ def test_ratio_of_cards_is_undecided_where_thresholds_disagree(
     lab = Laboratory(True)
     assert methods.complexity(lab, [2.0, 3.0]).verdict == REPRODUCED
     assert methods.complexity(lab, [1.0, 1.04]).verdict == NOT_REPRODUCED
+
+
+@pytest.mark.parametrize(
+    ("identity", "rests_on", "verdicts"),
+    [
+        ("v3-twice-the-time", ["unit times"], [IN_PART, NOT_REPRODUCED]),
+        ("iii1-crandall", ["example"], [REPRODUCED, NOT_REPRODUCED]),
+    ],
+)
+def test_a_verdict_names_the_parameters_on_which_it_rests(
+    identity: str, rests_on: list[str], verdicts: list[str], judged: dict[str, Judgement]
+) -> None:
+    found = judged[identity]
+    changed = [each for each in found.survivals if not each.survives]
+    assert [each.assumption.partition(":")[0] for each in changed] == rests_on
+    for programs in ("original", "corrected"):
+        assert getattr(found, programs).verdict == verdicts[0]
+        assert {getattr(each, programs) for each in changed} == {verdicts[1]}
+    assert claims_report([found]).data.rows[0][-1] == ", ".join(rests_on)
 
 
 THEORY = {

@@ -16,6 +16,10 @@ def test_runge_kutta_is_counted_as_by_hand() -> None:
     # Counted once are .5*DT, DT/6., and the slopes of stage 2, which the program computes at J = 1
     # again.
     assert found.once == found.written - 16
+    # Of all, 6 are divisions by 6, and these are multiplications: slopes, stages, result, tests.
+    products = 4 * 12 + 2 * 6 * 2 + 6 + 6 * 2 + 6
+    times = {"+": 0, "-": 0, "*": 1, "/": 1000}
+    assert operations_per_step(Listing.original("runge-kutta"), times).written == products + 6000
 
 
 def test_powers_and_literals() -> None:

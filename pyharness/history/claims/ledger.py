@@ -86,15 +86,20 @@ def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
     programs run.
     """
 
-    def verdicts(assumptions: Assumptions) -> tuple[Judged, Judged]:
+    def verdicts(entry: dict[str, Any], assumptions: Assumptions) -> tuple[Judged, Judged]:
         programs = outcome(entry, Laboratory(True, assumptions))
         return programs, outcome(entry, Laboratory(False, assumptions))
 
-    programs, methods = verdicts(Assumptions(word=word))
+    programs, methods = verdicts(entry, Assumptions(word=word))
+    others = [
+        (name, verdicts(entry, replace(each, word=word))) for name, each in _alternatives(entry)
+    ]
+    for name, changed in entry.get("otherwise", {}).items():
+        other = {**entry, "parameters": {**entry["parameters"], **changed}}
+        others.append((name, verdicts(other, Assumptions(word=word))))
     survivals = []
-    for name, assumptions in _alternatives(entry):
-        here = replace(assumptions, word=word)
-        original, corrected = (each.verdict for each in verdicts(here))
+    for name, found in others:
+        original, corrected = (each.verdict for each in found)
         same = (original, corrected) == (programs.verdict, methods.verdict)
         survivals.append(Survival(name, original, corrected, same))
     return Judgement(entry, programs, methods, tuple(survivals))

@@ -8,7 +8,7 @@ programs.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -235,26 +235,33 @@ def suffices(
     return graded(numbers, good >= enough, good >= 3)
 
 
-def execution_time(lab: Laboratory, low: float, high: float) -> Judged:
+def execution_time(
+    lab: Laboratory, low: float, high: float, unit_times: Mapping[str, int]
+) -> Judged:
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
-    The time is measured by the floating-point operations of one step. They are counted on the cards
-    of the programs in `lab` and in our version of the linear solver LEQT1F. One count has all
-    operations as written, and the other counts a term that occurs several times only once. The
-    operations of a collocation program are divided by those of Runge-Kutta, which gives four ratios
-    for two programs and two counts. The verdict is "reproduced" if all ratios are from `low` to
-    `high`, and "reproduced in part" if some are.
+    The floating-point operations of one step are counted on the cards of the programs in `lab` and
+    in our version of the linear solver LEQT1F. One count has all operations as written, and the
+    other counts a term that occurs several times only once. The time of a step is the sum of the
+    `unit_times` of its operations. The time of a collocation program is divided by that of
+    Runge-Kutta, which gives four ratios for two programs and two counts. The verdict is
+    "reproduced" if all ratios are from `low` to `high`, and "reproduced in part" if some are.
     """
-    counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
+    listings = {program: lab.listing(program) for program in PROGRAMS}
+    counts = {name: operations_per_step(each) for name, each in listings.items()}
+    times = {name: operations_per_step(each, unit_times) for name, each in listings.items()}
     numbers, inside = {}, []
     for way, told in (("written", "as written"), ("once", "common terms once")):
-        count = {program: float(getattr(each, way)) for program, each in counts.items()}
         for program in PROGRAMS:
-            numbers[f"{program}: operations a step, {told}"] = count[program]
+            numbers[f"{program}: operations a step, {told}"] = float(getattr(counts[program], way))
         for program in COLLOCATION:
-            ratio = count[program] / count["runge-kutta"]
+            ratio, by_time = (
+                getattr(each[program], way) / getattr(each["runge-kutta"], way)
+                for each in (counts, times)
+            )
             numbers[f"{program}: over Runge-Kutta, {told}"] = ratio
-            inside.append(low <= ratio <= high)
+            numbers[f"{program}: time over Runge-Kutta, {told}"] = by_time
+            inside.append(low <= by_time <= high)
     return graded(numbers, all(inside), any(inside))
 
 

@@ -177,7 +177,9 @@ def _hangs_on(judgement: Judgement) -> list[str]:
         for each in judgement.survivals
         if not each.survives
     )
-    return list(dict.fromkeys("omega(0)" if x.startswith("omega") else x for x in turning))
+    return list(
+        dict.fromkeys("omega(0)" if x.startswith("omega") else x.partition(":")[0] for x in turning)
+    )
 
 
 def written(x: float) -> str:

@@ -9,6 +9,7 @@ omega component, as a fraction of the largest omega.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -238,44 +239,48 @@ def _taylor_step(scene: Scene, order: int) -> Array:
     return total
 
 
-def crandall_example(lab: Laboratory, best: list[str]) -> Judged:
+def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
     """Judge the claim that in Crandall's example four weightings are better than the Taylor series.
 
     The weightings are collocation, subdomain, Galerkin and least squares. The example is dx/dt =
-    -x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2. The verdict is at least
-    "reproduced in part" if the largest error of each weighting is below half the error of the
+    `rate` x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2. The verdict is at
+    least "reproduced in part" if the largest error of each weighting is below half the error of the
     series. It is "reproduced" if also the two weightings in `best` have the smallest errors. `lab`
     is not used.
     """
     t, weight = np.polynomial.legendre.leggauss(12)
     t, weight = (t + 1.0) / 2.0, weight / 2.0
-    # The residual is R = base + c1 r1 + c2 r2; the columns are for r1, r2 and -base.
+    # The residual is R = -rate + c1 r1 + c2 r2; the columns are for r1, r2 and rate.
+    factors: Weights = (lambda s: 1 - rate * s, lambda s: 2 * s - rate * s**2)
+    weighted = partial(_weighted, t, weight, factors, rate)
+    points = np.array([1.0, 2.0]) / 3.0
     rows = {
-        "collocation": np.array([[1 + s, 2 * s + s**2, -1.0] for s in (1 / 3, 2 / 3)]),
-        "subdomain": _weighted(t, weight, (lambda s: s < 0.5, lambda s: s >= 0.5)),
-        "galerkin": _weighted(t, weight, (lambda s: s, lambda s: s**2)),
-        "least squares": _weighted(t, weight, (lambda s: 1 + s, lambda s: 2 * s + s**2)),
+        "collocation": np.array([[*(r(s) for r in factors), rate] for s in points]),
+        "subdomain": weighted((lambda s: s < 0.5, lambda s: s >= 0.5)),
+        "galerkin": weighted((lambda s: s, lambda s: s**2)),
+        "least squares": weighted(factors),
     }
     fine = np.linspace(0.0, 1.0, 201)
     numbers = {}
     for name, row in rows.items():
         c1, c2 = np.linalg.solve(row[:, :2], row[:, 2])
         numbers[f"{name}: largest error"] = float(
-            np.abs(1.0 + c1 * fine + c2 * fine**2 - np.exp(-fine)).max()
+            np.abs(1.0 + c1 * fine + c2 * fine**2 - np.exp(rate * fine)).max()
         )
-    series = float(np.abs(1.0 - fine + fine**2 / 2.0 - np.exp(-fine)).max())
+    taylor = 1.0 + rate * fine + (rate * fine) ** 2 / 2.0
+    series = float(np.abs(taylor - np.exp(rate * fine)).max())
     better = all(error < series / 2.0 for error in numbers.values())
     two = {name.partition(":")[0] for name in sorted(numbers, key=lambda n: numbers[n])[:2]}
     numbers["Taylor series: largest error"] = series
     return graded(numbers, better and two == set(best), better)
 
 
-def _weighted(t: Array, weight: Array, by: Weights) -> Array:
+def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weights) -> Array:
     """Return the linear equations for c1 and c2 of Crandall's example, a row for each weight.
 
-    `by` has the weight functions. A row has three weighted integrals over (0, 1): of the factor of
-    c1 in the residual, of the factor of c2, and of the right-hand side. `t` and `weight` are the
-    nodes and weights of a quadrature on (0, 1), which is applied to each half of the interval.
+    `by` has the weight functions. A row has three weighted integrals over (0, 1): of the two
+    `factors` of c1 and c2 in the residual, and of `rate`. `t` and `weight` are the nodes and
+    weights of a quadrature on (0, 1), which is applied to each half of the interval.
     """
     halves = [(t / 2.0, weight / 2.0), ((t + 1.0) / 2.0, weight / 2.0)]
     rows = []
@@ -283,7 +288,7 @@ def _weighted(t: Array, weight: Array, by: Weights) -> Array:
         row = np.zeros(3)
         for s, w in halves:
             factor = w * function(s)
-            row += [(factor * (1 + s)).sum(), (factor * (2 * s + s**2)).sum(), -factor.sum()]
+            row += [*((factor * r(s)).sum() for r in factors), rate * factor.sum()]
         rows.append(row)
     return np.array(rows)
 

@@ -213,6 +213,16 @@ def test_a_verdict_names_the_parameters_on_which_it_rests(
     assert claims_report([found]).data.rows[0][-1] == ", ".join(rests_on)
 
 
+def test_a_run_that_ends_early_counts_as_coinciding_and_the_rule_says_so() -> None:
+    entry, start = claim("v2-case-1-agree"), (0.0, 1.0, 10.0)
+    lab = Laboratory(True, Assumptions(start=start))
+    run = lab.run("runge-kutta", 1)
+    assert run.stop is not None
+    assert outcome(entry, lab).verdict == REPRODUCED
+    assert f"the {run.steps} steps of Runge-Kutta from (0, 1, 10) rad/s count" in entry["rule"]
+    assert "over the steps that each program ran" in entry["truth"]
+
+
 THEORY = {
     "ii3-partial": FALSE, "ii5-bounded-lipschitz": FALSE,
     "iii1-crandall": REPRODUCED, "iii2-improved-euler-error": REPRODUCED,

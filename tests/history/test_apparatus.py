@@ -39,6 +39,30 @@ def test_with_one_mass_whichever_case_2_stops_at_step_26(mass: float) -> None:
     assert "step 26" in entry("three-masses")["why"]
 
 
+@pytest.mark.parametrize(
+    ("kept", "told", "weights"),
+    [
+        (["x3-reads-acl2"], "(ACL1 + ACL2)/2 in place of ACL1", (0.5, 0.5)),
+        (
+            ["x3-reads-acl2", "dt-accumulates"],
+            "with dt-accumulates by 2 ACL1 - ACL2", (2.0, -1.0),
+        ),
+    ],
+)  # fmt: skip
+def test_x3_on_acl2_gives_the_acceleration_that_is_told(
+    kept: list[str], told: str, weights: tuple[float, float]
+) -> None:
+    """A sphere at rest, so that V1 is the acceleration times the time."""
+    scene = replace(case_scene(1), omega=(0.0, 0.0, 0.0), step_size=1e-4, steps=10000)
+    scene = replace(scene, torque=case_scene(2).torque)
+    run = run_program(scene, subset("two-term", "corrected", keep=kept))
+    assert run.velocity is not None
+    first, second = np.array(scene.forces[:2]) / scene.masses[0]
+    expected = weights[0] * first + weights[1] * second
+    assert run.velocity[-1, 0] / run.time[-1] == pytest.approx(expected, abs=1e-3)
+    assert told in entry("x3-reads-acl2")["why"]
+
+
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize("case", [3, 5])
 def test_corrected_velocity_is_that_of_one_mass(program: str, case: int) -> None:
@@ -94,7 +118,6 @@ def test_what_is_redundant_or_unread_is_so_on_the_cards() -> None:
     assert "DO 400 L=2,5,1" in body
     assert "WKA(24)" in four[110]
     assert "WKA(12)" in deck("two-term").cards[110].text
-    assert not any(re.search(r"\bM[123]\b", text) for n, text in kutta.items() if n != 110)
     assert not any("WRITE" in text for n, text in kutta.items() if n > 1250)
     assert [kutta[n].strip() for n in (770, 780, 790)] == [
         "DO 100 I=1,2,1", "J=I-1", "IF(I.EQ.1)J=1",
@@ -102,6 +125,26 @@ def test_what_is_redundant_or_unread_is_so_on_the_cards() -> None:
     for program, aim in (("two-term", "30"), ("four-term", "30")):
         jumps = [card.text for card in deck(program).cards.values() if "GO TO" in card.text]
         assert not any(text.rstrip().endswith(aim) for text in jumps)
+
+
+def test_our_names_of_the_torques_decide_which_names_are_unused() -> None:
+    unused = {}
+    for program in entry("unused-torques")["cards"]:
+        cards = [c for c in deck(program).cards.values() if not (c.is_comment or "REAL" in c.text)]
+        ours = " ".join(card.text for card in cards)
+        scan = " ".join(
+            "".join(
+                each.scans if each and each.entry == "torque-names" else text
+                for text, each in card.passages()
+            )
+            for card in cards
+        )
+        unused[program] = [
+            [name for name in "MN" if not re.search(rf"\b{name}[123]\b", text)]
+            for text in (ours, scan)
+        ]
+    assert unused == {"four-term": [[], ["N"]], "runge-kutta": [["M"], ["N"]]}
+    assert entry("unused-torques")["certainty"] == entry("torque-names")["certainty"] == "probable"
 
 
 def test_a_normalization_needs_no_emendation() -> None:

@@ -276,8 +276,9 @@ def test_codemeta_agrees_with_the_project_and_the_citation() -> None:
     thesis, (cited,) = codemeta["referencePublication"], citation["references"]
     assert thesis["name"] == cited["title"]
     assert thesis["datePublished"] == f"{cited['year']}-{cited['month']:02d}"
-    assert thesis["sourceOrganization"]["name"] == cited["institution"]["name"]
-    assert thesis["publisher"]["name"] == cited["publisher"]["name"]
+    assert thesis["@type"] == f"schema:{cited['type'].capitalize()}" == "schema:Report"
+    assert thesis["publisher"]["name"] == cited["institution"]["name"]
+    assert thesis["description"] == cited["notes"]
     (author,), (other_author,) = thesis["author"], cited["authors"]
     assert author["familyName"] == other_author["family-names"]
     assert author["givenName"] == other_author["given-names"]

@@ -80,7 +80,7 @@ def references(text: str) -> list[str]:
         field = dict(re.findall(r"(\w+)\s*=\s*\{(.*)\}", body))
         place = ", ".join(
             field[name]
-            for name in ("journal", "edition", "school", "institution", "publisher", "number")
+            for name in ("journal", "edition", "institution", "publisher", "number")
             if name in field
         )
         volume = f", {field['volume']}" if "volume" in field else ""

@@ -16,6 +16,7 @@ from pyharness.edition.decks import TITLES
 from pyharness.edition.package_runs import FAULTS_CASE
 from pyharness.history.ablation import CaseEffects, effects_of, entries, entry
 from pyharness.history.cards_report import scan_report
+from pyharness.history.claims.laboratory import Laboratory, largest
 from pyharness.history.claims.ledger import judgement, judgements
 from pyharness.history.claims.report import kinds_table
 from pyharness.history.claims.rules import COLLOCATION
@@ -80,6 +81,7 @@ def values() -> dict[str, Any]:
         },
         "superior": _superior(told),
         "sphere": {"least": _number("v2-case-1-agree", "original", "*: steps that it ran", "min")},
+        "classical": {f"case_{case}": _share_of_largest(case) for case in (3, 4)},
         "family": {"ratio": _number("vi-successful-technique", "corrected", "*")},
         "test": _stop_test(),
         "fast": {
@@ -238,6 +240,12 @@ def _superior(told: Mapping[str, Any]) -> dict[str, str]:
         "changed": changed[0].original,
         "verdict": judgement("vi-superior").corrected.verdict,
     }
+
+
+def _share_of_largest(case: int) -> str:
+    """Return the error of the printed two-term program, in percent of the largest omega."""
+    lab = Laboratory(True)
+    return f"{100.0 * lab.error('two-term', case) / largest(lab.truth(case)):.2f} %"
 
 
 def _stop_test() -> dict[str, str]:

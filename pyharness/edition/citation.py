@@ -52,18 +52,18 @@ def bibtex() -> str:
     printed = {
         "author": _authors(thesis),
         "title": f"{{{thesis['name']}}}",
-        "school": thesis["sourceOrganization"]["name"],
+        "institution": thesis["publisher"]["name"],
         "year": year,
         "month": str(int(month)),
-        "note": f"Published by {thesis['publisher']['name']}",
+        "note": thesis["description"],
     }
-    entries = (("misc", f"pyharness-{version}", edition), ("mastersthesis", "jacobs-1982", printed))
+    entries = (("misc", f"pyharness-{version}", edition), ("techreport", "jacobs-1982", printed))
     return "\n".join(_entry(kind, key, fields) for kind, key, fields in entries)
 
 
 def thesis_record() -> dict[str, Any]:
     """Return the description of the thesis as a dictionary with the terms of schema.org."""
-    return {**codemeta()["referencePublication"], "@type": "Thesis"}
+    return {**codemeta()["referencePublication"], "@type": "Report"}
 
 
 def linked_data() -> dict[str, Any]:

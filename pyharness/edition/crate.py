@@ -102,9 +102,6 @@ def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
         "identifier": [{"@id": "#text"}, {"@id": "#data"}],
         "hasPart": [{"@id": each["@id"]} for each in files],
     }
-    publishers = [
-        {"@id": f"#thesis-{name}", **thesis[name]} for name in ("sourceOrganization", "publisher")
-    ]
     graph: list[dict[str, Any]] = [
         {
             "@id": CRATE,
@@ -115,12 +112,11 @@ def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
         root,
         *files,
         *people,
-        *publishers,
+        {"@id": "#thesis-publisher", **thesis["publisher"]},
         {
             "@id": "#thesis",
             **thesis,
             "author": _references(people, "#thesis-author-"),
-            "sourceOrganization": {"@id": "#thesis-sourceOrganization"},
             "publisher": {"@id": "#thesis-publisher"},
         },
         {

@@ -9,7 +9,7 @@ from pyharness.edition import citation
 from pyharness.edition.citation import bibtex, codemeta, linked_data, release_date
 from pyharness.history.identifiers import DATA, data_identifier
 from pyharness.history.text_digest import text_digest
-from pyharness.model.facts import facts
+from pyharness.model.facts import facts, shipped
 from tests.edition.pages import pages
 
 
@@ -20,7 +20,7 @@ def _fields(entry: str) -> dict[str, str]:
 def test_bibtex_cites_the_edition_and_the_thesis() -> None:
     edition, thesis = bibtex().split("\n\n")
     assert edition.startswith(f"@misc{{pyharness-{codemeta()['version']},\n")
-    assert thesis.startswith("@mastersthesis{jacobs-1982,\n")
+    assert thesis.startswith("@techreport{jacobs-1982,\n")
     for entry in (edition, thesis):
         assert entry.count("{") == entry.count("}")
         assert not set(entry) & set("&%$#_~^\\")  # which BibTeX would not take as they are
@@ -33,7 +33,10 @@ def test_bibtex_cites_the_edition_and_the_thesis() -> None:
     assert _fields(thesis)["author"] == "Jacobs, Richard"
     assert facts("account")["work"]["author"] == "Richard Jacobs"
     assert (_fields(thesis)["year"], _fields(thesis)["month"]) == ("1982", "3")
-    assert facts("account")["work"]["published"] == "March 1982"
+    work = facts("account")["work"]
+    assert work["published"] == "March 1982"
+    assert "AFWAL" in _fields(thesis)["institution"]
+    assert f"submitted in {work['submitted']}" in _fields(thesis)["note"]
 
 
 def test_the_date_is_that_of_the_publication_if_there_is_one(
@@ -70,3 +73,19 @@ def test_the_page_has_the_citation_and_the_linked_data(built_site: dict[str, byt
     assert button["data-of"] in page.anchors
     assert "copied" in page.anchors
     assert b"navigator.clipboard.writeText" in built_site["assets/about.js"]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "docs/article/bibliography.bib", "docs/article/metadata.yaml.in",
+        "docs/explanation/reconstruction.md", "pyharness/data/edition.toml", "CITATION.cff",
+        "codemeta.json",
+    ],
+)  # fmt: skip
+def test_every_full_citation_is_of_a_report_and_dates_the_thesis(path: str) -> None:
+    text = shipped(path).read_text()
+    assert not re.search(r"@mastersthesis|(?m:type: thesis$)|schema:Thesis", text)
+    cited = text[text.index("Approach to the Unsymmetric Rigid Body Problem") :][:900]
+    assert re.search(r"(?i)\breport\b|techreport", text)
+    assert re.search(r"submitted (?:in )?July 1981", cited)

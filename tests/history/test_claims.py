@@ -444,8 +444,8 @@ def test_computer_error_is_judged_in_the_machines_words(judged: dict[str, Judgem
     assert all(1e-15 < x < 1e-11 for x in apart.values())
     ours = max(x for name, x in numbers.items() if "rounding error" in name)
     findings = " ".join((ROOT / "docs/explanation/findings.md").read_text().split())
-    assert f"their error is at most {ours:.0e} rad/s" in findings
-    assert f"differ from ours by at most {max(apart.values()):.0e} rad/s" in findings
+    assert f"their error is at most {ours:.1e} rad/s" in findings
+    assert f"differ from ours by at most {max(apart.values()):.1e} rad/s" in findings
     # With a limit below the rounding errors the verdict changes, also after a few steps.
     low = {**entry, "parameters": {**entry["parameters"], "limit": 1e-15}}
     few = Laboratory(False, Assumptions(steps=5))

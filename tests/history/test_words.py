@@ -1,6 +1,7 @@
 """Effects of word length on pages, stops, errors and IER, by bits and rounding rule."""
 
 import json
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, replace
@@ -14,13 +15,17 @@ from pyharness.cli import options
 from pyharness.cli.main import main
 from pyharness.history.words import WordCell, cells
 from pyharness.history.words_report import words_report
+from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene
+from pyharness.original.printer import page
+from pyharness.original.programs import run_program
 from pyharness.original.vectors import OURS
 from pyharness.original.word import RULES
 from pyharness.views.csv import csv_text
 from tests.conftest import Printed
 from tests.json_reference import schema_of
 
+ROOT = Path(__file__).parents[2]
 LENGTHS = (16, 20, 24, 28, 48, 53)
 
 
@@ -135,3 +140,24 @@ def test_vectors_that_differ_end_with_1(tmp_path: Path, capsys: pytest.CaptureFi
     assert "23 of 24 vectors agree" in out
     assert "1/3 (RX/)" in out
     assert "ours   1716 5252 5252 5252 5253" in out
+
+
+def test_one_value_changes_on_two_printed_pages() -> None:
+    """Findings and reconstruction say so; words.md counts the corrected programs too."""
+    scene, changed = case_scene(2), set()
+    for program in ("two-term", "four-term"):
+        pages = [
+            page(scene, program, run_program(scene, Listing.original(program), "python", word=word))
+            for word in ("binary64", "cdc48")
+        ]
+        lines = [text.split() for text in pages]
+        changed |= {
+            (program, n, *pair)
+            for n, pair in enumerate(zip(*lines, strict=True))
+            if pair[0] != pair[1]
+        }
+    assert [each[0] for each in sorted(changed)] == ["four-term", "two-term"]
+    assert {each[1:] for each in changed} == {(*next(iter(changed))[1:],)}
+    for name in ("findings", "reconstruction"):
+        text = " ".join((ROOT / f"docs/explanation/{name}.md").read_text().split())
+        assert re.search(r"one value (changes|differs), on two (printed )?pages", text)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SETS = {"original": Listing.original, "corrected": Listing.corrected}
+_CAPTIONS = {"original": "caption", "corrected": "corrected_caption"}
 ENDINGS = ("svg", "png", "csv")
 _NUMBERS = "curve listing time recorded_time omega1 omega2 omega3"
 # Curves differ also without colour: in dash, width, marker, and position of the markers.
@@ -132,7 +133,7 @@ def plans() -> list[FigurePlan]:
     return [
         FigurePlan(
             entry["number"], entry.get("part", ""), each, entry["case"], tuple(entry[each]),
-            entry["caption"], entry["source"],
+            entry[_CAPTIONS[each]], entry["source"],
         )
         for each in SETS
         for entry in facts("figures")["figure"]

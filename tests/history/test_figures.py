@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -13,6 +14,7 @@ import pytest
 from pyharness import case_scene
 from pyharness.cli.main import main
 from pyharness.history import figures
+from pyharness.history.claims.rules import share_of_range
 from pyharness.history.figures import Curve, FigureFinding, curve_numbers
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.original import compiled
@@ -86,6 +88,19 @@ def test_figure_n_is_case_n_minus_5_and_holds_what_the_text_says() -> None:
         assert plan.case == plan.number - 5
         assert plan.source
         assert plan.caption.endswith(".")
+
+
+def test_a_caption_tells_what_its_own_curves_do(found: dict[str, FigureFinding]) -> None:
+    """V.2 saw the printed programs alone; what the corrected ones do is seen in their curves."""
+    for stem, finding in found.items():
+        if finding.plan.set == "original":
+            assert found[f"{stem}-corrected"].plan.caption != finding.plan.caption
+            continue
+        assert "V.2" not in finding.plan.caption
+        assert re.search(r"\bfollows?\b", finding.plan.caption)
+        for curve in finding.curves:
+            assert not curve.ending
+            assert share_of_range(curve.trajectory.omega, finding.reference.omega) < 0.01
 
 
 def test_numbers_are_those_of_the_trajectories(found: dict[str, FigureFinding]) -> None:

@@ -78,13 +78,14 @@ def unexplained_defects() -> dict[str, str]:
     return dict(facts("disagreements")["unexplained"])
 
 
-def shared_statements() -> dict[tuple[str, str], int]:
+def shared_statements(scanned_names: bool = False) -> dict[tuple[str, str], int]:
     """Return the number of statements that two decks share, for each pair of programs.
 
     A statement that occurs several times in both decks counts as often as in the deck that has it
-    less often. Statement numbers, blanks and comments are ignored.
+    less often. Statement numbers, blanks and comments are ignored. With `scanned_names`, names that
+    we made uniform are those of the scan.
     """
-    found = {program: Counter(_statements(program)) for program in PROGRAMS}
+    found = {program: Counter(_statements(program, scanned_names)) for program in PROGRAMS}
     return {(a, b): (found[a] & found[b]).total() for a, b in combinations(PROGRAMS, 2)}
 
 
@@ -163,9 +164,10 @@ def _names_a_quoted_card(entry: dict[str, Any], each: Disagreement) -> bool:
     )
 
 
-def _statements(program: str) -> list[str]:
-    cards = deck(program).cards.values()
-    return [tight(card.text[6:]) for card in cards if not card.is_comment]
+def _statements(program: str, scanned_names: bool = False) -> list[str]:
+    cards = (card for card in deck(program).cards.values() if not card.is_comment)
+    texts = (card.text_with_scanned_names if scanned_names else card.text for card in cards)
+    return [tight(text[6:]) for text in texts]
 
 
 def _disagreement(given: dict[str, Any]) -> Disagreement:

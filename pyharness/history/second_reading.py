@@ -125,7 +125,7 @@ def read_cards() -> Iterator[ReadCard]:
         for number, text in given[program].items():
             card = deck(program).cards[int(number)]
             assert card.scan is not None
-            yield ReadCard(card, card.scan.partition("-")[2], _unchanged(card), tight(text))
+            yield ReadCard(card, card.scan.partition("-")[2], tight(card.text_with_scanned_names), tight(text))
 
 
 def misread_places(scan: str, reading: str) -> dict[int, str]:
@@ -176,8 +176,6 @@ def second_reading_report() -> Report:
     frame = len(witness_lines())
     seed = facts("cards/second-reading")["seed"]
     rows = [[*each, each.uncorrected] for each in found]
-    whole = found[-1]
-    decks = -(-whole.uncorrected * frame // len(cards))
     legend = (
         "first, second, both: number of misreadings of the scan in the sample that our text, the "
         "second reading, and both correct. estimate: Chapman's estimate of all misreadings in the "
@@ -195,10 +193,6 @@ def second_reading_report() -> Report:
             [legend],
             [Table(_COLUMNS, rows)],
             [f"{counted(len(differing), 'card')} read differently:", *told],
-            [
-                f"In proportion, at most {counted(decks, 'card')} of all {frame} have a misreading "
-                "that our text does not correct, if the two readings are independent."
-            ],
         ],
         record=lambda: {
             "sample": {"seed": seed, "size": len(cards), "cards": frame},
@@ -220,12 +214,3 @@ def second_reading_report() -> Report:
 def _recapture(unit: str, first: int, second: int, both: int) -> Recapture:
     estimate = chapman(first, second, both)
     return Recapture(unit, first, second, both, estimate, *recapture_interval(first, second, both))
-
-
-def _unchanged(card: Card) -> str:
-    """Return our text of a card without blanks, with the names that the scan has."""
-    kinds = {each["id"]: each["kind"] for each in facts("apparatus")["entry"]}
-    return "".join(
-        each.scans if each and kinds[each.entry] == "normalization" else tight(text)
-        for text, each in card.passages()
-    )

@@ -101,6 +101,15 @@ class Card(NamedTuple):
         return passages(self.text, self.differences)
 
     @property
+    def text_with_scanned_names(self) -> str:
+        """Return the text of the card with the scan's names where ours are a normalization."""
+        kinds = {each["id"]: each["kind"] for each in facts("apparatus")["entry"]}
+        return "".join(
+            each.scans if each and kinds[each.entry] == "normalization" else text
+            for text, each in self.passages()
+        )
+
+    @property
     def deviates(self) -> bool:
         """Return whether the scan of the thesis lacks the card, or differs from our text of it."""
         return bool(self.lost or self.printed or self.differences)

@@ -132,13 +132,7 @@ def test_our_names_of_the_torques_decide_which_names_are_unused() -> None:
     for program in entry("unused-torques")["cards"]:
         cards = [c for c in deck(program).cards.values() if not (c.is_comment or "REAL" in c.text)]
         ours = " ".join(card.text for card in cards)
-        scan = " ".join(
-            "".join(
-                each.scans if each and each.entry == "torque-names" else text
-                for text, each in card.passages()
-            )
-            for card in cards
-        )
+        scan = " ".join(card.text_with_scanned_names for card in cards)
         unused[program] = [
             [name for name in "MN" if not re.search(rf"\b{name}[123]\b", text)]
             for text in (ours, scan)

@@ -3,6 +3,7 @@
 import copy
 import csv
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -101,6 +102,11 @@ def test_decks_share_statements() -> None:
     )
     for (one, other), count in found.items():
         assert count < min(statement_count(one), statement_count(other))
+    # Seven statements are the same because we call the torques N in both decks.
+    in_scan = shared_statements(scanned_names=True)
+    assert [found[pair] - in_scan[pair] for pair in found] == [7, 1, 0]
+    rows = re.findall(r"^\| ([\w-]+) and ([\w-]+) \| (\d+) \| (\d+) \|", origins_page(), re.M)
+    assert rows == [(*pair, str(n), str(n - in_scan[pair])) for pair, n in found.items()]
 
 
 def test_known_facts_of_the_stages_are_on_the_cards() -> None:

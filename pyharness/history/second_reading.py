@@ -125,7 +125,9 @@ def read_cards() -> Iterator[ReadCard]:
         for number, text in given[program].items():
             card = deck(program).cards[int(number)]
             assert card.scan is not None
-            yield ReadCard(card, card.scan.partition("-")[2], tight(card.text_with_scanned_names), tight(text))
+            yield ReadCard(
+                card, card.scan.partition("-")[2], tight(card.text_with_scanned_names), tight(text)
+            )
 
 
 def misread_places(scan: str, reading: str) -> dict[int, str]:

@@ -218,7 +218,7 @@ def test_no_text_tells_what_the_author_thought(path: Path) -> None:
 def test_a_told_motive_is_found() -> None:
     for text in (
         "The thesis took the effects for a weakness", "Jacobs trusted them too",
-        "The thesis prefers one method only because its program", "V.2 takes the stop as a property",
+        "The thesis prefers one method only because its program", "V.2 takes the stop as a fault",
         "Jacobs checked his programs first with Case 1",
     ):  # fmt: skip
         assert _MOTIVES.search(text)

@@ -210,7 +210,9 @@ def test_a_verdict_names_the_parameters_on_which_it_rests(
     for programs in ("original", "corrected"):
         assert getattr(found, programs).verdict == verdicts[0]
         assert {getattr(each, programs) for each in changed} == {verdicts[1]}
-    assert claims_report([found]).data.rows[0][-1] == ", ".join(rests_on)
+    data = claims_report([found]).data
+    assert data is not None
+    assert data.rows[0][-1] == ", ".join(rests_on)
 
 
 def test_a_run_that_ends_early_counts_as_coinciding_and_the_rule_says_so() -> None:

@@ -48,8 +48,9 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
     `lab` runs the programs; only the steps that all three programs ran are compared. A case counts
     if the errors of both collocation programs are below the error of the Runge-Kutta program. The
     verdict is "reproduced" if all `cases` count, "reproduced in part" if some do, otherwise
-    "false". The ratios, of the larger collocation error, of the cases in `shown` are reported too,
-    but do not affect the verdict. An error is the largest error of any omega component against the reference solution.
+    "false". The ratios of the larger collocation error to that of Runge-Kutta are reported, also
+    for the cases in `shown`, which do not affect the verdict. An error is the largest error of any
+    omega component against the reference solution.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):

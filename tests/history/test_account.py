@@ -15,10 +15,11 @@ from pyharness.history.claims.ledger import claim, claims, outcome
 from pyharness.history.claims.verdicts import FALSE, NOT_TESTABLE, REPRODUCED
 from pyharness.history.limits import limit
 from pyharness.model.facts import facts, shipped
-from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
+from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switches
 from pyharness.model.scene_file import case_scene
 from pyharness.original.cards import deck
 from pyharness.original.cells import subsets
+from pyharness.original.printer import page
 from pyharness.original.programs import PROGRAM_REGISTRY, run_program
 from pyharness.truth.reference import reference
 
@@ -213,6 +214,30 @@ _MOTIVES = re.compile(
 @pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)
 def test_no_text_tells_what_the_author_thought(path: Path) -> None:
     assert not _MOTIVES.findall(_words(path.read_text()))
+
+
+_ALL_SWITCHED = re.compile(
+    r"(?i)(?:each|every) (?:fault|defect) (?:has|as|with) a switch"
+    r"|switch for (?:each|every) (?:fault|defect)\b(?! that changes a number)"
+)
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)
+def test_no_text_gives_every_defect_a_switch(path: Path) -> None:
+    assert not _ALL_SWITCHED.findall(_words(path.read_text()))
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_each_switch_changes_a_printed_number_and_some_defects_have_none(program: str) -> None:
+    pages = {
+        "".join(
+            page(scene, program, run_program(scene, subset(program, "original", fix)))
+            for scene in (case_scene(3), case_scene(7))
+        )
+        for fix in ([], *([name] for name in names_of("defect", program)))
+    }
+    assert len(pages) == 1 + len(names_of("defect", program))
+    assert any("flag" not in each for each in entries("defect") if program in each["programs"])
 
 
 def test_a_told_motive_is_found() -> None:

@@ -91,6 +91,7 @@ def test_the_verb_shows_it_in_every_form(
         return capsys.readouterr().out
 
     assert max(map(len, told().splitlines())) <= 100
+    assert "at most" not in told()  # the two readings are not independent: nothing is bounded
     record = json.loads(told("--format", "json"))
     assert record["sample"] == {"seed": 1982, "size": 120, "cards": 521}
     assert [each["first"] for each in record["recaptures"]] == [e.first for e in recaptures()]

@@ -76,7 +76,7 @@ def compare_methods(
     for name in tolerances:
         check_torque(scene, name, attitude)
         if attitude:
-            check_attitude(name, scene)
+            check_attitude(name)
     scene = replace(scene, attitude=(scene.attitude or IDENTITY) if attitude else None)
     truth = reference(scene, scene.times(), effort=effort)
     import scipy.integrate  # noqa: F401  (not to be timed with the first method)

@@ -7,14 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pyharness.methods.fixed_state import fixed_state
 from pyharness.methods.problem import normalized, trajectory_of
 from pyharness.model.codes import Methods
 from pyharness.model.effort import Integrator, advice
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Trajectory
 
 
@@ -30,8 +28,6 @@ def fixed_step(name: str) -> Integrator:
     def solve(
         scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
     ) -> Trajectory:
-        if isinstance(scene.torque, StateTorque):
-            return fixed_state(name, scene, times, effort)
         work = np.array([effort, 0.0])
         rows, n_rows, status, steps, evaluations = extension().fixed_step_solution(
             scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, number,

@@ -2,20 +2,17 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from pyharness.methods.gauss_state import GaussState, step_counts
 from pyharness.methods.problem import normalized, trajectory_of
 from pyharness.methods.sensitivity import is_sensitive, motion_growth, torque_noise
-from pyharness.methods.stepper import step_lengths
 from pyharness.model.effort import Integrator, advice, waves
 from pyharness.model.errors import TimedError
-from pyharness.model.extension import COMPLETE, OVERFLOW, SENSITIVE, extension
+from pyharness.model.extension import COMPLETE, SENSITIVE, extension
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import ROUNDING, Array, Trajectory
 from pyharness.scenes.rescaled import omega_by_torque
 
@@ -47,16 +44,11 @@ def gauss(stages: int) -> Integrator:
     ) -> Trajectory:
         kernel = _kernel(scene, stages, times, effort)
         if times[-1] == 0.0:
-            rest = np.array([[*scene.omega, *(scene.attitude or ())]]).T
-            return _trajectory(times, rest, 1, COMPLETE, 0, 0)
-        if not math.isfinite(kernel.pushed) and kernel.may_be_singular:
-            return _trajectory(times, np.empty((3, 0)), 0, OVERFLOW, 0, 1)
+            return trajectory_of(times, np.array([scene.omega]).T, 1, COMPLETE, 0, 0)
         scale = max(map(abs, scene.omega))
         start = max(scale, kernel.pushed)
         lengths = _lengths(times)
         step, spent, reached = _first_step(kernel.rate, float(lengths.min())), 0, 0.0
-        if isinstance(scene.torque, StateTorque):
-            step = _shortened(step, scene, scene.torque, times[-1], tolerance)
         most = kernel.most
         more = 1.0  # estimated steps of the final solution over the steps of the next solution
         pace = 2.0 * stages  # right-hand sides per step
@@ -82,8 +74,8 @@ def gauss(stages: int) -> Integrator:
             reached = float(found.reached[0])
             if before is not None and before.n_rows == found.n_rows:
                 n = found.n_rows
-                scale = max(scale, float(np.abs(found.rows[:3, :n]).max(initial=0.0)))
-                difference = found.difference(before, n, scale)
+                scale = max(scale, float(np.abs(found.rows[:, :n]).max(initial=0.0)))
+                difference = found.difference(before, n)
                 # If an interval has as many steps as before, the difference does not measure an
                 # error: `known` is then 0.
                 ratio = float((counts / previous).min(initial=2.0))
@@ -113,10 +105,9 @@ def gauss(stages: int) -> Integrator:
                         # The difference comes from rounding, which does not fall with the step.
                         error = difference / scale
                     error += ROUNDING * (growth or 1.0) * (1.0 + noise)
-                    return _trajectory(times, found.rows, n, status, count, spent, error, growth)
-                is_singular = kernel.may_be_singular and found.ends_like(before)
-                if found.blows_up(before, start) or (is_singular and (close or not n)):
-                    return _trajectory(times, found.rows, n, found.status, count, spent)
+                    return trajectory_of(times, found.rows, n, status, count, spent, error, growth)
+                if found.blows_up(before, start):
+                    return trajectory_of(times, found.rows, n, found.status, count, spent)
             before, previous = found, counts
             step *= 0.5
             counts = kernel.counts(step)
@@ -132,24 +123,9 @@ class _Solution:
     status: int
     evaluations: int
 
-    def difference(self, other: "_Solution", n: int, scale: float) -> float:
-        """Return the largest difference of two solutions in the first `n` rows (rad/s).
-
-        Attitudes, which follow omega in each row, count by their angle (rad) times `scale`, the
-        largest |omega| (rad/s).
-        """
-        apart = np.abs(self.rows[:, :n] - other.rows[:, :n])
-        angle = 2.0 * scale * float(apart[3:].max(initial=0.0))
-        return max(float(apart[:3].max(initial=0.0)), angle)
-
-    def ends_like(self, coarser: "_Solution") -> bool:
-        """Return whether this solution and a coarser one have no number at nearly the same time.
-
-        The torque is then singular at this time, because shorter steps do not avoid it.
-        """
-        time = float(self.reached[0])
-        is_same = abs(coarser.reached[0] - time) <= 0.01 * abs(time)
-        return self.status == coarser.status == OVERFLOW and time != 0.0 and bool(is_same)
+    def difference(self, other: "_Solution", n: int) -> float:
+        """Return the largest difference of two solutions in the first `n` rows (rad/s)."""
+        return float(np.abs(self.rows[:, :n] - other.rows[:, :n]).max(initial=0.0))
 
     def blows_up(self, coarser: "_Solution", start: float) -> bool:
         """Return whether this solution and a coarser one end because omega grows without bound.
@@ -169,7 +145,7 @@ class _Solution:
         if abs(self.reached[0] - coarser.reached[0]) > 0.01 * abs(self.reached[0]):
             return False
         largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
-        so_far = float(np.abs(self.rows[:3, : self.n_rows]).max(initial=start))
+        so_far = float(np.abs(self.rows[:, : self.n_rows]).max(initial=start))
         return largest > 1.5 * before > 1e3 * so_far or min(largest, before) > _NEAR_THE_END
 
 
@@ -177,11 +153,10 @@ class _Kernel(NamedTuple):
     """The function that solves a scene with equal steps, and quantities that determine its steps.
 
     `solution` takes the largest step size (s), and `counts` returns the numbers of equal steps that
-    it takes between the times at which steps must end.
+    it takes between the requested times.
     `rate` is the largest rate (rad/s) of the phases of the motion and of the torque. `pushed` is
     the omega (rad/s) that the torque alone would cause until the end. `most` is the work limit of
-    all solutions, a number of right-hand sides. `may_be_singular` states whether the torque may be
-    infinite or undefined at some time or state.
+    all solutions, a number of right-hand sides.
     """
 
     solution: "Callable[[float], _Solution]"
@@ -189,17 +164,9 @@ class _Kernel(NamedTuple):
     rate: float
     pushed: float
     most: float
-    may_be_singular: bool = False
 
 
 def _kernel(scene: Scene, stages: int, times: Sequence[float], effort: float) -> _Kernel:
-    """Return the kernel for a scene: a compiled one, or Python for a torque of the state."""
-    if isinstance(scene.torque, StateTorque):
-        state = GaussState(scene, stages, times, effort)
-        return _Kernel(
-            lambda step: _Solution(*state.rows(step)), state.counts,
-            state.rate, state.pushed, state.most, True,
-        )  # fmt: skip
     given = normalized(scene)
     rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
     for amplitude, frequency in scene.law.sines + scene.law.cosines:
@@ -209,11 +176,21 @@ def _kernel(scene: Scene, stages: int, times: Sequence[float], effort: float) ->
         lambda step: _Solution(
             *extension().gauss_solution(*given, scene.omega, times, stages, step, effort=effort)
         ),
-        lambda step: step_counts(_lengths(times), step),
+        lambda step: _step_counts(_lengths(times), step),
         rate,
         omega_by_torque(scene, times[-1]),
         effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene)),
     )
+
+
+def _step_counts(lengths: Array, step: float) -> Array:
+    """Return the number of equal steps that the kernel takes in each interval between times.
+
+    `lengths` are the lengths of the intervals (s). No step is longer than `step` (s), except for a
+    relative excess of 1e-6.
+    """
+    with np.errstate(over="ignore", divide="ignore"):
+        return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 
 
 def _lengths(times: Sequence[float]) -> Array:
@@ -221,34 +198,6 @@ def _lengths(times: Sequence[float]) -> Array:
     lengths = np.abs(np.diff(np.array(times, dtype=float), prepend=0.0))
     found: Array = lengths[lengths > 0.0]
     return found
-
-
-def _shortened(
-    step: float, scene: Scene, torque: StateTorque, end: float, tolerance: float
-) -> float:
-    """Return a step (s), halved until no step of a Taylor series is shorter.
-
-    Two solutions with long steps may agree because neither of them sees a short pulse. If the
-    series does not reach `end` (s), because the torque is singular, the step is not halved.
-    """
-    breaks = [] if torque.tape is None else torque.tape.breaks
-    attitude = scene.attitude is not None
-    found, is_whole = step_lengths(scene, attitude, end, tolerance, [*breaks, end])
-    least = min(found.values(), default=step)
-    if not is_whole or least >= step:
-        return step
-    return math.ldexp(step, -math.ceil(math.log2(step / least)))
-
-
-def _trajectory(times: Sequence[float], rows: Array, *more: Any) -> Trajectory:
-    """Return a trajectory from rows of omega, or of omega and attitude, shape (3 or 7, n).
-
-    `more` are the other arguments of `trajectory_of`, before the attitudes.
-    """
-    if len(rows) == 3:
-        return trajectory_of(times, rows, *more)
-    units = rows[3:] / np.linalg.norm(rows[3:], axis=0)
-    return replace(trajectory_of(times, rows[:3], *more), attitude=units.T[: more[0]])
 
 
 def _first_step(rate: float, shortest: float) -> float:

@@ -70,6 +70,9 @@ def _reference(
     from pyharness.truth.reference import reference
 
     result = reference(scene, times, effort=effort)
+    finite = np.isfinite(result.omega).all(axis=1)
+    if not finite.all():
+        return rows_trajectory([], result.omega[:0], 0, len(times), "overflow")
     ended = "complete" if len(result.time) == len(times) else "overflow"
     largest = max(*map(abs, scene.omega), float(np.abs(result.omega).max(initial=0.0)))
     # An estimate of 0 would be a promise that nothing has tested. If the scene was transformed to
@@ -129,17 +132,13 @@ def _gauss(stages: int) -> Method:
         _GAUSS_DEFAULT[stages - 1],
         _from("gauss", "gauss", stages),
         order=2 * stages,
-        state_torque=True,
     )
 
 
 def _fixed_step(name: str, title: str, source: str, order: int, evaluations: int) -> Method:
     title, source = f"{title} in the scene's steps", f"fortran/modern/fixed_step.f90; {source}"
     solve = _from("fixed_step", "fixed_step", name)
-    return Method(
-        name, title, source, 1.0, 1.0, solve, order=order, evaluations=evaluations,
-        state_torque=True,
-    )  # fmt: skip
+    return Method(name, title, source, 1.0, 1.0, solve, order=order, evaluations=evaluations)
 
 
 REGISTRY = {
@@ -237,14 +236,9 @@ def requested_tolerance(method: str, tolerance: Number | None) -> float:
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
 
 
-def check_attitude(method: str, scene: Scene | None = None) -> None:
-    """Raise InputError if the method with this name can't propagate the attitude.
-
-    Some methods propagate it only if the torque of `scene` depends on the state.
-    """
-    chosen = REGISTRY[method]
-    by_state = scene is not None and isinstance(scene.torque, StateTorque)
-    if not (chosen.attitude or (by_state and chosen.state_torque)):
+def check_attitude(method: str) -> None:
+    """Raise InputError if the method with this name can't propagate the attitude."""
+    if not REGISTRY[method].attitude:
         able = ", ".join(each.name for each in REGISTRY.values() if each.attitude)
         raise InputError(f"method {method} does not compute attitudes; allowed: {able}")
 

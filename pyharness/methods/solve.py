@@ -150,7 +150,7 @@ def solve(
     functions = None if events is None else event_functions(events, attitude)
     names = None if sensitivities is None else checked_names(scene, sensitivities, method, attitude)
     if attitude:
-        check_attitude(method, scene)
+        check_attitude(method)
     given = scene
     # An attitude that was not requested is not computed.
     start = (scene.attitude or IDENTITY) if attitude else None

@@ -68,7 +68,7 @@ contains
     real(dp) :: y(tape%n_unknowns), y_low(tape%n_unknowns) ! unknowns and their rounding errors
     real(dp) :: left(tape%n_unknowns)         ! truncation error of the step
     real(dp) :: weights(tape%n_unknowns)      ! which make the unknowns comparable
-    real(dp) :: noise(tape%n_unknowns)
+    real(dp), dimension(tape%n_unknowns) :: noise, sum_of_noise ! of the rates; of all steps, squared
     real(dp) :: change(tape%n_unknowns)       ! of the unknowns in the step
     real(dp) :: lanes(SIDE_BY_SIDE, MOST_UNKNOWNS) ! the error, and a perturbation of each unknown
     real(dp) :: t(2), t_next(2)               ! time and its rounding error, s
@@ -91,6 +91,7 @@ contains
     rest = t_end
     solution%status = COMPLETE
     solution%n_rows = 0
+    sum_of_noise = 0.0_dp
     s%a = 0.0_dp
     s%v(:, :, TIME_SLOT) = 0.0_dp
     call begin(n, transitions)
@@ -159,9 +160,6 @@ contains
       end if
       call estimate_truncation()
       call noise_of(tape, s, noise)
-      do i = 1, n
-        found%noise = found%noise + (weights(i)*noise(i)*factor*s%h)**2
-      end do
       if (.not. is_continued()) then
         is_rejected = .true.
         tries = tries + 1
@@ -177,6 +175,7 @@ contains
       n_before = solution%n_rows
       call add_rows()
       if (solution%status /= COMPLETE) exit
+      sum_of_noise = sum_of_noise + (noise*factor*s%h)**2
       call take_step()
       found%steps = found%steps + 1
       if (.not. maxval(abs(y)) <= huge(s%h)) then
@@ -206,7 +205,7 @@ contains
     end do
     call weigh()
     found%growth = growth_of(transposed(lanes), 1.0_dp/weights, transitions)
-    found%noise = sqrt(found%noise)
+    found%noise = norm2(weights*sqrt(sum_of_noise))
     do i = 1, n
       found%error = max(found%error, weights(i)*abs(lanes(1, i)))
     end do

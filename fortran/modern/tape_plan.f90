@@ -4,7 +4,7 @@ module tape_plan
   use operations, only: EXPONENTIAL => EXP, QUOTIENT, SQUARE_ROOT => SQRT, TANGENT => TANH
   use tape, only: FIRST_UNKNOWN, tape_t
   use tape_powers, only: INVISIBLE, powers_t, resolve
-  use tape_series, only: LAST_TERM, MOST_ORDER
+  use tape_series, only: LARGE_ARGUMENT, LAST_TERM, MOST_ORDER
   implicit none(type, external)
   private
 
@@ -63,6 +63,7 @@ contains
     real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots)
     type(powers_t), intent(inout) :: powers
     real(dp), intent(inout) :: factor
+    real(dp) :: most
     integer :: n
 
     call resolve(tape, order, smallest, a, powers, factor)
@@ -70,7 +71,12 @@ contains
       associate (first => tape%operations(2, n), second => tape%operations(3, n))
         select case (tape%operations(1, n))
         case (EXPONENTIAL)
-          factor = limited(first, max(0.5_dp*order, -a(0, first) - INVISIBLE), factor)
+          most = max(0.5_dp*order, -a(0, first) - INVISIBLE)
+          if (a(0, tape%operations(4, n) + 1) /= 0.0_dp) then
+            ! It is constant while its argument is large.
+            most = max(most, a(0, first) - LARGE_ARGUMENT)
+          end if
+          factor = limited(first, most, factor)
         case (TANGENT)
           ! The derivative decreases as exp(-2 abs(x)).
           factor = limited(first, max(0.25_dp*order, abs(a(0, first)) - 0.5_dp*INVISIBLE), factor)

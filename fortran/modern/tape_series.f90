@@ -18,6 +18,15 @@ module tape_series
   integer, parameter, public :: SIDE_BY_SIDE = 8       ! perturbations in a register
   integer, parameter :: BYTES = 8                      ! of a number
   real(dp), parameter :: EPSILON_OF_FUNCTION = 2.0_dp ! rounding error of a function, in units
+  ! A value whose rounding error is a number too. Beyond it, exponentials of larger arguments than
+  ! LARGE_ARGUMENT are saturated. They are all larger than the powers of 2 that replace them, 2**MOST_POWER at most.
+  real(dp), parameter :: LARGEST = 1e290_dp
+  real(dp), parameter, public :: LARGE_ARGUMENT = 210.0_dp
+  integer, parameter :: MOST_POWER = 300, POWERS_APART = 7, DIFFERENT = 20
+  ! Powers of 2 for all exponentials, to see what depends on them.
+  integer, parameter :: LARGE = 1000, ONE = 0, OF_SLOT = -1, NONE = -2
+  ! Largest part of a derivative that may depend on them.
+  real(dp), parameter :: UNSEEN = 2.0_dp**(-150)
   ! Largest terms of perturbations that a step leaves out, relative.
   real(dp), parameter, public :: VARIATION_TOLERANCE = 1e-3_dp
 
@@ -143,7 +152,9 @@ contains
     logical, intent(in) :: has_values !! whether terms 0 of all slots, and the tables, are inputs
     type(series_t), intent(inout) :: s
 
-    if (.not. has_values) call set_values(tape, t_low, s%h, s%a)
+    real(dp) :: derivatives(tape%n_unknowns)
+
+    if (.not. has_values) call set_values(tape, t_low, s%h, s%a, derivatives)
     call expand_tape(s%arrays, s%h, s%order)
   end subroutine expand
 
@@ -156,22 +167,46 @@ contains
     real(dp), intent(in) :: h     !! points to the side of which the pieces of tables are taken
     type(series_t), intent(inout) :: s
     real(dp), intent(out) :: derivatives(:)
-    integer :: i
 
     s%a(0, TIME_SLOT) = t(1)
     s%a(0, FIRST_UNKNOWN:FIRST_UNKNOWN + size(y) - 1) = y
-    call set_values(tape, t(2), h, s%a)
-    do i = 1, size(y)
-      derivatives(i) = value_of(tape, size(tape%constants) - size(y) + i, s%a)
-    end do
+    call set_values(tape, t(2), h, s%a, derivatives)
   end subroutine derivatives_at
 
-  pure subroutine set_values(tape, t_low, h, a)
-    !! Compute term 0 of all slots, and all terms of the tables.
+  pure subroutine set_values(tape, t_low, h, a, found)
+    !! Compute term 0 of all slots, all terms of the tables, and the derivatives of the unknowns. A logistic function, or the
+    !! reciprocal of a hyperbolic cosine, is finite where an exponential in it overflows. Large
+    !! exponentials are then replaced by others, unless a derivative shows the difference.
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t_low, h  !! s
     real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)
+    real(dp), intent(out) :: found(tape%n_unknowns)
+    real(dp), dimension(tape%n_unknowns) :: large_ones, ones
+
     integer :: n
+
+    call set_values_with(tape, t_low, h, NONE, a, found)
+    do n = 1, tape%n_operations
+      if (tape%operations(1, n) == EXPONENTIAL) exit
+    end do
+    if (n > tape%n_operations) return
+    if (all(abs(a(0, :)) <= LARGEST)) return
+    call set_values_with(tape, t_low, h, LARGE, a, large_ones)
+    call set_values_with(tape, t_low, h, ONE, a, ones)
+    call set_values_with(tape, t_low, h, OF_SLOT, a, found)
+    ! NaN is not allowed.
+    if (all(abs(found - large_ones) <= UNSEEN*(max(abs(found), abs(ones))))) return
+    call set_values_with(tape, t_low, h, NONE, a, found)
+  end subroutine set_values
+
+  pure subroutine set_values_with(tape, t_low, h, power, a, derivatives)
+    !! Compute term 0 of all slots, all terms of the tables, and the derivatives of the unknowns.
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: t_low, h  !! s
+    integer, intent(in) :: power      !! of 2, in place of large exponentials
+    real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)
+    real(dp), intent(out) :: derivatives(:)
+    integer :: i, n
 
     do n = 1, tape%n_operations
       associate (first => tape%operations(2, n), second => tape%operations(3, n), &
@@ -186,7 +221,15 @@ contains
         case (SQUARE_ROOT)
           a(0, out) = sqrt(a(0, first))
         case (EXPONENTIAL)
-          a(0, out) = exp(a(0, first))
+          ! Term 0 of the second slot says that the exponential is constant.
+          a(0, out + 1) = merge(1.0_dp, 0.0_dp, power /= NONE .and. a(0, first) > LARGE_ARGUMENT)
+          if (a(0, out + 1) == 0.0_dp) then
+            a(0, out) = exp(a(0, first))
+          else if (power == OF_SLOT) then
+            a(0, out) = 2.0_dp**(MOST_POWER - POWERS_APART*mod(n, DIFFERENT))
+          else
+            a(0, out) = 2.0_dp**power
+          end if
         case (TANGENT)
           a(0, out) = tanh(a(0, first))
           ! The square of the tangent may be rounded to 1.
@@ -204,7 +247,10 @@ contains
         end select
       end associate
     end do
-  end subroutine set_values
+    do i = 1, tape%n_unknowns
+      derivatives(i) = value_of(tape, size(tape%constants) - tape%n_unknowns + i, a)
+    end do
+  end subroutine set_values_with
 
   pure subroutine set_table_terms(tape, number, t, t_low, h, terms)
     !! Compute the terms of a table, which are those of a cubic polynomial.

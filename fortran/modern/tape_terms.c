@@ -129,6 +129,7 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
       case EXP:
         /* The second slot has k times the terms of the argument. */
         angle = out + TERMS;
+        if (angle[0]) break; /* It is constant, because it is large. */
         angle[k] = k * x[k];
         out[k] = (add_products(out, angle, out, 1.0, &range) + angle[k] * out[0]) / k;
         break;

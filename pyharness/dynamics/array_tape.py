@@ -1,11 +1,12 @@
 """Evaluation of a tape for many times and states at once, in NumPy's arrays."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
-from pyharness.model.tape import N_INPUTS, Functions, Table, Tape, evaluate
+from pyharness.model.tape import N_INPUTS, Functions, Table, Tape, evaluate, float_outputs
 from pyharness.model.trajectory import Array
 
 
@@ -40,4 +41,9 @@ def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
     with np.errstate(all="ignore"):
         found: Sequence[Any] = evaluate(tape, inputs_of(times, state), ARRAYS)
     # An output that is a constant is a number.
-    return np.stack([np.broadcast_to(each, len(times)) for each in found], axis=1)
+    outputs = np.stack([np.broadcast_to(each, len(times)) for each in found], axis=1)
+    for row in np.flatnonzero(~np.isfinite(outputs).all(axis=1)):
+        with suppress(ZeroDivisionError):
+            inputs = inputs_of(times[row : row + 1], state[row : row + 1])
+            outputs[row] = float_outputs(tape, [float(each[0]) for each in inputs])
+    return outputs

@@ -7,7 +7,8 @@ is then evaluated in every arithmetic: floats, decimal numbers, Taylor series, o
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from pyharness.model.functions import cosine, sine
@@ -118,22 +119,28 @@ def evaluate(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T
     `inputs` are the values of the eight input slots: the time, three components of omega, and four
     of the attitude.
     """
+    values = slot_values(tape, inputs, functions)
+    return [_combined(each, values, functions) for each in tape.outputs]
+
+
+def _combined(linear: Linear, values: Sequence[Any], functions: Functions[Any]) -> Any:
+    total: Any = None
+    for slot, coefficient in linear.terms:
+        term = values[slot]
+        if coefficient != 1.0:
+            term = functions.number(coefficient) * term
+        total = term if total is None else total + term
+    if total is None:
+        return functions.number(linear.constant)
+    return total + functions.number(linear.constant) if linear.constant else total
+
+
+def slot_values(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T]:
+    """Return the values of all slots of a tape, as `evaluate` computes them."""
     values: list[Any] = list(inputs)
-
-    def combined(linear: Linear) -> Any:
-        total: Any = None
-        for slot, coefficient in linear.terms:
-            term = values[slot]
-            if coefficient != 1.0:
-                term = functions.number(coefficient) * term
-            total = term if total is None else total + term
-        if total is None:
-            return functions.number(linear.constant)
-        return total + functions.number(linear.constant) if linear.constant else total
-
     for kind, operands, linear, table in tape.operations:
         if linear is not None:
-            values.append(combined(linear))
+            values.append(_combined(linear, values, functions))
         elif table is not None:
             values.append(functions.table(table, values[TIME]))
         elif kind == "product":
@@ -142,7 +149,7 @@ def evaluate(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T
             values.append(values[operands[0]] / values[operands[1]])
         else:
             values.append(getattr(functions, kind)(values[operands[0]]))
-    return [combined(each) for each in tape.outputs]
+    return values
 
 
 def _sqrt(x: float) -> float:
@@ -165,3 +172,34 @@ def _value(table: Table, time: float) -> float:
 
 # For arguments of type float. A division by zero raises ZeroDivisionError.
 FLOATS: Functions[float] = Functions(float, _sqrt, _exp, math.tanh, sine, cosine, _value)
+# Large exponentials that overflow are replaced by powers of 2, as in tape_series.f90.
+_LARGE_ARGUMENT, _LEAST_POWER, _MOST_POWER, _ALL_LARGE = 210.0, 167.0, 300.0, 1000.0
+_UNSEEN = 2.0**-150
+
+
+def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
+    """Return the outputs of a tape in floats.
+
+    If a large exponential makes an output NaN or infinite, as in sinh(x)/cosh(x), it is replaced by
+    another one, unless the outputs depend on which. A division by zero raises ZeroDivisionError.
+    """
+    found = evaluate(tape, inputs, FLOATS)
+    if all(map(math.isfinite, found)) or all(each.kind != "exp" for each in tape.operations):
+        return found
+    # The power differs between arguments, so that a quotient of two exponentials is seen.
+    own, large, ones = (
+        evaluate(tape, inputs, replace(FLOATS, exp=partial(_saturated, *powers)))
+        for powers in ((_LEAST_POWER, _MOST_POWER), (_ALL_LARGE, _ALL_LARGE), (0.0, 0.0))
+    )
+    if all(
+        abs(x - y) <= _UNSEEN * max(abs(x), abs(z))
+        for x, y, z in zip(own, large, ones, strict=True)
+    ):
+        return own
+    return found
+
+
+def _saturated(least: float, most: float, x: float) -> float:
+    if x <= _LARGE_ARGUMENT:
+        return _exp(x)
+    return math.exp2(least + (most - least) * math.fmod(math.frexp(x)[0] * 1e4, 1.0))

@@ -25,6 +25,7 @@ from pyharness.methods.scipy_run import (
     Run,
     rows_of,
 )
+from pyharness.methods.scipy_spans import Span, spans_of
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.compiled_torque import CompiledTorque
 from pyharness.model.errors import InputError, TimedError, printable
@@ -56,6 +57,7 @@ _MOST_GUESSES = 200
 _MOST_STUCK = 50
 # An omega that has grown by this factor when the phase is too large grows without bound.
 _UNBOUNDED = 1e3
+_ORDINARY = 1e100  # rad/s; products of such are numbers
 # Local tolerances of the two integrations that determine the smallest tolerance.
 _TRIAL = (1e-7, 1e-8)
 # Work of a right-hand side, in microseconds: without torque, with SciPy's own work; of an operation
@@ -88,10 +90,12 @@ def solve_state(
     |omega|, and the attitude as an angle (rad). `effort` is the factor on the work limit, and
     `most` is the limit in right-hand sides of a body without torque. The trajectory ends early,
     with the ending ``overflow``, before a time at which omega grows without bound or the torque is
-    singular. Raise InputError if an opaque function raises an exception, if the torque needs an
-    attitude that the scene does not have, or if the tolerance or the work limit can't be met.
+    singular. Its ending is ``unchecked`` if the series of a recorded torque, which bounds the
+    steps, does not reach the last time. Raise InputError if an opaque function raises an exception,
+    if the torque needs an attitude that the scene does not have, or if the tolerance or the work
+    limit can't be met.
     """
-    run = _StateRun(scene, times[-1], name, effort, most)
+    run = _StateRun(scene, times[-1], name, effort, most, tolerance)
     nothing = np.empty((0, len(run.start)))
     if run.is_singular():
         _check_attitude(scene)
@@ -105,7 +109,7 @@ def solve_state(
         return rows_of(times, rest, run.evaluations, len(times), "complete")
     found = _refined(run, times, tolerance, scale)
     count = len(found.state)
-    ended = "complete" if found.is_complete else "overflow"
+    ended = "overflow" if not found.is_complete else "complete" if run.is_bounded else "unchecked"
     return rows_of(times[:count], found.state, run.evaluations, len(times), ended)
 
 
@@ -129,7 +133,7 @@ def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
     The torque of the scene depends on the state, and `time` is in s. `name` and `most` are those of
     `solve_state`. The estimate is 0 if the method does not reach the end.
     """
-    run = _StateRun(scene, time, name, 1.0, most)
+    run = _StateRun(scene, time, name, 1.0, most, _TRIAL[-1])
     scale = 0.0 if run.is_singular() else run.expected_omega()
     if scale == 0.0:
         return 0.0
@@ -214,7 +218,9 @@ class _StateRun(Run):
     The time reached and the largest |omega| are recorded after each step.
     """
 
-    def __init__(self, scene: Scene, end: float, name: str, effort: float, most: float) -> None:
+    def __init__(
+        self, scene: Scene, end: float, name: str, effort: float, most: float, tolerance: float
+    ) -> None:
         torque = scene.torque
         assert isinstance(torque, StateTorque)
         if torque.needs_attitude and scene.attitude is None:
@@ -234,15 +240,18 @@ class _StateRun(Run):
             self._compiled = torque.function
         limit = int(most * _WORK / (_COMPILED_WORK if self._compiled else _WORK + work))
         start = (*scene.omega, *(scene.attitude or ()))
-        own = self._between_breaks(slopes) if torque.tape is not None else _guarded(slopes)
+        own = self._between_breaks(slopes)
+        if torque.tape is None:
+            own = _guarded(slopes, isinstance(torque.function, CompiledTorque))
         super().__init__(start, own, rate, end, name, effort, limit)
         self.name = name
         self.is_smooth = torque.tape is not None
-        breaks = torque.tape.breaks if torque.tape is not None else []
-        self._breaks = sorted((x for x in breaks if 0.0 < x / (end or 1.0) < 1.0), key=abs)
         self._between = -math.inf, math.inf
         self._integrations = 0
         self._reached, self._largest, self._stuck = 0.0, 0.0, 0
+        self._spans, self.is_bounded = [Span(end, math.inf)], True
+        if self.is_smooth and end and not self.is_singular():
+            self._spans, self.is_bounded = spans_of(scene, end, tolerance)
 
     def _between_breaks(self, slopes: RightHandSide) -> RightHandSide:
         """Return a right-hand side in which a table changes after a breakpoint, not at it."""
@@ -311,11 +320,11 @@ class _StateRun(Run):
         rows = np.empty((0, len(self.start)))
         state, begin, self._largest = self.start, 0.0, 0.0
         # SciPy does not know where a table changes: each integration ends there.
-        for end in [*(x for x in self._breaks if abs(x) < abs(times[-1])), times[-1]]:
+        for end, most in self._spans:
             own = [time for time in times[len(rows) :] if abs(time) <= abs(end)]
             wanted = own if own and own[-1] == end else [*own, end]
             self._between = _interior(begin, end)
-            found = self._from(begin, state, wanted, local, sizes, longest, scale)
+            found = self._from(begin, state, wanted, local, sizes, min(longest, most), scale)
             rows = np.concatenate([rows, found[: len(own)]])
             if len(found) < len(wanted):
                 break
@@ -373,12 +382,12 @@ def _interior(first: float, second: float) -> tuple[float, float]:
     return min(inner), max(inner)
 
 
-def _guarded(slopes: RightHandSide) -> RightHandSide:
-    """Return a right-hand side that raises InputError if a user's opaque function fails."""
+def _guarded(slopes: RightHandSide, is_compiled: bool) -> RightHandSide:
+    """Return a right-hand side that raises InputError if an opaque function fails or is NaN."""
 
     def guarded(time: float, state: Sequence[float]) -> list[float]:
         try:
-            return slopes(time, state)
+            found = slopes(time, state)
         except InputError:
             raise
         except Exception as error:
@@ -388,5 +397,15 @@ def _guarded(slopes: RightHandSide) -> RightHandSide:
                 "N m",
                 float(time),
             ) from error
+        # A large omega may be about to become infinite, and a compiled function may lack the
+        # attitude.
+        is_odd = any(map(math.isnan, found)) and max(map(abs, state[:3])) <= _ORDINARY
+        if is_odd and not is_compiled:
+            raise TimedError(
+                "[torque]: the function returned NaN at t = {time} s; allowed: three finite "
+                "components in N m",
+                float(time),
+            )
+        return found
 
     return guarded

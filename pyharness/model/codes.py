@@ -15,6 +15,8 @@ class Statuses:
     GAVE_UP = 4  # work limit exceeded, or no digit of the phase is left
     INTERRUPTED = 5  # the user interrupted it; a Python exception is set
     SENSITIVE = 6  # all rows are present, but the amplified rounding error exceeds the tolerance
+    UNCHECKED = 7  # all rows are present, but SciPy may have passed a short change of the torque
+    SINGULAR = 8  # the torque is undefined at the end, although neither it nor omega is infinite
 
 
 class Methods:

@@ -16,7 +16,7 @@ from scipy.integrate import DenseOutput, OdeSolver
 from pyharness.methods.recorded import kernel_tape
 from pyharness.methods.taylor_step import LONGEST_TRIAL, taylor_step
 from pyharness.model.errors import InputError
-from pyharness.model.symbols import Recorder, called_once
+from pyharness.model.symbols import Recorder, called_once, recorded_twice
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Array
 from pyharness.model.values import number
@@ -32,7 +32,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
     """Integrate an ordinary differential equation y' = fun(t, y) by its Taylor series.
 
     It is a method of `scipy.integrate.solve_ivp`: ``solve_ivp(fun, t_span, y0, method=Taylor)``.
-    `fun` is called once, with symbols in place of numbers, and its arithmetic is recorded; the
+    `fun` is called twice, with symbols in place of numbers, and its arithmetic is recorded; the
     series are then computed by compiled code. The order, which follows from the tolerances, is
     between 8 and 28. The dense output is the series itself.
 
@@ -181,18 +181,22 @@ def recorded_equation(fun: Callable[..., Any], n: int) -> Tape:
 
     Raise InputError if it can't be recorded, or does not return n numbers.
     """
+
+    def record(recorder: Recorder) -> Tape:
+        time, *state = recorder.inputs()
+        # A single equation may return a number.
+        rates = called_once(
+            lambda t, y: np.ravel(np.array(fun(t, y), dtype=object)),
+            (time, np.array(state, dtype=object)),
+            recorder,
+            f"a function of (t, y) that returns {n} numbers",
+        )
+        if len(rates) != n:
+            raise InputError(f"fun returned {len(rates)} values; allowed: {n}, the length of y0")
+        return recorder.tape(rates)
+
     instead = "another method of solve_ivp"
-    recorder = Recorder(_MOST_OPERATIONS, n + 1, "fun", instead)
-    time, *state = recorder.inputs()
-    given = (time, np.array(state, dtype=object))
-    # A single equation may return a number.
-    rates = called_once(
-        lambda t, y: np.ravel(np.array(fun(t, y), dtype=object)),
-        given, recorder, f"a function of (t, y) that returns {n} numbers",
-    )  # fmt: skip
-    if len(rates) != n:
-        raise InputError(f"fun returned {len(rates)} values; allowed: {n}, the length of y0")
-    return recorder.tape(rates)
+    return recorded_twice(record, lambda: Recorder(_MOST_OPERATIONS, n + 1, "fun", instead))
 
 
 def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:

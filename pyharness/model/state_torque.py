@@ -14,8 +14,8 @@ from pyharness.model.attitude import product, quaternion_of_axes
 from pyharness.model.compiled_torque import compiled_torque
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.law_symbols import body_torque
-from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, called_once
-from pyharness.model.tape import FLOATS, N_INPUTS, TIME, Tape, evaluate
+from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, called_once, recorded_twice
+from pyharness.model.tape import N_INPUTS, TIME, Tape, evaluate, float_outputs
 from pyharness.model.torque_law import FRAMES, TorqueLaw
 from pyharness.model.values import Triple, converted, three_floats
 
@@ -97,7 +97,7 @@ class StateTorque:
         if self.tape is None:
             return _called(self.function, self.needs_attitude, time, omega, attitude)
         try:
-            first, second, third = evaluate(self.tape, [time, *omega, *attitude], FLOATS)
+            first, second, third = float_outputs(self.tape, [time, *omega, *attitude])
         except ZeroDivisionError:
             return math.nan, math.nan, math.nan
         return first, second, third
@@ -148,7 +148,10 @@ def replayed(function: Function) -> StateTorque:
 
 def _tape_of(function: Function, names: Sequence[str] = ()) -> Tape:
     """Return a function of (t, omega, attitude) as a tape; keyword arguments are further inputs."""
-    recorder = Recorder(n_inputs=N_INPUTS + len(names))
+    return _recorded_with(Recorder(n_inputs=N_INPUTS + len(names)), function, names)
+
+
+def _recorded_with(recorder: Recorder, function: Function, names: Sequence[str] = ()) -> Tape:
     time, *state = recorder.inputs()
     omega, attitude = (np.array(each, dtype=object) for each in (state[:3], state[3:7]))
     values = dict(zip(names, state[7:], strict=True))
@@ -169,9 +172,8 @@ def recorded(function: Function) -> StateTorque:
     ----------
     function : callable
         A function of (t, omega) or of (t, omega, attitude) that returns the three components of the
-        torque about the body axes (N m). It is called once, and again if it has keyword arguments
-        whose defaults are numbers: these are parameters, and `solve` computes sensitivities to
-        them.
+        torque about the body axes (N m). Keyword arguments whose defaults are numbers are
+        parameters, and `solve` computes sensitivities to them.
 
     Returns
     -------
@@ -181,7 +183,8 @@ def recorded(function: Function) -> StateTorque:
     Raises
     ------
     InputError
-        If the function can't be recorded, or does not return three numbers.
+        If the function can't be recorded, does not return three numbers, or has a memory: it is
+        called at least twice, and must be recorded as the same operations.
 
     Examples
     --------
@@ -202,7 +205,9 @@ def recorded(function: Function) -> StateTorque:
             raise InputError(f"[torque]: {len(components)} components; allowed: three")
         return components
 
-    return _with_parameters(replayed(called), function, called)
+    tape = recorded_twice(lambda recorder: _recorded_with(recorder, called), Recorder)
+    torque = StateTorque(tape, None, tape.needs_attitude)
+    return _with_parameters(torque, function, called)
 
 
 def opaque(function: Any, *, needs_attitude: bool = False) -> StateTorque:
@@ -329,10 +334,12 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
             return False
         return True
 
+    if not values:
+        return torque
     names = list(values)
     if not is_recordable(names):
         names = [name for name in names if is_recordable([name])]
-    if not (names and is_recordable(names)):
+    if not is_recordable(names):
         return torque
     parameters = tuple((name, values[name]) for name in names)
     return replace(torque, parameters=parameters, varied=_tape_of(called, names))

@@ -60,6 +60,14 @@ class Recorder:
         allowed = f"allowed: {_ALLOWED}, or {self._instead}"
         return InputError(f"{self.place}: {what} can't be recorded; {allowed}")
 
+    def impure(self) -> InputError:
+        """Return the exception for a function whose result depends on more than its arguments."""
+        return InputError(
+            f"{self.place}: two calls of the function differ, or it keeps its arguments; allowed: "
+            "a function of its arguments alone, without random numbers and memory; for a "
+            "controller with memory, set held_torque of a Stepper"
+        )
+
     def number(self, value: float) -> "Symbol":
         """Return a constant as a symbol."""
         return Symbol(self, value, {})
@@ -88,6 +96,8 @@ class Recorder:
         if isinstance(value, np.ndarray) and value.shape == ():
             value = value.item()
         if isinstance(value, Symbol):
+            if value.recorder is not self:
+                raise self.impure()
             return value.linear()
         number = converted(value)
         if not isinstance(number, float):
@@ -130,6 +140,8 @@ class Symbol:
     def _other(self, value: Any) -> "Symbol | None":
         """Return the other operand of an operator as a symbol, or None if it is no number."""
         if isinstance(value, Symbol):
+            if value.recorder is not self.recorder:
+                raise self.recorder.impure()
             return value
         if isinstance(value, np.ndarray):
             return None
@@ -337,6 +349,17 @@ class Symbol:
         if name.startswith("_") or name == "dtype":
             raise AttributeError(name)
         raise self.recorder.refusal(f"{name} of the state")
+
+
+def recorded_twice(record: Callable[[Recorder], Tape], recorder: Callable[[], Recorder]) -> Tape:
+    """Return the tape that `record` records of a user's function with a new recorder.
+
+    Raise InputError if another call of the function is recorded as another tape.
+    """
+    first, again = record(recorder()), recorder()
+    if record(again) != first:
+        raise again.impure()
+    return first
 
 
 def called_once(

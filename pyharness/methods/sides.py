@@ -8,7 +8,7 @@ import numpy as np
 from pyharness.model.trajectory import Trajectory
 
 _ROWS = ("time", "recorded_time", "omega")
-_WORST_FIRST = ("overflow", "sensitive", "complete")
+_WORST_FIRST = ("singular", "overflow", "unchecked", "sensitive", "complete")
 
 
 def row_names(found: Trajectory) -> tuple[str, ...]:
@@ -38,6 +38,7 @@ def joined(before: Trajectory, after: Trajectory) -> Trajectory:
         **rows,
         ended=min((x.ended for x in both), key=_WORST_FIRST.index),
         error=_larger(before.error, after.error),
+        reason=before.reason or after.reason,
         growth=_larger(before.growth, after.growth),
         steps=before.steps + after.steps,
         evaluations=before.evaluations + after.evaluations,

@@ -27,6 +27,7 @@ from pyharness.methods.registry import (
 )
 from pyharness.methods.scipy_ivp import finest_tolerance
 from pyharness.methods.sides import in_reverse, joined
+from pyharness.methods.stepper import with_reason
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort
@@ -172,7 +173,11 @@ def solve(
     below = [t for t in values if t < 0.0]
     # The times on either side of 0, in order away from 0.
     sides = (below[::-1], values[len(below) :])
-    parts = [_integrate(chosen, scene, each, tolerance, effort) for each in sides if each]
+    parts = [
+        with_reason(scene, _integrate(chosen, scene, each, tolerance, effort), each[-1])
+        for each in sides
+        if each
+    ]
     if below:
         parts[0] = in_reverse(parts[0])
     found = parts[0] if len(parts) == 1 else joined(*parts)
@@ -180,6 +185,11 @@ def solve(
     found = replace(found, moments=moments, tolerance=reported, scene=given)
     if axes is not None:
         found = in_scene_axes(found, axes)
+    if found.ended == "unchecked" and (dense_output or functions is not None):
+        raise InputError(
+            f"dense output and events of {method} need the series of a recorded torque, which ends "
+            "before the last time; allowed: a smooth torque, or opaque(function)"
+        )
     rows = partial(_more_rows, given, method, effort, found.attitude is not None)
     if dense_output:
         found = replace(found, sol=solution_of(given, found, rows, method, tolerance))

@@ -4,21 +4,23 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from pyharness.dynamics.system import with_constant_body
+from pyharness.dynamics.system import is_recorded, with_constant_body
 from pyharness.methods.recorded import kernel_tape
+from pyharness.methods.singular import SingularError, undefined_operation
 from pyharness.methods.taylor_step import LONGEST_TRIAL, Step, taylor_step
 from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
 from pyharness.model.errors import InputError
 from pyharness.model.scene import CHANGING, Scene, checked_scene
 from pyharness.model.state_torque import StateTorque, of_law, torque_of
 from pyharness.model.symbols import MOST_OPERATIONS, Recorder
-from pyharness.model.tape import FLOATS, Tape, evaluate
-from pyharness.model.trajectory import Array
+from pyharness.model.tape import Tape, float_outputs
+from pyharness.model.trajectory import Array, Trajectory
 from pyharness.model.values import boolean, finite, number, three_floats, tolerance_of
 
 _FINEST = 1e-14  # smallest tolerance of a step
@@ -85,8 +87,8 @@ class Stepper:
 
     # Another name that is set, such as `torque`, is an error.
     __slots__ = (
-        "_begin", "_breaks", "_largest", "_last", "_n", "_packed", "_scene", "_state", "_steps",
-        "_tape", "_time", "_tolerance", "_trial",
+        "_begin", "_breaks", "_largest", "_last", "_n", "_origin", "_packed", "_scene", "_state",
+        "_steps", "_tape", "_time", "_tolerance", "_trial",
     )  # fmt: skip
 
     def __init__(
@@ -104,6 +106,7 @@ class Stepper:
         self._state[:3] = scene.omega
         if attitude:
             self._state[3:7] = unit_quaternion("attitude", scene.attitude or IDENTITY)[0]
+        self._origin = [0.0, *self._state.tolist()]
         self._trial, self._largest = LONGEST_TRIAL, 0.0
         self._last = Step(0.0, self._state[None], self._state, 0)
         self._begin = 0.0
@@ -161,8 +164,7 @@ class Stepper:
 
         `longest` is the longest step that is allowed (s); a negative one leads to earlier times. A
         step ends where a table of the torque changes. Raise InputError if `longest` is too small to
-        change the time, or not a number, and ArithmeticError if the motion or its torque is
-        singular.
+        change the time, or not a number, and if the motion or its torque is singular.
         """
         longest = number("longest", longest)
         end = self._time + longest
@@ -198,7 +200,7 @@ class Stepper:
                 self._packed, self._time, self._state, tolerances, self._tolerance, trial, longest
             )
             if taken.h == 0.0:
-                raise ArithmeticError(f"no step is short enough at t = {self._time:g} s")
+                raise self._singular()
             # The omega that a body at rest is about to reach was a guess.
             reached = float(np.abs(taken.state[:3]).max())
             if self._largest > 0.0 or not 0.0 < reached < 0.5 * scale:
@@ -208,7 +210,7 @@ class Stepper:
     def until(self, time: float) -> None:
         """Take steps until `time` (s), which is later or earlier than now.
 
-        Raise InputError if `time` is not a finite number, and ArithmeticError as `step` does.
+        Raise InputError if `time` is not a finite number, and as `step` does.
         """
         end = finite("time", time)
         while self._time != end:
@@ -255,6 +257,11 @@ class Stepper:
         self._breaks = self._tape.breaks
         self._scene = scene
 
+    def _singular(self) -> SingularError:
+        """Return the exception for a time at which no step is short enough."""
+        what = undefined_operation(self._tape, self._origin, [self._time, *self._state.tolist()])
+        return SingularError(what, self._time)
+
     def _set(self, place: slice, values: Sequence[float]) -> None:
         self._state = self._state.copy()
         self._state[place] = values
@@ -268,7 +275,7 @@ class Stepper:
             return self._largest
         # The omega that a body at rest is about to reach.
         try:
-            rates = evaluate(self._tape, [self._time, *self._state.tolist()], FLOATS)
+            rates = float_outputs(self._tape, [self._time, *self._state.tolist()])
         except ArithmeticError:
             return 1.0
         return math.sqrt(max(map(abs, rates[:3]))) or 1.0
@@ -282,25 +289,46 @@ class Stepper:
 
 
 def step_lengths(
-    scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
-) -> tuple[dict[float, float], bool]:
-    """Return the steps (s) of a Taylor series from time 0 to `end`, and whether it reaches `end`.
+    scene: Scene,
+    attitude: bool,
+    end: float,
+    tolerance: float,
+    bounds: Sequence[float],
+    most: int = _MOST_STEPS,
+) -> tuple[dict[float, float], float]:
+    """Return the steps (s) of a Taylor series from time 0 to `end`, and the time that it reaches.
 
     The steps are given by their ends and lengths. Those that end at one of the `bounds`, which may
-    have cut them, are not included. A series ends before a singularity, and after too many steps.
+    have cut them, are not included. A series ends before a singularity, and after `most` steps.
     """
     if scene.changing is not None:
         scene = with_constant_body(scene)
     stepper = Stepper(scene, max(tolerance, _FINEST), attitude=attitude)
     cuts = frozenset(bounds)
     found: dict[float, float] = {}
-    with suppress(ArithmeticError):
-        while abs(stepper.time) < abs(end) and stepper.steps < _MOST_STEPS:
+    with suppress(SingularError):
+        while abs(stepper.time) < abs(end) and stepper.steps < most:
             before = stepper.time
             after = stepper.step(end - before)
             if after not in cuts:
                 found[after] = abs(after - before)
-    return found, stepper.time == end
+    return found, stepper.time
+
+
+def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
+    """Return a trajectory from 0 to `end` (s), with the reason if its torque is not defined."""
+    if found.ended != "overflow" or not is_recorded(scene):
+        return found
+    try:
+        stepper = Stepper(with_constant_body(scene), attitude=scene.attitude is not None)
+        while abs(stepper.time) < abs(end) and stepper.steps < _MOST_STEPS:
+            stepper.step(end - stepper.time)
+    except SingularError as error:
+        if error.what:
+            return replace(found, ended="singular", reason=str(error))
+    except InputError:
+        pass
+    return found
 
 
 def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:

@@ -22,6 +22,7 @@ class SciPyNames:
     ended: str
     stop: "Stop | None"
     growth: float | None
+    reason: str | None
 
     if TYPE_CHECKING:
 
@@ -82,9 +83,15 @@ class SciPyNames:
             )
         if self.ended == "event":
             return "A terminal event ended the integration; the rows end before it or at it."
-        if self.ended == "overflow":
+        if self.ended in ("overflow", "singular"):
             last = f"the last row is at t = {self.time[-1]:g} s" if len(self.time) else "no row"
-            return f"Omega or the torque became infinite or NaN; {last}."
+            reason = self.reason or "omega or the torque became infinite or NaN"
+            return f"{reason[0].upper()}{reason[1:]}; {last}."
+        if self.ended == "unchecked":
+            return (
+                "The integration reached all requested times, but may have passed a short change "
+                "of the torque, whose series ends before."
+            )
         if self.ended != "sensitive":
             return "The integration reached all requested times."
         by = "" if self.growth is None else f", amplified by {short(self.growth)},"

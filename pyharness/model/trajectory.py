@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 # Largest relative rounding error of a number in binary64.
 ROUNDING = 2.0**-53
 # The ways to end a run (`Trajectory.ended`) with all requested rows present.
-WITH_ALL_ROWS = ("complete", "sensitive")
-ENDINGS = (*WITH_ALL_ROWS, "stopped", "overflow", "event")
+WITH_ALL_ROWS = ("complete", "sensitive", "unchecked")
+ENDINGS = (*WITH_ALL_ROWS, "stopped", "overflow", "singular", "event")
 STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
 
 
@@ -73,12 +73,14 @@ class Trajectory(Mechanics, Conversions):
     steps, evaluations : int
         The number of steps, and the number of evaluations of the right-hand side. SciPy's methods
         and the reference count their rows as steps.
-    ended : {"complete", "sensitive", "stopped", "overflow", "event"}
+    ended : {"complete", "sensitive", "unchecked", "stopped", "overflow", "singular", "event"}
         How the integration ended. "stopped" means that the Lipschitz test ended it. After an
-        "overflow" the rows end before the first omega that is not finite. "sensitive" means that
-        all rows are present, but the rounding error, amplified by the motion, exceeds the requested
-        tolerance. "event" means that a terminal event ended the integration, and that rows after it
-        are not present.
+        "overflow" the rows end before the first omega that is not finite, and if it is "singular"
+        before a time at which a recorded torque is not defined (`reason`). "event" means that a
+        terminal event ended it, and that rows after it are not present. In two cases all rows are
+        present: "sensitive" means that the rounding error, amplified by the motion, exceeds the
+        requested tolerance, and "unchecked" that a method of SciPy may have passed a short change
+        of a recorded torque, because the series that bounds its steps does not reach the end.
     stop : Stop or None
         The point at which the Lipschitz test ended the run; None if the test did not end it.
     ier : ndarray of int, shape (n,), or None
@@ -91,6 +93,8 @@ class Trajectory(Mechanics, Conversions):
     growth : float or None
         The error amplification: the largest norm of the state-transition matrix of omega from any
         earlier time to the end. None if it is unknown.
+    reason : str or None
+        The time at which a recorded torque is not defined, and the operation; None if it is.
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs. None if they were not
         requested.
@@ -140,6 +144,7 @@ class Trajectory(Mechanics, Conversions):
     ier: NDArray[np.int32] | None = None
     error: float | None = None
     growth: float | None = None
+    reason: str | None = field(default=None, repr=False)
     attitude: Array | None = None
     moments: tuple[float, float, float] | ChangingMoments | ChangingInertia | None = None
     axes: Array | None = None

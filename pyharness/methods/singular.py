@@ -1,0 +1,63 @@
+"""The operation of a recorded torque that is not defined where an integration ends."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pyharness.dynamics.array_tape import ARRAYS
+from pyharness.model.errors import TimedError
+from pyharness.model.tape import OMEGA, Tape, slot_values
+
+# An operand that is smaller, relative to its value at the beginning, is about to become 0.
+_NEARLY_ZERO = 1e-6
+# An omega that is larger, relative to the one at the beginning, grows without bound.
+_UNBOUNDED = 1e6
+
+
+class SingularError(TimedError):
+    """The exception for a time at which no step of a series is short enough.
+
+    `what` says which operation of the torque is not defined; it is None if omega or the torque
+    becomes infinite.
+    """
+
+    def __init__(self, what: str | None, time: float) -> None:
+        """Store the message with `what` and `time` (s)."""
+        where = "at t = {time} s"
+        message = f"omega or its torque becomes infinite {where}; allowed: an earlier time"
+        super().__init__(f"the torque is not defined {where}: {what}" if what else message, time)
+        self.what = what
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return the class and the arguments that recreate the error, so that it can be pickled."""
+        return type(self), (self.what, self.time)
+
+
+def undefined_operation(tape: Tape, begin: Sequence[float], end: Sequence[float]) -> str | None:
+    """Return what is not defined at the end of an integration, and what to write instead.
+
+    `begin` and `end` are the inputs of the tape where the integration begins and where it ends. The
+    result is None if omega or a quotient becomes infinite.
+    """
+    first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))
+    if last > _UNBOUNDED * (first or 1.0):
+        return None
+    with np.errstate(all="ignore"):
+        before, values = (slot_values(tape, list(map(np.float64, x)), ARRAYS) for x in (begin, end))
+
+    def vanishes(slot: int) -> bool:
+        size = abs(before[slot]) if begin != end and np.isfinite(before[slot]) else 0.0
+        return not abs(values[slot]) > _NEARLY_ZERO * size
+
+    for kind, operands, *_ in tape.operations:
+        if kind == "sqrt" and (values[operands[0]] < 0.0 or vanishes(operands[0])):
+            return (
+                "the square root of a number that becomes 0 or negative; write a smooth function, "
+                "such as x*tanh(x/e) for sqrt(x**2)"
+            )
+        if kind == "quotient" and vanishes(operands[1]):
+            if vanishes(operands[0]):
+                return "0/0; write a function that has a value there, such as a polynomial"
+            return None
+    return None

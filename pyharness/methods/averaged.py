@@ -10,7 +10,6 @@ nonlinear Schroedinger equations, Numerische Mathematik 129.
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -20,15 +19,11 @@ from pyharness.methods.averaged_step import MacroStep, NotResolvedError
 from pyharness.methods.averaged_torque import fastest_of, torque_of
 from pyharness.methods.problem import rows_trajectory
 from pyharness.methods.sensitivity import is_sensitive
-from pyharness.methods.taylor import taylor
 from pyharness.model.array_type import Array
 from pyharness.model.effort import advice
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import StateTorque
-from pyharness.model.tape import TIME
 from pyharness.model.trajectory import ROUNDING, Trajectory
-from pyharness.model.values import three
 
 NODES = 20  # in a macro-step
 _TURN = 2.0 * math.pi
@@ -54,8 +49,6 @@ _FASTEST = 0.02
 _SHARE, _FLOOR = 0.05, 1e-15
 _ROWS_AT_ONCE = 1000
 _LARGEST_PHASE = 1e15  # rad
-# Tolerance of the series for one revolution, and difference from it that is rounding.
-_EXACT, _EXACT_FLOOR = 1e-14, 1e-12
 
 
 def averaged(
@@ -70,8 +63,9 @@ def averaged(
 
     Raise InputError for an opaque torque, and if omega would not oscillate about a principal axis
     without the torque; if the motion is near the separatrix; if the torque is not weak, or varies
-    as fast as the motion and may be in resonance with it; if the torque may change within a part of
-    a macro-step, as a pulse; and if the work limit is exceeded.
+    as fast as the motion and may be in resonance with it; if a recorded torque is no polynomial in
+    omega and time, and waves, so that it may change within a part of a macro-step; and if the work
+    limit is exceeded.
     """
     coordinates = Coordinates.of(scene.euler_coefficients, scene.omega)
     if coordinates is None:
@@ -133,7 +127,6 @@ class _Run:
         n_rows = 0
         while True:
             step = self._step()
-            self._check_revolution(step)
             point, parts = step.end
             whole = math.fsum([*self.begin, *parts])
             inside = n_rows
@@ -166,30 +159,6 @@ class _Run:
         return rows_trajectory(
             self.times, found, self.evaluations, len(self.done), ended, error=error, growth=growth
         )
-
-    def _check_revolution(self, step: MacroStep) -> None:
-        """Compare the first revolution of a macro-step with the Taylor series, if it can be.
-
-        Raise TimedError if a torque that a function of omega defines acts where no angle is.
-        """
-        torque, time = self.scene.torque, self.begin[0]
-        if not isinstance(torque, StateTorque) or torque.tape is None:
-            return
-        if time != 0.0 and TIME in torque.tape.inputs:
-            return  # the series begins at time 0
-        turn = self.forward * _TURN / self.pace
-        start = np.array(self.coordinates.omega(*step.at(np.zeros(1)))[0])[:, 0]
-        end = np.array(self.coordinates.omega(*step.at(step.angles(np.array([turn]))))[0])[:, 0]
-        exact = taylor(replace(self.scene, omega=three("omega", start)), [turn], _EXACT)
-        missed = float(np.abs(end - exact.omega[-1]).max()) / self.largest
-        count = max(1.0, self.phase / _TURN)
-        own = float(self._relative(step).sum())
-        if not missed <= 4.0 * own + max(_EXACT_FLOOR, self.tolerance / count):
-            raise TimedError(
-                "averaged: at t = {time} s the torque changes too fast as a function of omega; "
-                "allowed: a smoother torque, or another method",
-                time,
-            )
 
     def _pace(self, point: Array) -> float:
         """Return the frequency of the motion (rad/s), roughly."""

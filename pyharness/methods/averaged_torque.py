@@ -15,6 +15,8 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import N_INPUTS, TIME, Linear, Operation, Tape
 from pyharness.model.torque_law import TorqueLaw
 
+_MOST_DEGREE = 8.0
+
 
 def torque_of(scene: Scene) -> tuple[Torque, bool]:
     """Return the torque over the moments as a function, and whether it depends on time."""
@@ -55,65 +57,61 @@ def _state_torque(scene: Scene, given: StateTorque) -> Torque:
 
 
 class _Slot(NamedTuple):
-    """The direct dependence of a slot of a tape on time, not that by way of omega.
+    """The dependence of a slot of a tape on omega and time.
 
-    `fastest` is the highest frequency of its waves (rad/s), and infinite if the slot is more than a
-    sum of products of waves and powers of the time. `rate` is the derivative with respect to time
-    (1/s), if it is constant; otherwise it is NaN.
+    `degree` is the degree of a polynomial in omega and time, and infinite if the slot is more than
+    a sum of products of such and waves. `fastest` is the highest frequency of its waves (rad/s).
+    `rate` is the derivative with respect to time (1/s) of a slot that is linear in time alone.
     """
 
-    fastest: float
-    rate: float
-
-    @property
-    def is_constant(self) -> bool:
-        return self.fastest == 0.0 and self.rate == 0.0
+    degree: float = 0.0
+    fastest: float = 0.0
+    rate: float | None = None
 
 
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
     """Return the highest frequency of the waves of a torque (rad/s).
 
-    Raise InputError if the torque depends on time in a way that a macro-step may miss, as a pulse.
+    Raise InputError if the torque depends on omega or time in a way that a macro-step may miss, as
+    a pulse does, and a torque that acts in a narrow range of energy.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)
     assert torque.tape is not None
-    fastest = _fastest_of_tape(torque.tape)
-    if fastest == math.inf:
+    found = _all_of(torque.tape)
+    if found.degree > _MOST_DEGREE:
         raise InputError(
-            "averaged may miss changes of this torque with time; allowed: a torque whose time is "
-            "only in powers, and in sines and cosines of low frequency, or another method"
+            "averaged may miss changes of this torque; allowed: a recorded torque that is a "
+            f"polynomial of degree {_MOST_DEGREE:.0f} at most in omega and time, times sines and "
+            "cosines of low frequency, or another method"
         )
-    return fastest
+    return found.fastest
 
 
-def _fastest_of_tape(tape: Tape) -> float:
-    slots = [_Slot(0.0, 1.0 if slot == TIME else 0.0) for slot in range(N_INPUTS)]
+def _all_of(tape: Tape) -> _Slot:
+    slots = [_Slot(1.0, rate=1.0) if slot == TIME else _Slot(1.0) for slot in range(N_INPUTS)]
     for operation in tape.operations:
         slots.append(_result(operation, slots))
-    return max(_combined(output, slots).fastest for output in tape.outputs)
+    outputs = [_combined(output, slots) for output in tape.outputs]
+    return _Slot(max(each.degree for each in outputs), max(each.fastest for each in outputs))
 
 
 def _combined(linear: Linear, slots: list[_Slot]) -> _Slot:
-    used = [(slots[slot], factor) for slot, factor in linear.terms if factor != 0.0]
+    used = [(slots[slot], factor) for slot, factor in linear.terms]
+    rates = [factor * each.rate for each, factor in used if each.rate is not None]
     return _Slot(
+        max((each.degree for each, _ in used), default=0.0),
         max((each.fastest for each, _ in used), default=0.0),
-        math.fsum(each.rate * factor for each, factor in used),
+        math.fsum(rates) if len(rates) == len(used) else None,
     )
 
 
 def _result(operation: Operation, slots: list[_Slot]) -> _Slot:
     if operation.linear is not None:
         return _combined(operation.linear, slots)
-    if operation.table is not None:
-        return _Slot(math.inf, math.nan)
-    first, *others = (slots[slot] for slot in operation.operands)
-    if first.is_constant and all(each.is_constant for each in others):
-        return _Slot(0.0, 0.0)
+    used = [slots[slot] for slot in operation.operands]
     if operation.kind == "product":
-        return _Slot(first.fastest + others[0].fastest, math.nan)
-    if operation.kind == "quotient" and others[0].is_constant:
-        return _Slot(first.fastest, math.nan)
-    if operation.kind in ("sine", "cosine") and first.fastest == 0.0 and math.isfinite(first.rate):
-        return _Slot(abs(first.rate), math.nan)
-    return _Slot(math.inf, math.nan)
+        return _Slot(sum(each.degree for each in used), sum(each.fastest for each in used))
+    if operation.kind in ("sine", "cosine") and used[0].rate is not None:
+        return _Slot(0.0, abs(used[0].rate))
+    return _Slot(math.inf)

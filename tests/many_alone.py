@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness import Ensemble, Scene, prepare, solve_many
+from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.trajectory import Array
 
 BASE = Scene("", (1.0, 1.0, 1.0), moments=(1.0, 1.0, 1.0), step_size=0.05)
 # Methods, each with the finest tolerance that is drawn for it (10 to minus this power).
 METHODS = {
-    "auto": 15, "taylor": 15, "rk4": 3, "taylor-3": 3, "improved-euler": 3, "gauss-2": 12,
-    "quick": 11,
+    "auto": 15, "taylor": 15, "gauss-2": 12, "quick": 11,
 }  # fmt: skip
+METHODS |= dict.fromkeys(FIXED_STEP, 3)
 _BATCH = 2000
 _ALONE = 40  # bodies of a batch that are also solved alone
 _WAVES = 3  # sines and as many cosines; one batch in eight has more than lanes can take

@@ -10,7 +10,7 @@ module many_fixed
   use kinds, only: dp
   use many_columns, only: block_t, columns_of, equations_of, next_block, odd_axes, put_back, &
                           times_of, turn_axes, turn_back
-  use methods, only: IMPROVED_EULER, TAYLOR_3
+  use methods, only: IMPROVED_EULER, RK4, TAYLOR_3
   use statuses, only: COMPLETE
   implicit none(type, external)
   private
@@ -53,6 +53,11 @@ contains
 
     call c_f_pointer(bodies_at, bodies)
     interrupted = 0
+    if (.not. any(method == [IMPROVED_EULER, TAYLOR_3, RK4])) then
+      ! The single-body kernel refuses an unknown method.
+      where (status == bodies%mark) status = NEEDS_FALLBACK
+      return
+    end if
     block%last = 0
     do
       call next_block(n, status, bodies%mark, block)
@@ -236,7 +241,7 @@ contains
       call improved_euler_steps(m, n_steps, s)
     case (TAYLOR_3)
       call taylor_steps(m, n_steps, s)
-    case default
+    case (RK4)
       call runge_kutta_steps(m, n_steps, s)
     end select
   end subroutine advance

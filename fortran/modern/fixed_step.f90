@@ -6,7 +6,7 @@ module fixed_step
   use kinds, only: dp
   use methods, only: IMPROVED_EULER, RK4, TAYLOR_3
   use problem, only: problem_t, request_t, solution_t
-  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
+  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED
   use torque_law, only: torque_at, torque_rate_at
   implicit none(type, external)
   private
@@ -24,7 +24,8 @@ contains
   subroutine fixed_step_rows(problem, request, method, step, solution)
     !! Compute the angular velocity at each of the times, which are ordered away from 0. Between two
     !! of them there are as many whole steps as fit and then a shorter one. The last whole step may
-    !! be longer by up to EXCESS instead. The status is COMPLETE, OVERFLOW, GAVE_UP or INTERRUPTED.
+    !! be longer by up to EXCESS instead. The status is COMPLETE, OVERFLOW, GAVE_UP, INTERRUPTED, or
+    !! REFUSED for an unknown method.
     type(problem_t), intent(in) :: problem
     type(request_t), intent(in) :: request         !! its tolerance is not used
     integer, intent(in) :: method                  !! IMPROVED_EULER, TAYLOR_3 or RK4
@@ -41,6 +42,8 @@ contains
     integer :: i
 
     solution%n_rows = 0
+    solution%status = REFUSED
+    if (per_step(method) == 0) return
     solution%status = GAVE_UP
     ! A varying torque costs as much as the rest of the step, and a wave twice that.
     cost = 1.0_dp + 2.0_dp*real(problem%n_sines + problem%n_cosines, dp) &
@@ -102,10 +105,18 @@ contains
   end function steps_to
 
   pure integer function per_step(method)
-    !! Return the number of right-hand sides in a step. The derivative of one counts as another.
+    !! Return the number of right-hand sides in a step; 0 for an unknown method. The derivative of
+    !! one counts as another.
     integer, intent(in) :: method
 
-    per_step = merge(4, 2, method == RK4)
+    select case (method)
+    case (IMPROVED_EULER, TAYLOR_3)
+      per_step = 2
+    case (RK4)
+      per_step = 4
+    case default
+      per_step = 0
+    end select
   end function per_step
 
   pure subroutine advance(problem, method, begin, h, first, last, y)
@@ -161,7 +172,7 @@ contains
         k2(2) = m_slope(2) + a(2)*(k1(3)*y(1) + y(3)*k1(1))
         k2(3) = m_slope(3) + a(3)*(k1(1)*y(2) + y(1)*k1(2))
         y = y + h*(k1 + (0.5_dp*h)*k2)
-      case default
+      case (RK4)
         ! Eq. 31: classical Runge-Kutta.
         k2 = rates(a, m_middle, y + (0.5_dp*h)*k1)
         k3 = rates(a, m_middle, y + (0.5_dp*h)*k2)

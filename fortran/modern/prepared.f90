@@ -144,9 +144,11 @@ contains
           call solve_by_series(problem, request, code, solution, found)
         case (IMPROVED_EULER:RK4)
           call fixed_step_rows(problem, request, code, packed(STEP), solution)
-        case default
+        case (GAUSS + 1:GAUSS + 8)
           call gauss_rows(problem, request, code - GAUSS, packed(STEP), solution, reached)
           solution%steps = solution%evaluations
+        case default
+          solution%status = REFUSED
         end select
       end associate
       ended = solution%status

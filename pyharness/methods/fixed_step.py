@@ -11,7 +11,7 @@ from pyharness.methods.problem import normalized, trajectory_of
 from pyharness.model.codes import Methods
 from pyharness.model.effort import Integrator, advice
 from pyharness.model.errors import TimedError
-from pyharness.model.extension import GAVE_UP, extension
+from pyharness.model.extension import GAVE_UP, REFUSED, extension
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 
@@ -33,6 +33,8 @@ def fixed_step(name: str) -> Integrator:
             scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, number,
             scene.step_size, effort=work,
         )  # fmt: skip
+        if status == REFUSED:
+            raise NotImplementedError(f"{name} has no kernel in fortran/modern/fixed_step.f90")
         if status == GAVE_UP:
             raise TimedError(
                 f"{name}: {abs(times[-1]) / scene.step_size:.3g} steps of {{time}} s would "

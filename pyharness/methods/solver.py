@@ -11,6 +11,7 @@ from pyharness.methods.last_call import LastCall
 from pyharness.methods.many_starts import many_starts
 from pyharness.methods.packed import packed_scene
 from pyharness.methods.plan import RK4_OR_TAYLOR, Plan
+from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.codes import Methods, Places
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
@@ -35,9 +36,7 @@ CODES = {
     "sphere": Methods.SPHERE,
     RK4_OR_TAYLOR: Methods.QUICK_OR_TAYLOR,
     "taylor": Methods.TAYLOR,
-    "improved-euler": Methods.IMPROVED_EULER,
-    "taylor-3": Methods.TAYLOR_3,
-    "rk4": Methods.RK4,
+    **{name: getattr(Methods, name.upper().replace("-", "_")) for name in FIXED_STEP},
     "quick": Methods.QUICK,
     **{f"gauss-{stages}": Methods.GAUSS + stages for stages in range(1, 9)},
 }

@@ -11,10 +11,12 @@ term that the method yields for y' = a y**2.
 import math
 from functools import cache
 
-from numpy.polynomial import Polynomial
+import numpy as np
 
 from pyharness.methods.registry import FIXED_STEP, REGISTRY, SCIPY_METHODS
 from pyharness.model.basis import Basis
+from pyharness.model.scene import Scene
+from pyharness.theory.schemes import SCHEMES, Series, constant
 
 STEPS = Basis(
     "derived",
@@ -57,17 +59,10 @@ def fixed_step_sum(name: str, angle: float, steps: int) -> float:
 def _series(name: str) -> tuple[float, ...]:
     """Return the coefficients of the powers of the step size in a method's result after one step.
 
-    The step starts from y(0) = 1 and integrates y' = y**2. Its result is a polynomial in the step
-    size, whose coefficients are returned from power 0 on. `name` is the method.
+    The step starts from y(0) = 1 and integrates y' = y**2, which is Euler's equations with A = B =
+    C = 1 for three equal components.
     """
-    if name == "taylor-3":
-        return 1.0, 1.0, 1.0
-    y, h = Polynomial([1.0]), Polynomial([0.0, 1.0])
-    first = y * y
-    if name == "improved-euler":
-        result = y + 0.5 * h * (first + (y + h * first) ** 2)
-    else:
-        second = (y + 0.5 * h * first) ** 2
-        third = (y + 0.5 * h * second) ** 2
-        result = y + 1.0 / 6.0 * (h * (first + 2.0 * (second + third) + (y + h * third) ** 2))
-    return tuple(result.coef.tolist())
+    ones = np.ones(3)
+    equal = Scene("equal", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
+    found = SCHEMES[name].scheme(Series(equal), constant(ones))[:, 0]
+    return tuple(found.tolist())

@@ -4,6 +4,7 @@ import tracemalloc
 from dataclasses import replace
 from functools import cache
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -11,7 +12,11 @@ import pytest
 from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve, solve_many
 from pyharness.methods import many_scenes
 from pyharness.methods.many import Ensemble
+from pyharness.methods.problem import normalized
+from pyharness.methods.registry import FIXED_STEP
+from pyharness.methods.solver import CODES, PREPARED
 from pyharness.model.codes import Methods, Statuses
+from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
 from tests.as_written import compiler_here, many_as_written
 from tests.many_errors import KINDS, bodies, exceeding, scene_of
@@ -122,7 +127,7 @@ def test_every_case(case: int, level: int) -> None:
         assert np.abs(omega - solver(start, 3.0)).max() <= 3e-12 * np.abs(many).max()
 
 
-@pytest.mark.parametrize("method", ["rk4", "improved-euler", "taylor-3"])
+@pytest.mark.parametrize("method", FIXED_STEP)
 @pytest.mark.parametrize("torque", [(0.0, 0.0, 0.0), (3.0, -2.0, 1.0)])
 def test_fixed_steps_are_those_of_the_single_method(
     method: str, torque: tuple[float, float, float], level: int
@@ -136,6 +141,40 @@ def test_fixed_steps_are_those_of_the_single_method(
         for start, body, omega in zip(starts, moments, found.omega, strict=True):
             alone = prepare(replace(scene, moments=body), method)(start, t_end)
             assert np.abs(omega - alone).max() <= 2e-14 * np.abs(alone).max()
+
+
+@pytest.mark.parametrize("method", PREPARED)
+def test_many_bodies_are_those_of_the_prepared_solver(method: str) -> None:
+    rng = np.random.default_rng(11)
+    starts, moments = rng.standard_normal((20, 3)), rng.uniform(1.0, 3.0, (20, 3))
+    law = TorqueLaw() if method == "closed-form" else TorqueLaw((0.3, -0.2, 0.1))
+    scene = replace(TOP, torque=law, step_size=0.05)
+    tolerance = None if method in FIXED_STEP else 1e-7
+    found = solve_many(
+        scene, 2.0, omega0=starts, moments=moments, method=method, tolerance=tolerance
+    )
+    assert found.has_result.all()
+    for start, body, omega in zip(starts, moments, found.omega, strict=True):
+        alone = prepare(replace(scene, moments=body), method, tolerance)(start, 2.0)
+        assert np.abs(omega - alone).max() <= (tolerance or 1e-13) * np.abs(alone).max()
+
+
+def test_kernels_refuse_a_method_that_they_do_not_have() -> None:
+    """A method that was added in Python alone had the results of rk4."""
+    scene = replace(TOP, torque=TorqueLaw((0.3, -0.2, 0.1)), step_size=0.05)
+    known = {code for name, code in vars(Methods).items() if name.isupper()}
+    for code in (Methods.RK4 + 100, Methods.GAUSS + 9, -1):
+        assert code not in known - {Methods.SPACE_TORQUE}
+        with patch.dict(CODES, {"rk4": code}):
+            solver = prepare(scene, "rk4")
+            assert np.isnan(solver(scene.omega, 1.0)).all()
+            assert solver.status == "refused"
+            found = solve_many(scene, 1.0, omega0=np.ones((40, 3)), method="rk4")
+            assert not found.has_result.any()
+    rows = extension().fixed_step_solution(
+        *normalized(scene), scene.omega, [1.0], 99, 0.1, effort=np.array([1.0, 0.0])
+    )
+    assert rows[1:3] == (0, Statuses.REFUSED)
 
 
 def test_what_has_no_lanes_is_solved_one_by_one() -> None:

@@ -89,7 +89,7 @@ def test_steady_spin_of_a_brick(level: int) -> None:
     assert found.error is not None
     (error,) = _angle_errors(scene, [40.0], found.attitude)
     # Most of the estimated error has been subtracted.
-    assert 1e-7 < error < 0.5 * found.error < 1e-4
+    assert 1e-8 < error < 0.5 * found.error < 1e-4
     assert found.digits == pytest.approx(-math.log10(found.error), abs=0.1)
 
 

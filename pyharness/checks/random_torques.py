@@ -22,18 +22,16 @@ from pyharness.checks.judge import (
     tolerance_of,
 )
 from pyharness.checks.methods import run_of_call
-from pyharness.checks.orders import in_few_steps, order_if_seen
 from pyharness.checks.random_methods import CAMPAIGN, ROUNDING, sample
 from pyharness.checks.selection import Selection
 from pyharness.methods.many import solve_many
-from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, PREPARED_FOR_STATE, SCIPY_METHODS
+from pyharness.methods.registry import METHODS, PREPARED_FOR_STATE, SCIPY_METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import WITH_ALL_ROWS
 from pyharness.scenes.random_scenes import COARSEST
 from pyharness.scenes.state_scenes import draw, draw_ready
-from pyharness.truth.reference import reference
 
 # One of 20 draws of a run has such a scene, and in one of 80 the methods in Python are tried too.
 _EVERY, _EVERY_SLOW = 20, 80
@@ -41,10 +39,7 @@ _EFFORT = 0.2  # factor on the work limit of the reference
 _EARLIER = 0.4  # fraction of the last time, to judge intermediate output too
 # Methods in Python or in decimal arithmetic. The finest tolerances take them too long.
 _FINE = 1e-9
-# Gauss collocation of low order takes too many steps.
 _SLOW = ("reference", *SCIPY_METHODS)
-_STAGES = (2, 8)
-_RADIANS = 4.0
 
 
 def random_torques(chosen: Selection) -> Iterator[Attempt]:
@@ -67,8 +62,6 @@ def random_torques(chosen: Selection) -> Iterator[Attempt]:
             for name, x in _entrances(scene, time, source, is_slow).items()
             if chosen.may_ask(f"random/{number}/{name}")
         }
-        if is_slow:
-            yield from _orders(chosen, number, scene, abs(time))
         try:
             truth = reference_truth(scene, (_EARLIER * time, time), _EFFORT) if entrances else None
         except InputError:
@@ -79,25 +72,15 @@ def random_torques(chosen: Selection) -> Iterator[Attempt]:
                 yield Attempt(chosen.drawn(number, subject), partial(_samples, tried, truth))
 
 
-def _orders(chosen: Selection, number: int, scene: Scene, time: float) -> Iterator[Attempt]:
-    """Yield deferred checks of the order of each method with a fixed step, in a few radians."""
-    coarse = in_few_steps(scene, min(time, _RADIANS / max(map(abs, scene.omega))))
-    known = cache(partial(reference, coarse, coarse.times()))
-    for method in FIXED_STEP:
-        name = replace(chosen.drawn(number, "torque-order"), setting=method)
-        yield Attempt(name, partial(order_if_seen, coarse, known))
-
-
 def _entrances(
     scene: Scene, time: float, source: Random, is_slow: bool
 ) -> dict[str, Callable[[], MethodRun]]:
     """Return a deferred run for each entry point, by its name, as in ``torque-solve-taylor``.
 
-    `source` draws the tolerances, from 1e-3 to the finest of a method, and the stages of Gauss
-    collocation.
+    `source` draws the tolerances, from 1e-3 to the finest of a method.
     """
     times, digits = (_EARLIER * time, time), source.random()
-    slow = (*_SLOW, f"gauss-{source.randint(*_STAGES)}") if is_slow else ()
+    slow = _SLOW if is_slow else ()
 
     def tolerance(name: str) -> float:
         finest = max(METHODS[name].finest, 0.0 if name in PREPARED_FOR_STATE else _FINE)
@@ -131,7 +114,7 @@ def _may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     """
     if tried.method in SCIPY_METHODS and "can't meet it" in why:
         return True
-    return tried.method in (*SCIPY_METHODS, *GAUSS) and "allow more work" in why
+    return tried.method in SCIPY_METHODS and "allow more work" in why
 
 
 def _limit(truth: Truth, tried: MethodRun) -> float:

@@ -25,7 +25,14 @@ from pyharness.checks.tolerances import MIDDLING
 from pyharness.checks.trials.threads import THREADS, Job, different
 from pyharness.methods.problem import closed_form
 from pyharness.methods.recorded import system
-from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS
+from pyharness.methods.registry import (
+    FIXED_STEP,
+    GAUSS,
+    METHODS,
+    SCIPY_METHODS,
+    check_attitude,
+    check_torque,
+)
 from pyharness.methods.solve import solve
 from pyharness.model.attitude import IDENTITY, angle_between, product, quaternion_of_axes
 from pyharness.model.errors import InputError
@@ -90,6 +97,8 @@ def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
             _threads,
         ),
     }
+    if not any(_takes(method, scene) for method in FIXED_STEP):
+        del made["step-size"]
     own = named("", scene=scene, options=options)
     return {
         name: Trial(name, title, bound, partial(_made, attempts, scene, replace(own, suite=name)))
@@ -114,9 +123,21 @@ def _last(scene: Scene) -> float:
 def _tried(scene: Scene) -> Iterator[tuple[str, float]]:
     """Yield each method that is tried on a scene, with its tolerances."""
     for method in (*_METHODS, *(["closed-form"] if closed_form(scene) else [])):
+        if not _takes(method, scene):
+            continue
         yield method, max(MIDDLING, METHODS[method].finest)
         if method in _FINE:
             yield method, METHODS[method].finest
+
+
+def _takes(method: str, scene: Scene) -> bool:
+    try:
+        check_torque(scene, method, attitude=True)
+        if scene.attitude is not None:
+            check_attitude(method)
+    except InputError:
+        return False
+    return True
 
 
 def _length(scene: Scene, name: Name) -> Iterator[Attempt]:

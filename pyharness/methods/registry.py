@@ -266,10 +266,12 @@ def check_torque(scene: Scene, method: str, attitude: bool) -> None:
     computed.
     """
     torque, chosen = scene.torque, REGISTRY[method]
-    kind = "a torque about the axes of space" if torque.in_space else "a torque that depends on "
+    kind = "a torque about the axes of space"
     able: list[str] = []
     if isinstance(torque, StateTorque):
-        kind += "the attitude" if torque.needs_attitude else "omega"
+        kind = "a recorded torque, which is no TorqueLaw"
+        if torque.needs_attitude:
+            kind = "a torque that depends on the attitude"
         if torque.tape is None and not chosen.scipy:
             kind, able = "an opaque torque", list(SCIPY_METHODS)
         elif chosen.weak_torque and scene.changing is not None:

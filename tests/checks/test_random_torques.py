@@ -17,7 +17,6 @@ from pyharness.checks.selection import Selection
 from pyharness.compare import candidates
 from pyharness.dynamics import system
 from pyharness.methods import many_recorded, recorded, solve
-from pyharness.methods.registry import FIXED_STEP, METHODS
 from pyharness.model import arrays
 from pyharness.model.tape import Linear, Tape
 from pyharness.model.trajectory import Trajectory
@@ -48,20 +47,6 @@ def test_only_requested_checks_are_made() -> None:
     again = found[0].replay.partition("--only ")[2].split()[0]
     (same,) = [check for check in checks(again) if check.id == again]
     assert same.value == found[0].value
-
-
-def test_orders_are_measured_and_a_wrong_one_is_seen() -> None:
-    only = [f"random/{number}/torque-order" for number in (0, 160)]
-    chosen = Selection(only=only, seed="fixed", draws=200)
-    found = list(made(random_torques(chosen), only))
-    assert {check.name.setting for check in found} == set(FIXED_STEP)
-    assert len(found) == 6
-    assert all(check.passed for check in found)
-    assert any(check.limit is not None for check in found)
-    wrong = {name: replace(METHODS[name], order=METHODS[name].order + 1) for name in FIXED_STEP}
-    with patch.dict(METHODS, wrong):
-        again = made(random_torques(chosen), only)
-        assert [not x.passed for x in again] == [x.limit is not None for x in found]
 
 
 def _off(scene: Any, attitude: bool, real: Callable[..., Tape] = system.system_of) -> Tape:

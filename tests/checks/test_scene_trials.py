@@ -14,7 +14,7 @@ import pytest
 from pyharness import Scene, opaque, read_scene, torques
 from pyharness.checks import scene_trials as room
 from pyharness.checks.check import Check
-from pyharness.checks.stress import SCENE_TRIALS, stress
+from pyharness.checks.stress import SCENE_TRIALS, TRIALS, stress
 from pyharness.cli.main import main
 from pyharness.methods.registry import METHODS
 from pyharness.model.errors import InputError

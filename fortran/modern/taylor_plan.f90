@@ -38,6 +38,7 @@ contains
     real(dp) :: gain                        ! omega that torques may add, rad/s
     real(dp) :: rate                        ! rate of change, 1/s
     real(dp) :: turned                      ! angle of the waves, rad
+    real(dp) :: part                        ! of the tolerance
     integer :: n
 
     turned = 0.0_dp
@@ -54,9 +55,8 @@ contains
     end do
     if (with_attitude) coupling = max(coupling, 1.0_dp)
     h = first_step(rate, time)
-    local_tolerance = local_tolerance_of(coupling, scale, gain, turned, &
-                                         tolerance*merge(WITH_ATTITUDE_TOO, 1.0_dp, with_attitude), &
-                                         time)
+    part = merge(WITH_ATTITUDE_TOO, 1.0_dp, with_attitude)
+    local_tolerance = local_tolerance_of(coupling, scale, gain, turned, part*tolerance, time)
     order = order_for(local_tolerance)
   end subroutine plan
 

@@ -175,7 +175,7 @@ def test_brake_in_a_narrow_band_of_energy_or_momentum_is_refused(band: Any) -> N
         return [-1e-6 * band(energy, momentum) * w[i] for i in range(3)]
 
     with pytest.raises(InputError, match="polynomial of degree 8 at most in omega and time"):
-        _averaged(replace(SCENE, torque=brake), [1e4])
+        _averaged(replace(SCENE, torque=recorded(brake)), [1e4])
 
 
 def test_recorded_torque_with_slow_changes_is_solved_and_with_fast_waves_refused() -> None:

@@ -19,7 +19,7 @@ module tape_series
   integer, parameter :: BYTES = 8                      ! of a number
   real(dp), parameter :: EPSILON_OF_FUNCTION = 2.0_dp ! rounding error of a function, in units
   ! A value whose rounding error is a number too. Beyond it, exponentials of larger arguments than
-  ! LARGE_ARGUMENT are saturated. They are all larger than the powers of 2 that replace them, 2**MOST_POWER at most.
+  ! LARGE_ARGUMENT are saturated. They are all larger than the powers of 2 that replace them.
   real(dp), parameter :: LARGEST = 1e290_dp
   real(dp), parameter, public :: LARGE_ARGUMENT = 210.0_dp
   integer, parameter :: MOST_POWER = 300, POWERS_APART = 7, DIFFERENT = 20
@@ -174,15 +174,15 @@ contains
   end subroutine derivatives_at
 
   pure subroutine set_values(tape, t_low, h, a, found)
-    !! Compute term 0 of all slots, all terms of the tables, and the derivatives of the unknowns. A logistic function, or the
-    !! reciprocal of a hyperbolic cosine, is finite where an exponential in it overflows. Large
-    !! exponentials are then replaced by others, unless a derivative shows the difference.
+    !! Compute term 0 of all slots, all terms of the tables, and the derivatives of the unknowns. A
+    !! logistic function, or the reciprocal of a hyperbolic cosine, is finite where an exponential
+    !! in it overflows. Large exponentials are then replaced by others, unless a derivative shows
+    !! the difference.
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t_low, h  !! s
     real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)
     real(dp), intent(out) :: found(tape%n_unknowns)
     real(dp), dimension(tape%n_unknowns) :: large_ones, ones
-
     integer :: n
 
     call set_values_with(tape, t_low, h, NONE, a, found)

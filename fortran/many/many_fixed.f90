@@ -243,6 +243,8 @@ contains
       call taylor_steps(m, n_steps, s)
     case (RK4)
       call runge_kutta_steps(m, n_steps, s)
+    case default
+      return ! unknown methods are refused before
     end select
   end subroutine advance
 

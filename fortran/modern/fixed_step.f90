@@ -178,6 +178,8 @@ contains
         k3 = rates(a, m_middle, y + (0.5_dp*h)*k2)
         k4 = rates(a, m_end, y + h*k3)
         y = y + (h/6.0_dp)*((k1 + k4) + 2.0_dp*(k2 + k3))
+      case default
+        return ! unknown methods are refused before
       end select
     end do
   end subroutine advance

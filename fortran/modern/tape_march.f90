@@ -68,7 +68,8 @@ contains
     real(dp) :: y(tape%n_unknowns), y_low(tape%n_unknowns) ! unknowns and their rounding errors
     real(dp) :: left(tape%n_unknowns)         ! truncation error of the step
     real(dp) :: weights(tape%n_unknowns)      ! which make the unknowns comparable
-    real(dp), dimension(tape%n_unknowns) :: noise, sum_of_noise ! of the rates; of all steps, squared
+    real(dp) :: noise(tape%n_unknowns)        ! of the rates
+    real(dp) :: sum_of_noise(tape%n_unknowns) ! squares, of all steps
     real(dp) :: change(tape%n_unknowns)       ! of the unknowns in the step
     real(dp) :: lanes(SIDE_BY_SIDE, MOST_UNKNOWNS) ! the error, and a perturbation of each unknown
     real(dp) :: t(2), t_next(2)               ! time and its rounding error, s

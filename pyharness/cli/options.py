@@ -53,7 +53,7 @@ EFFORT = {
 }
 STRICT = {
     "--strict": "Exit with status 1 if the motion amplifies rounding errors so much that they "
-    "exceed the tolerance."
+    "exceed the tolerance, or if a short change of the torque may have been passed."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too, each in the format of its name: .md "

@@ -130,6 +130,10 @@ def ending(trajectory: Trajectory) -> str:
         )
     if trajectory.ended == "overflow":
         return f"overflow: the rows end before the first omega that is not finite ({counts})"
+    if trajectory.ended == "singular":
+        return f"singular: {trajectory.reason} ({counts})"
+    if trajectory.ended == "unchecked":
+        return f"unchecked: a short change of the torque may have been passed ({counts})"
     if trajectory.ended == "event":
         return f"ended by a terminal event ({counts})"
     if trajectory.ended == "sensitive":

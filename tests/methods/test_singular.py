@@ -1,13 +1,16 @@
 """Recorded torques that are not defined at some time: the ending, the reason, and the advice."""
 
 import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, Stepper, solve
+from pyharness.cli.main import main
 from pyharness.methods.singular import SingularError
+from pyharness.model.scene_report import ending
 
 
 def _scene(torque: Any) -> Scene:
@@ -61,3 +64,22 @@ def test_stepper_refuses_it_in_one_line() -> None:
     assert isinstance(caught.value, SingularError)
     again = pickle.loads(pickle.dumps(caught.value))
     assert (str(again), again.what) == (str(caught.value), caught.value.what)
+
+
+def test_endings_are_shown_by_run(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    kink = _scene(lambda t, w: [np.sqrt((t - 0.5) ** 2), 0.0, 0.0])
+    for method, words in (
+        ("auto", "singular: the torque is not"),
+        ("dop853", "unchecked: a short"),
+    ):
+        found = solve(kink, [0.25, 1.0], method, 1e-6)
+        assert words in ending(found)
+    path = tmp_path / "kink.toml"
+    path.write_text(
+        "[body]\nmoments = [1.0, 1.0, 1.0]\n[initial]\nomega = [1.0, 0.0, 0.0]\n"
+        '[torque]\nexpression = ["sqrt((t - 0.5)**2)", "0", "0"]\n'
+    )
+    asked = ["run", "--scene", str(path), "--method", "dop853", "--times", "0.25,1"]
+    assert main(asked) == 0
+    assert main([*asked, "--strict"]) == 1
+    capsys.readouterr()

@@ -94,7 +94,7 @@ def run(options: argparse.Namespace) -> int:
     word = None if options.word == BINARY64 else options.word
     report = trajectory_report(scene, name, listing, title, trajectory, form, word, bound)
     shared.show(report, options, {"printer": page, "tape5": tape})
-    return 1 if options.strict and trajectory.ended == "sensitive" else 0
+    return 1 if options.strict and trajectory.ended in ("sensitive", "unchecked") else 0
 
 
 def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) -> None:

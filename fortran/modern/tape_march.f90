@@ -176,7 +176,9 @@ contains
       n_before = solution%n_rows
       call add_rows()
       if (solution%status /= COMPLETE) exit
-      sum_of_noise = sum_of_noise + (noise*factor*s%h)**2
+      do i = 1, n
+        sum_of_noise(i) = sum_of_noise(i) + (noise(i)*factor*s%h)**2
+      end do
       call take_step()
       found%steps = found%steps + 1
       if (.not. maxval(abs(y)) <= huge(s%h)) then

@@ -21,6 +21,7 @@ module tape_series
   ! A value whose rounding error is a number too. Beyond it, exponentials of larger arguments than
   ! LARGE_ARGUMENT are saturated. They are all larger than the powers of 2 that replace them.
   real(dp), parameter :: LARGEST = 1e290_dp
+  real(dp), parameter :: SMALL_ENOUGH = 1e20_dp ! for all powers of an exponential that are likely
   real(dp), parameter, public :: LARGE_ARGUMENT = 210.0_dp
   integer, parameter :: MOST_POWER = 300, POWERS_APART = 7, DIFFERENT = 20
   ! Powers of 2 for all exponentials, to see what depends on them.
@@ -152,9 +153,7 @@ contains
     logical, intent(in) :: has_values !! whether terms 0 of all slots, and the tables, are inputs
     type(series_t), intent(inout) :: s
 
-    real(dp) :: derivatives(tape%n_unknowns)
-
-    if (.not. has_values) call set_values(tape, t_low, s%h, s%a, derivatives)
+    if (.not. has_values) call set_values(tape, t_low, s%h, s%a)
     call expand_tape(s%arrays, s%h, s%order)
   end subroutine expand
 
@@ -167,47 +166,72 @@ contains
     real(dp), intent(in) :: h     !! points to the side of which the pieces of tables are taken
     type(series_t), intent(inout) :: s
     real(dp), intent(out) :: derivatives(:)
+    integer :: i
 
     s%a(0, TIME_SLOT) = t(1)
     s%a(0, FIRST_UNKNOWN:FIRST_UNKNOWN + size(y) - 1) = y
-    call set_values(tape, t(2), h, s%a, derivatives)
+    call set_values(tape, t(2), h, s%a)
+    do i = 1, size(y)
+      derivatives(i) = value_of(tape, size(tape%constants) - size(y) + i, s%a)
+    end do
   end subroutine derivatives_at
 
-  pure subroutine set_values(tape, t_low, h, a, found)
-    !! Compute term 0 of all slots, all terms of the tables, and the derivatives of the unknowns. A
-    !! logistic function, or the reciprocal of a hyperbolic cosine, is finite where an exponential
-    !! in it overflows. Large exponentials are then replaced by others, unless a derivative shows
-    !! the difference.
+  pure subroutine set_values(tape, t_low, h, a)
+    !! Compute term 0 of all slots, and all terms of the tables.
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t_low, h  !! s
     real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)
-    real(dp), intent(out) :: found(tape%n_unknowns)
-    real(dp), dimension(tape%n_unknowns) :: large_ones, ones
-    integer :: n
+    logical :: is_large
 
-    call set_values_with(tape, t_low, h, NONE, a, found)
-    do n = 1, tape%n_operations
-      if (tape%operations(1, n) == EXPONENTIAL) exit
-    end do
-    if (n > tape%n_operations) return
-    if (all(abs(a(0, :)) <= LARGEST)) return
-    call set_values_with(tape, t_low, h, LARGE, a, large_ones)
-    call set_values_with(tape, t_low, h, ONE, a, ones)
-    call set_values_with(tape, t_low, h, OF_SLOT, a, found)
-    ! NaN is not allowed.
-    if (all(abs(found - large_ones) <= UNSEEN*(max(abs(found), abs(ones))))) return
-    call set_values_with(tape, t_low, h, NONE, a, found)
+    call set_values_with(tape, t_low, h, NONE, a, is_large)
+    if (is_large) call saturate(tape, t_low, h, a)
   end subroutine set_values
 
-  pure subroutine set_values_with(tape, t_low, h, power, a, derivatives)
-    !! Compute term 0 of all slots, all terms of the tables, and the derivatives of the unknowns.
+  pure subroutine saturate(tape, t_low, h, a)
+    !! Replace large exponentials by smaller ones if a value overflows, unless a derivative shows the
+    !! difference: a logistic function, or the reciprocal of a hyperbolic cosine, is finite where an
+    !! exponential in it overflows.
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t_low, h  !! s
-    integer, intent(in) :: power      !! of 2, in place of large exponentials
+    real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)
+    real(dp), dimension(tape%n_unknowns) :: found, large_ones, ones
+    logical :: is_large
+
+    if (all(abs(a(0, :)) <= LARGEST)) return
+    call find_derivatives(tape, t_low, h, LARGE, a, large_ones)
+    call find_derivatives(tape, t_low, h, ONE, a, ones)
+    call find_derivatives(tape, t_low, h, OF_SLOT, a, found)
+    ! NaN is not allowed.
+    if (all(abs(found - large_ones) <= UNSEEN*max(abs(found), abs(ones)))) return
+    call set_values_with(tape, t_low, h, NONE, a, is_large)
+  end subroutine saturate
+
+  pure subroutine find_derivatives(tape, t_low, h, power, a, derivatives)
+    !! Compute the derivatives of the unknowns with a power of 2 in place of large exponentials.
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: t_low, h  !! s
+    integer, intent(in) :: power
     real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)
     real(dp), intent(out) :: derivatives(:)
-    integer :: i, n
+    logical :: is_large
+    integer :: i
 
+    call set_values_with(tape, t_low, h, power, a, is_large)
+    do i = 1, size(derivatives)
+      derivatives(i) = value_of(tape, size(tape%constants) - size(derivatives) + i, a)
+    end do
+  end subroutine find_derivatives
+
+  pure subroutine set_values_with(tape, t_low, h, power, a, is_large)
+    !! Compute term 0 of all slots, and all terms of the tables.
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: t_low, h  !! s
+    integer, intent(in) :: power      !! of 2, in place of large exponentials; or NONE, or OF_SLOT
+    real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)
+    logical, intent(out) :: is_large  !! whether an exponential or its powers may overflow
+    integer :: n
+
+    is_large = .false.
     do n = 1, tape%n_operations
       associate (first => tape%operations(2, n), second => tape%operations(3, n), &
                  out => tape%operations(4, n))
@@ -230,6 +254,7 @@ contains
           else
             a(0, out) = 2.0_dp**power
           end if
+          if (.not. a(0, out) <= SMALL_ENOUGH) is_large = .true.
         case (TANGENT)
           a(0, out) = tanh(a(0, first))
           ! The square of the tangent may be rounded to 1.
@@ -246,9 +271,6 @@ contains
           end if
         end select
       end associate
-    end do
-    do i = 1, tape%n_unknowns
-      derivatives(i) = value_of(tape, size(tape%constants) - tape%n_unknowns + i, a)
     end do
   end subroutine set_values_with
 

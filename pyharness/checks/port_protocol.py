@@ -14,6 +14,7 @@ from pyharness.model.records import listing_record, scene_record
 from pyharness.model.scene import Scene
 from pyharness.model.schema import SCHEMAS
 from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop
+from pyharness.model.values import parsed_float
 from pyharness.original.equations import card_torque
 
 VARIABLES = ("TIME", "U1", "U2", "U3", "V1", "V2", "V3")
@@ -162,7 +163,7 @@ def read_number(where: str, value: object) -> float:
         if type(value) is int:
             return float(value)
         if isinstance(value, str):
-            return float.fromhex(value) if "x" in value.lower() else float(value)
+            return float.fromhex(value) if "x" in value.lower() else parsed_float(value)
     except (ValueError, OverflowError):
         raise PortError(f"{where}: {json.dumps(value)[:60]} is no number of binary64") from None
     raise PortError(f"{where}: {kind_of(value)} where a number belongs")

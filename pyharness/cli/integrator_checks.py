@@ -67,7 +67,7 @@ def check_integrator(options: argparse.Namespace) -> int:
 
 
 def _check_names(names: list[str]) -> None:
-    form = re.compile(rf"({'|'.join(KINDS)})(-\d{{1,4}})?")
+    form = re.compile(rf"({'|'.join(KINDS)})(-[0-9]{{1,4}})?")
     for each in names:
         if not form.fullmatch(each):
             raise InputError(

@@ -18,6 +18,7 @@ from pyharness.model.listing import PROGRAMS, Listing, subset
 from pyharness.model.report import Report
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.model.values import parsed_float, parsed_whole
 
 FORMATS = ("table", "json", "csv", "markdown")
 # Options that several verbs share, each with its help text. An option takes a value if a
@@ -271,7 +272,7 @@ def numbers(text: str, option: str) -> list[float]:
 def number(text: str, option: str) -> float:
     """Return the value `text` of an option as a finite number; raise InputError if it is none."""
     try:
-        value = float(text)
+        value = parsed_float(text)
     except ValueError:
         raise InputError(f"{option}: '{text}' where a number belongs") from None
     if not math.isfinite(value):
@@ -295,7 +296,7 @@ def positive(text: str | None, option: str, default: float) -> float:
 def whole(text: str, option: str) -> int:
     """Return the value `text` of an option as a whole number; raise InputError if it is none."""
     try:
-        return int(text)
+        return parsed_whole(text)
     except ValueError:
         raise InputError(f"{option}: '{text}' where a whole number belongs") from None
 

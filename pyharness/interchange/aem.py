@@ -28,6 +28,7 @@ from pyharness.model.attitude import matrices
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.output_files import check_writable, write_files
 from pyharness.model.trajectory import Trajectory
+from pyharness.model.values import parsed_float
 
 _BODY = "SC_BODY"
 _TYPES = {"QUATERNION": 4, "QUATERNION/DERIVATIVE": 8, "QUATERNION/ANGVEL": 7}
@@ -311,7 +312,7 @@ def _segment(lines: _Lines) -> AttitudeEphemeris:
     for number, line in lines.rows:
         first, *others = line.split()
         try:
-            row = [float(each) for each in others]
+            row = [parsed_float(each) for each in others]
         except ValueError:
             raise lines.wrong("the row has what is no number", number) from None
         if len(row) != _TYPES[kind] or not np.isfinite(row).all():

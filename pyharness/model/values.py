@@ -64,6 +64,25 @@ def is_no_number(value: object) -> bool:
     return kind not in _REAL or getattr(value, "shape", ()) != ()
 
 
+def parsed_float(text: str) -> float:
+    """Return the number that `text` is, finite or not; raise ValueError if it is none.
+
+    Other programs do not read the underscores and foreign digits that float() allows.
+    """
+    return float(_plain(text))
+
+
+def parsed_whole(text: str) -> int:
+    """Return the whole number that `text` is, as `parsed_float` does."""
+    return int(_plain(text))
+
+
+def _plain(text: str) -> str:
+    if not text.isascii() or "_" in text:
+        raise ValueError(f"{text!r} is no number")
+    return text
+
+
 def three(where: str, values: object) -> Triple:
     """Return three finite numbers of a user as a tuple of floats.
 

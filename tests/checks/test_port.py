@@ -132,6 +132,7 @@ def test_numbers_are_read_in_every_form() -> None:
         ({"rows": [ROW, [*ROW[:6], True]]}, "row 2: true or false where a number belongs"),
         ({"rows": [ROW, [*ROW[:6], "one"]]}, 'row 2: "one" is no number'),
         ({"rows": [ROW, [*ROW[:6], "0xgg"]]}, 'row 2: "0xgg" is no number'),
+        ({"rows": [ROW, [*ROW[:6], "1_0"]]}, 'row 2: "1_0" is no number'),
         ({"rows": [ROW, [*ROW[:6], 10**400]]}, "is no number of binary64"),
         ({"ended": "done"}, 'ended is "done"; allowed: complete, stopped, overflow'),
         ({"ended": ["complete"]}, "ended is"),

@@ -184,6 +184,7 @@ def test_segments_and_comments(tmp_path: Path) -> None:
         ("= QUATERNION\n", "= SPIN\n", "attitude type SPIN; allowed: QUATERNION, "),
         ("0 0 0 1", "0 0 0", "line 15: QUATERNION has 4 finite numbers in a row"),
         ("0 0 0 1", "0 0 0 x", "line 15: the row has what is no number"),
+        ("0 0 0 1", "0 0 0 1_0", "line 15: the row has what is no number"),
         ("0 0 0 1", "0 0 0 nan", "line 15: QUATERNION has 4 finite numbers in a row"),
         ("0 0 0 1", "0 0 0 0", "line 15: a quaternion is 0"),
         ("0 0 0 1", "1e200 0 0 1e200", "line 15: a quaternion is 0, or far from length 1"),

@@ -16,7 +16,7 @@ import numpy as np
 
 from pyharness.checks.cells import of_cell
 from pyharness.checks.check import BITS, Check, Name, selected
-from pyharness.checks.port_process import PATIENCE, PortError, PortProcess
+from pyharness.checks.port_process import PATIENCE, PortError, PortProcess, refuse_other
 from pyharness.checks.port_protocol import VARIABLES, Answer, read_answer, request
 from pyharness.compare.agreement import ulps
 from pyharness.model.listing import PROGRAMS, Listing
@@ -159,6 +159,15 @@ def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Ite
                 yield asked(process, command, cell)
     except PortError as error:
         yield _port_check(name.judged(False, str(error)), again)
+
+
+def refuse_port(command: str) -> None:
+    """Raise InputError if `command`, which does not answer as an integrator, is a port."""
+    cell = port_cells(PROGRAMS, (1,), ())[0]
+    refuse_other(
+        command, "--integrator", "--port", cell.request,
+        lambda answer: read_answer(answer, cell.scene.steps),
+    )  # fmt: skip
 
 
 def replay_command(command: str, cell: Cell | None = None) -> str:

@@ -11,6 +11,7 @@ import shlex
 import signal
 import subprocess
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -24,6 +25,7 @@ _TO_END = 1.0  # s that a port may take to end after it has closed its input or 
 # Limit on the rounds of searching for processes that a port has started, and of reading its last
 # output.
 _ROUNDS = 100
+_PROBE = 10.0  # s for the answer to a single request of the other protocol
 # An example of a command, for each option that has one.
 _EXAMPLES = {"--port": "node web/port.js", "--integrator": "python3 mine.py"}
 _MARK = "PYHARNESS_PORT"  # environment variable that marks each process of a port
@@ -49,6 +51,18 @@ def split_command(command: str, option: str = "--port") -> list[str]:
         example = _EXAMPLES[option]
         raise InputError(f"{option}: no command is given; give one, as in {option} '{example}'")
     return words
+
+
+def refuse_other(
+    command: str, option: str, instead: str, line: bytes, read: Callable[[bytes], object]
+) -> None:
+    """Raise InputError if a process that does not answer the requests of `option` is of another.
+
+    It is of the option `instead` if `read` accepts its answer to `line`, a request of that option.
+    """
+    with contextlib.suppress(PortError), PortProcess(command, _PROBE, option) as process:
+        read(process.ask(line))
+        raise InputError(f"{option} {command}: answers requests of {instead}; give it to {instead}")
 
 
 def _processes_with(mark: str) -> list[int]:

@@ -5,6 +5,7 @@ import re
 
 from pyharness.checks.integrators.judging import judge_integrator, replay_command
 from pyharness.checks.integrators.problem import DRAWS, Problem, problems
+from pyharness.checks.port import refuse_port
 from pyharness.checks.selection import Selection
 from pyharness.cli import options as shared
 from pyharness.cli.forecast import Cost, check_count
@@ -60,6 +61,8 @@ def check_integrator(options: argparse.Namespace) -> int:
     found = judge_integrator(
         command, chosen, again, due, lambda done, what: shared.progress(done, total, what)
     )
+    if not found.judged:
+        refuse_port(command)
     from pyharness.checks.integrators.report import integrator_report
 
     shared.show(integrator_report(found, seed), options)
@@ -88,5 +91,7 @@ def _self_test(options: argparse.Namespace, chosen: list[Problem], due: float, a
     for each in self_test(options.integrator, chosen, due):
         found.append(each)
         shared.progress(len(found), len(PLANTS) + 1, as_check(each).id)
+    if found[0].note:
+        refuse_port(options.integrator)
     shared.show(self_test_report(options.integrator, found, again), options)
     return 0 if all(each.passed for each in found) else 1

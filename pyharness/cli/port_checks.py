@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Sequence
 
+from pyharness.checks.integrators.protocol import refuse_integrator
 from pyharness.checks.port import Cell, port, port_cells, random_cells
 from pyharness.checks.port_report import port_report
 from pyharness.checks.selection import Selection
@@ -46,6 +47,8 @@ def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequ
     for check in port(options.port, cells):
         checks.append(check)
         shared.progress(len(checks), len(cells), check.id)
+    if checks[0].value is None:
+        refuse_integrator(options.port)
     shared.show(port_report(options.port, checks, len(cells), seed), options)
     return 0 if all(check.passed for check in checks) else 1
 
@@ -108,5 +111,7 @@ def _self_test(options: argparse.Namespace, cells: Sequence[Cell]) -> int:
     for caught in self_test(options.port, cells):
         found.append(caught)
         shared.progress(len(found), len(PLANTS) + 1, as_check(caught).id)
+    if not found[0].passed:
+        refuse_integrator(options.port)
     shared.show(report(options.port, found), options)
     return 0 if all(caught.passed for caught in found) else 1

@@ -21,6 +21,7 @@ from pyharness.cli.main import main
 from pyharness.model.attitude import angle_between
 from pyharness.scenes.moderate import KINDS, draw_moderate
 from tests.json_reference import schema_of
+from tests.ports import documented_command
 
 Capture = pytest.CaptureFixture[str]
 ROOT = Path(__file__).parent.parent.parent
@@ -243,6 +244,14 @@ def test_an_integrator_that_refuses_everything_does_not_pass(
     (failed,) = [check for check in record["checks"] if not check["passed"]]
     assert failed["note"] == "the integrator refused every scene"
     assert main(["verify", "--integrator", command_of(path), "--self-test", "--draws", "1"]) == 1
+
+
+@pytest.mark.parametrize("more", [[], ["--self-test"]])
+def test_a_port_is_sent_to_its_option(more: list[str], capsys: Capture) -> None:
+    assert main(["verify", "--integrator", documented_command(), "--draws", "1", *more]) == 2
+    told = capsys.readouterr().err
+    assert told.endswith(": answers requests of --port; give it to --port\n")
+    assert told.count("\n") == 1
 
 
 def test_numbers_that_are_not_finite_are_an_error(tmp_path: Path, capsys: Capture) -> None:

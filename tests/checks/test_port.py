@@ -24,7 +24,7 @@ from pyharness.cli.main import main
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_numbers
 from pyharness.original.cells import all_cells
-from tests.ports import SAMPLE, WEB, answering, documented, node, sample
+from tests.ports import ROOT, SAMPLE, WEB, answering, documented, node, sample
 
 ROOT = Path(__file__).parent.parent.parent
 Capture = pytest.CaptureFixture[str]
@@ -212,6 +212,14 @@ def test_a_command_that_is_not_there_is_a_line_and_exit_1(command: str, capsys: 
     assert captured.err == ""
     assert f"FAILED port/start ('{command}' can't be started: " in captured.out
     assert f"  python -m pyharness verify --port {command}\n" in captured.out
+
+
+@pytest.mark.parametrize("more", [[], ["--self-test"]])
+def test_an_integrator_is_sent_to_its_option(more: list[str], capsys: Capture) -> None:
+    command = shlex.join([sys.executable, str(ROOT / "docs/how-to/integrator/rk4.py")])
+    assert main(["verify", "--port", command, *more]) == 2
+    told = f"--port {command}: answers requests of --integrator; give it to --integrator\n"
+    assert capsys.readouterr().err == f"pyharness: {told}"
 
 
 def _gone(pid: int) -> bool:

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.checks.port_process import PortError
+from pyharness.checks.port_process import PortError, refuse_other
 from pyharness.checks.port_protocol import read_list, read_number, read_object
 from pyharness.model.records import scene_record
 from pyharness.model.scene import Scene
 from pyharness.model.schema import SCHEMAS
 from pyharness.model.trajectory import Array
+from pyharness.scenes.moderate import KINDS, draw_moderate
 
 CONTROLS = ("step_size", "tolerance")
 """The field of a request that determines the accuracy of an integrator."""
@@ -68,6 +69,12 @@ def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: f
         "tolerance": tolerance,
     }
     return json.dumps(asked, allow_nan=False).encode()
+
+
+def refuse_integrator(command: str) -> None:
+    """Raise InputError if `command`, which does not answer as a port, is an integrator."""
+    line = request(draw_moderate("", KINDS[0], 0), [1.0], 0.5, 1e-3)
+    refuse_other(command, "--port", "--integrator", line, lambda answer: read_motion(answer, 1))
 
 
 def read_motion(line: bytes, rows: int) -> Motion:

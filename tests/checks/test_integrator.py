@@ -11,15 +11,26 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
+from pyharness.checks.integrators.drift import growth_power
 from pyharness.checks.integrators.faults import FAULTS, motions, true_motion
 from pyharness.checks.integrators.plants import PLANTS, as_check, self_test
-from pyharness.checks.integrators.problem import LEVELS, convergence, growth_power, problems
+from pyharness.checks.integrators.problem import LEVELS, convergence, problems
 from pyharness.checks.integrators.protocol import read_motion, request
 from pyharness.checks.integrators.recognition import FIRST_ORDER
 from pyharness.checks.port_process import PortError
 from pyharness.cli.main import main
 from pyharness.model.attitude import angle_between
 from pyharness.scenes.moderate import KINDS, draw_moderate
+from tests.checks import integrator_campaign
+from tests.checks.integrator_campaign import (
+    METHODS,
+    Drawn,
+    drawn,
+    is_right,
+    judged,
+    right,
+    solve_of,
+)
 from tests.json_reference import schema_of
 from tests.ports import documented_command
 
@@ -81,7 +92,7 @@ def test_a_higher_order_than_it_has_is_refused(capsys: Capture) -> None:
 
 # Changes of a line of the example, and the fault that has to be named.
 MISTAKES = (
-    ("(n1 + (i2 - i3) * y_ * z) / i1", "n1 / i1", None),
+    ("(n1 + (i2 - i3) * y_ * z) / i1", "n1 / i1", "unknown"),
     ("(n1 + (i2 - i3) * y_ * z) / i1|(n2 + (i3 - i1) * z * x) / i2|(n3 + (i1 - i2) * x * y_) / i3",
      "n1 / i1|n2 / i2|n3 / i3", "gyroscopic-missing"),
     ("(i2 - i3)|(i3 - i1)|(i1 - i2)", "(i3 - i2)|(i1 - i3)|(i2 - i1)", "gyroscopic-sign"),
@@ -111,7 +122,7 @@ MISTAKES = (
 
 @pytest.mark.parametrize(("old", "new", "fault"), MISTAKES)
 def test_a_mistake_in_the_source_is_named(
-    old: str, new: str, fault: str | None, tmp_path: Path, capsys: Capture
+    old: str, new: str, fault: str, tmp_path: Path, capsys: Capture
 ) -> None:
     text = RK4.read_text()
     for before, after in zip(old.split("|"), new.split("|"), strict=True):
@@ -124,7 +135,7 @@ def test_a_mistake_in_the_source_is_named(
     # Without a scene without torque, the long motion is left out.
     words = ("--seed", "mistake", "--cell")
     record = _json(capsys, command_of(path), *words, "constant-0,wave-0", status=status)
-    assert _faults(record) == ({fault} if fault else set())
+    assert _faults(record) == {fault}
     if remark:
         _json(capsys, command_of(path), *words, "wave-0", "--order", "4", status=1)
 
@@ -200,6 +211,62 @@ def test_the_self_test_fails_for_a_faulty_integrator(tmp_path: Path, capsys: Cap
     words = ["verify", "--integrator", command_of(path), "--self-test", "--cell", "free-0"]
     assert main([*words, "--seed", "x"]) == 1
     assert "FAILED control" in capsys.readouterr().out
+
+
+def test_drawn_integrators_have_the_right_verdict() -> None:
+    """The campaign draws more of them: a wrong one fails, and its fault is named or unknown."""
+    chosen = problems("drawn", 1, ["free", "wave"])
+    for each in [*right("drawn"), *(drawn(kind, "drawn", 0) for kind in integrator_campaign.KINDS)]:
+        found = judged(each, chosen)
+        assert is_right(each, found), (each.says, integrator_campaign.named(found))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("last", "seconds", "failed"),
+    [("nan", 100.0, "finite/long"), ("1e200", 100.0, "conserved/long"),
+     ("0", 100.0, "conserved/long"), ("nan", 4.0, "finite/free-0")],
+)  # fmt: skip
+def test_a_late_failure_is_noticed(last: str, seconds: float, failed: str) -> None:
+    solve = next(right("late")).solve
+
+    def late(asked: dict[str, Any]) -> dict[str, Any]:
+        answer = solve(asked)
+        for row, time in enumerate(asked["times"]):
+            if time > seconds:
+                answer["omega"][row] = [last] * 3
+        return answer
+
+    found = judged(Drawn("late", late, "unknown"), problems("late", 1, ["free"]))
+    assert f"integrator/{failed}" in {check.id for check in found.checks if not check.passed}
+    assert integrator_campaign.named(found) == {"unknown"}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("axis", [1, 2, 3])
+def test_the_sign_of_one_gyroscopic_term_is_named_where_the_motion_is_finite(axis: int) -> None:
+    """It was named gyroscopic-missing where the answer overflows, and moments-213 elsewhere."""
+    wrong = Drawn("", solve_of((f"(n{axis} +", f"(n{axis} -")), f"gyroscopic-sign-{axis}")
+    found = judged(wrong, problems("a", 1, ["free", "wave"]))
+    assert integrator_campaign.named(found) == {wrong.fault}
+
+
+def test_an_explicit_method_of_order_1_may_drift() -> None:
+    """With steps of 1/32 s, it overflows in this scene within 512 s."""
+    euler = Drawn("", solve_of((METHODS[0][1], METHODS[-1][1])), "", 1.0)
+    found = judged(euler, problems("1/26", 1, ["free"]))
+    assert all(check.passed for check in found.checks)
+    assert found.drift is not None
+    assert 1e-2 < found.drift.energy[-1] < 10.0
+
+
+def test_a_missing_attitude_in_some_answers_is_invalid() -> None:
+    solve = next(right("some")).solve
+    some = Drawn("", lambda asked: {
+        **solve(asked), **({"attitude": None} if asked["step_size"] == 0.25 else {})
+    }, "unknown")  # fmt: skip
+    (check,) = judged(some, problems("some", 1, ["free"])).checks
+    assert check.note == "only some of the answers in a scene have an attitude"
 
 
 # A body of an answer in Python, and words of the one line that the checks report.

@@ -26,7 +26,6 @@ from pyharness.model.scene_file import case_numbers
 from pyharness.original.cells import all_cells
 from tests.ports import ROOT, SAMPLE, WEB, answering, documented, node, sample
 
-ROOT = Path(__file__).parent.parent.parent
 Capture = pytest.CaptureFixture[str]
 
 

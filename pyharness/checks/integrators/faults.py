@@ -36,11 +36,13 @@ class Fault:
 
     The function `motion` takes the scene, the requested times (s) and the step size (s), and
     returns the states of a faulty integrator, or None if the fault has no effect in the scene.
+    With `of_step`, they depend on the step size, and approach the true states as it falls.
     """
 
     name: str
     says: str
     motion: Callable[[Scene, Array, float], State | None]
+    of_step: bool = False
 
 
 def true_motion(scene: Scene, times: Array) -> State:
@@ -73,8 +75,8 @@ def _law(scene: Scene, t: Any) -> list[Any]:
     return found
 
 
-def _with_gyroscopic(factor: float) -> Callable[[Scene, Array, float], State]:
-    """Return the motion with `factor` times the gyroscopic term -omega x (I omega)."""
+def _with_gyroscopic(x: float, y: float, z: float) -> Callable[[Scene, Array, float], State]:
+    """Return the motion with x, y and z times the components of the term -omega x (I omega)."""
 
     def motion(scene: Scene, times: Array, step: float) -> State:
         moments = scene.moments
@@ -82,8 +84,8 @@ def _with_gyroscopic(factor: float) -> Callable[[Scene, Array, float], State]:
 
         def torque(t: Any, omega: Any) -> list[Any]:
             term = _cross(omega, [m * w for m, w in zip(moments, omega, strict=True)])
-            pairs = zip(_law(scene, t), term, strict=True)
-            return [n + (1.0 - factor) * each for n, each in pairs]
+            each = zip(_law(scene, t), (x, y, z), term, strict=True)
+            return [n + (1.0 - factor) * part for n, factor, part in each]
 
         return true_motion(replace(scene, torque=checked_torque(torque)), times)
 
@@ -214,8 +216,19 @@ def _doubled_rates(scene: Scene, times: Array, step: float) -> State:
 
 
 def _thesis_program(scene: Scene, times: Array, step: float) -> State:
-    """Return the curve 2 y(t/2) - y(0) for the true states y, with quaternions of norm 1."""
-    half = true_motion(scene, 0.5 * times)
+    """Return the curve 2 y(t/2) - y(0), with quaternions of norm 1.
+
+    The states y are the true ones under a torque that passes at double speed.
+    """
+    law = scene.law
+    x, y, z = law.rate
+    fast = replace(
+        law,
+        rate=(2.0 * x, 2.0 * y, 2.0 * z),
+        sines=tuple((amplitude, 2.0 * frequency) for amplitude, frequency in law.sines),
+        cosines=tuple((amplitude, 2.0 * frequency) for amplitude, frequency in law.cosines),
+    )
+    half = true_motion(replace(scene, torque=fast), 0.5 * times)
     attitude = 2.0 * half.attitude - np.array(scene.attitude)
     return State(
         2.0 * half.omega - np.array(scene.omega),
@@ -231,9 +244,17 @@ _ORDERS = ((0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0))
 
 FAULTS = (
     Fault("gyroscopic-missing", "the gyroscopic term omega x (I omega) is missing",
-          _with_gyroscopic(0.0)),
-    Fault("gyroscopic-sign", "the gyroscopic term has the opposite sign", _with_gyroscopic(-1.0)),
-    Fault("gyroscopic-half", "half of the gyroscopic term is missing", _with_gyroscopic(0.5)),
+          _with_gyroscopic(0.0, 0.0, 0.0)),
+    Fault("gyroscopic-sign", "the gyroscopic term has the opposite sign",
+          _with_gyroscopic(-1.0, -1.0, -1.0)),
+    *(
+        Fault(f"gyroscopic-sign-{axis + 1}",
+              f"the gyroscopic term of axis {axis + 1} has the opposite sign",
+              _with_gyroscopic(*(-1.0 if k == axis else 1.0 for k in range(3))))
+        for axis in range(3)
+    ),
+    Fault("gyroscopic-half", "half of the gyroscopic term is missing",
+          _with_gyroscopic(0.5, 0.5, 0.5)),
     Fault("omega-in-space", "omega is given about the axes of space, not of the body",
           _of_state(space_omega)),
     Fault("omega-in-degrees", "omega is given in degrees per second",
@@ -263,13 +284,13 @@ FAULTS = (
           "the thesis: stages build on one another, and no step begins at the last result",
           _thesis_program),
     Fault("step-late", "the state is that of one step before the requested time",
-          _at_times(_shift(-1.0))),
+          _at_times(_shift(-1.0)), of_step=True),
     Fault("step-early", "the state is that of one step after the requested time",
-          _at_times(_shift(1.0))),
+          _at_times(_shift(1.0)), of_step=True),
     Fault("half-step-late", "the state is that of half a step before the requested time",
-          _at_times(_shift(-0.5))),
+          _at_times(_shift(-0.5)), of_step=True),
     Fault("half-step-early", "the state is that of half a step after the requested time",
-          _at_times(_shift(0.5))),
+          _at_times(_shift(0.5)), of_step=True),
     Fault("quaternion-transposed", "the quaternion is the conjugate, from space to body",
           _of_output("quaternion-transposed")),
     Fault("scalar-last", "the scalar of the quaternion is last, not first",
@@ -290,13 +311,15 @@ OUTPUTS = ("quaternion-transposed", "scalar-last", "attitude-from-identity")
 def motions(scene: Scene, times: Array, step: float) -> Iterator[tuple[Fault, State]]:
     """Yield each known fault that has an effect in the scene, with the states of its motion.
 
-    `times` (s) are ascending and above 0, and `step` is the step size of the integrator (s).
+    `times` (s) are ascending and above 0, and `step` is the step size of the integrator (s). The
+    states of a motion that does not reach the last time are NaN.
     """
     for fault in FAULTS:
         with np.errstate(all="ignore"):
             try:
                 found = fault.motion(scene, times, step)
             except ArithmeticError:
-                continue
+                rows = len(times)
+                found = State(np.full((rows, 3), np.nan), np.full((rows, 4), np.nan))
         if found is not None:
             yield fault, found

@@ -9,34 +9,29 @@ import math
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from pyharness.checks.check import Check, Name
+from pyharness.checks.integrators.drift import CHANGE, Drift, drift_of, growth_power, long_motion
 from pyharness.checks.integrators.problem import (
     LEVELS,
     PARTS,
     Convergence,
-    Drift,
     Judged,
     Problem,
     convergence,
-    drift_of,
-    finite_or_infinite,
-    growth_power,
 )
 from pyharness.checks.integrators.protocol import Motion, read_motion, request
-from pyharness.checks.integrators.recognition import FIRST_ORDER, Finding, recognised
+from pyharness.checks.integrators.recognition import FIRST_ORDER, UNKNOWN, Finding, recognised
 from pyharness.checks.port_process import PATIENCE, PortError, PortProcess
 from pyharness.compare.orders import ORDER_SLACK
 from pyharness.model.attitude import angle_between
 from pyharness.model.basis import Basis
+from pyharness.model.trajectory import Array
 
-# An error above this many roundings, times the square root of the number of steps, is that of the
-# formula.
-_ROUNDINGS = 240.0
 _CONSERVED = 8.0  # rounding errors in a step of a reversible integrator
-_LONG_TIME, _LONG_ROWS, _LONG_STEP, _LONG_TOLERANCE = 512.0, 64, 1.0 / 32.0, 1e-6
 _NORM = 1e-3
 
 _SLACK = Basis(
@@ -54,6 +49,14 @@ _SAME = Basis(
     "derived",
     "rows that differ between two answers to one request",
     "a deterministic program gives the same answer (`checks/integrator.py`)",
+)
+
+
+_FINITE = Basis(
+    "derived",
+    "rows with a number that is not finite",
+    "the true motion is finite; with a large step the measured order may predict an overflow "
+    "(`checks/integrators/problem.py`)",
 )
 
 
@@ -118,7 +121,7 @@ def judge_integrator(
                 judge_problem(ask, problem, due, found, again)
             where = "long"
             told(len(chosen), where)
-            _judge_long(ask, chosen, found, again)
+            _judge_long(ask, found, again)
     except PortError as error:
         name = Name("integrator", where)
         found.checks.append(replace(name.judged(False, str(error)), again=again("")))
@@ -132,7 +135,39 @@ def judge_integrator(
         # A low order is a fault only if another one was requested, and is judged by its own checks.
         check = name.judged(each.name in FIRST_ORDER, each.says)
         found.checks.append(replace(check, again=again("")))
+    if found.judged and (unexplained := _unexplained(found)):
+        says = "no known fault explains the failed checks"
+        found.findings.append(Finding(UNKNOWN, says, unexplained))
     return found
+
+
+def _unexplained(found: Verdict) -> tuple[str, ...]:
+    """Return the problems with failed checks that no fault explains.
+
+    A recognised fault also explains failures where its motion, or a long one, may overflow. A low
+    order explains that a higher one is missing.
+    """
+    faults = [each for each in found.findings if each.name not in FIRST_ORDER]
+    named = {each.name for each in faults}
+    explained = {problem for each in faults for problem in each.problems}
+    remarked = {problem for each in found.findings for problem in each.problems}
+    low = set()
+    for judged in found.judged:
+        problem = judged.problem
+        states = [state for fault, state in problem.faulty if fault.name in named]
+        if not all(np.isfinite(each.omega).all() for each in states):
+            explained.add(problem.name)
+        if problem.name in remarked:
+            low |= {(each.part, problem.name) for each in judged.convergences if each.converges}
+    if named:
+        explained.add("long")
+    names = [check.name for check in found.checks if not check.passed]
+    where = [
+        each.circumstance or each.subject
+        for each in names
+        if each.subject != "fault" and (each.subject, each.circumstance) not in low
+    ]
+    return tuple(dict.fromkeys(each for each in where if each not in explained))
 
 
 Ask = Callable[[bytes, int], Motion]
@@ -157,13 +192,15 @@ def judge_problem(
             return
         answers.append(motion)
     finest = answers[-1]
+    if len({each.attitude is None for each in answers}) > 1:
+        raise PortError("only some of the answers in a scene have an attitude")
     found.control = finest.control
     by_tolerance = finest.control == "tolerance"
     settings = [
         problem.tolerance(level) if by_tolerance else problem.step_size(level)
         for level in range(LEVELS)
     ]
-    floor = _ROUNDINGS * finest.rounding * math.sqrt(problem.most_steps)
+    floor = problem.floor(finest.rounding)
     errors = [problem.errors(motion) for motion in answers]
     judged = []
     for k, part in enumerate(PARTS):
@@ -174,18 +211,21 @@ def judge_problem(
         judged.append(convergence(part, settings, known, floor, by_tolerance))
     found.judged.append(Judged(problem, tuple(answers), tuple(judged)))
     wanted = 1.0 if by_tolerance else due
-    checks = [_order_check(each, problem, wanted, floor) for each in judged]
+    lost = Name("integrator", "finite", problem.name).bounded(found.judged[-1].lost, 0.0, _FINITE)
+    orders = [
+        replace(_order_check(each, problem, wanted, floor), reference_bound=lambda: problem.bound)
+        for each in judged
+    ]
+    checks = [lost, *orders]
     if finest.attitude is not None:
         name = Name("integrator", "norm", problem.name)
         angle = errors[-1][1]
         assert angle is not None
-        checks.append(name.bounded(finest.norm, max(_NORM, angle), _UNIT))
+        limit = max(_NORM, angle) if math.isfinite(angle) else _NORM
+        checks.append(name.bounded(finest.norm, limit, _UNIT))
     if problem is found.judged[0].problem:
         checks += [_repeated(ask, found.judged[0]), *_returned(ask, found.judged[0])]
-    found.checks += [
-        replace(check, again=again(problem.name), reference_bound=lambda: problem.bound)
-        for check in checks
-    ]
+    found.checks += [replace(check, again=again(problem.name)) for check in checks]
 
 
 def _order_check(each: Convergence, problem: Problem, due: float, floor: float) -> Check:
@@ -201,19 +241,23 @@ def _order_check(each: Convergence, problem: Problem, due: float, floor: float) 
 
 
 def _repeated(ask: Ask, judged: Judged) -> Check:
-    """Return the check that the same request has the same answer, to the last bit."""
+    """Return the check that the same request has the same answer, to the last bit.
+
+    A quaternion and its negative are the same attitude.
+    """
     problem, level = judged.problem, LEVELS // 2
     motion, before = ask(problem.request(level), len(problem.times)), judged.answers[level]
-    pairs = [(motion.omega, before.omega)]
+    if motion.refusal or (motion.attitude is None) != (before.attitude is None):
+        raise PortError("a repeated request has an answer of another form")
+    differs = ~_same(motion.omega, before.omega)
     if motion.attitude is not None and before.attitude is not None:
-        pairs.append((motion.attitude, before.attitude))
-    differs = np.zeros(len(problem.times), bool)
-    for one, other in pairs:
-        if one.shape != other.shape:
-            differs[:] = True
-        else:
-            differs |= ~((one == other) | (np.isnan(one) & np.isnan(other))).all(axis=1)
+        one, other = motion.attitude, before.attitude
+        differs |= ~(_same(one, other) | _same(one, -other))
     return Name("integrator", "repeated", problem.name).bounded(float(differs.sum()), 0.0, _SAME)
+
+
+def _same(one: Array, other: Array) -> Any:
+    return ((one == other) | (np.isnan(one) & np.isnan(other))).all(axis=1)
 
 
 def _returned(ask: Ask, judged: Judged) -> list[Check]:
@@ -236,36 +280,49 @@ def _returned(ask: Ask, judged: Judged) -> list[Check]:
     name = Name("integrator", "return", problem.name)
     if back.refusal or back.attitude is None:
         return [name.described(None, f"refused: {back.refusal or 'no attitude'}")]
+    if back.lost:
+        return [name.bounded(back.lost, 0.0, _FINITE)]
     start = np.array(problem.scene.omega)
-    omega = finite_or_infinite(float(np.abs(back.omega[-1] + start).max() / np.abs(start).max()))
+    omega = float(np.abs(back.omega[-1] + start).max() / np.abs(start).max())
     attitude = np.array([problem.scene.attitude])
     angle = float(angle_between(back.attitude[-1:], attitude)[0])
     error = max(omega, angle)
     there = max(x for x in problem.errors(forth) if x is not None)
     limit = _CONSERVED * forth.rounding * (problem.times[-1] / problem.step_size(level))
     kept = "the integrator is reversible" if error <= max(limit, 1e-3 * there) else "not reversible"
-    return [name.described(error if math.isfinite(error) else None, kept)]
+    return [name.described(error, kept)]
 
 
-def _judge_long(
-    ask: Ask, chosen: Sequence[Problem], found: Verdict, again: Callable[[str], str]
-) -> None:
-    """Add the drift of energy and angular momentum in a long motion without torque."""
-    free = next((each for each in chosen if each.scene.torque.is_zero), None)
-    if free is None or not any(each.problem is free for each in found.judged):
+def _judge_long(ask: Ask, found: Verdict, again: Callable[[str], str]) -> None:
+    """Add the checks of a long motion without torque: finite numbers, and conserved quantities."""
+    free = next((each for each in found.judged if each.problem.scene.torque.is_zero), None)
+    if free is None:
         return
-    times = (np.arange(1, _LONG_ROWS + 1) * (_LONG_TIME / _LONG_ROWS)).tolist()
-    motion = ask(request(free.scene, times, _LONG_STEP, _LONG_TOLERANCE), len(times))
+    scene, name = free.problem.scene, free.problem.name
+    level, times, limit = long_motion(free)
+    settings = free.problem.step_size(level), free.problem.tolerance(level)
+    motion = ask(request(scene, times.tolist(), *settings), len(times))
     if motion.refusal:
+        check = Name("integrator", "long").described(None, f"refused: {motion.refusal}")
+        found.checks.append(replace(check, again=again(name)))
         return
-    found.drift = drift_of(free.scene, np.array(times), motion)
+    found.drift = drift_of(scene, times, motion)
+    checks = [Name("integrator", "finite", "long").bounded(motion.lost, 0.0, _FINITE)]
+    change = Name("integrator", "conserved", "long")
+    if limit is None:
+        checks.append(change.described(None, "no limit: the errors of the short motion are large"))
+    else:
+        checks.append(change.bounded(found.drift.change, limit, CHANGE))
     for quantity, values in found.drift.named().items():
-        name = Name("integrator", quantity, free.name, quantity="drift")
         largest = float(np.abs(values).max())
         power = growth_power(found.drift.times, values)
         note = "" if power is None else f"grows with the power {power:.1f} of the time"
-        check = name.described(largest if math.isfinite(largest) else None, note)
-        found.checks.append(replace(check, again=again(free.name)))
+        checks.append(
+            Name("integrator", quantity, name, quantity="drift").described(
+                largest if math.isfinite(largest) else None, note
+            )
+        )
+    found.checks += [replace(check, again=again(name)) for check in checks]
 
 
 def replay_command(command: str, seed: str, draws: int, name: str = "") -> str:

@@ -1,4 +1,4 @@
-"""The random scenes in which an integrator is judged, and its errors and drifts in them."""
+"""The random scenes in which an integrator is judged, and its errors in them."""
 
 import math
 from collections.abc import Sequence
@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from pyharness.checks.integrators.faults import State
+from pyharness.checks.integrators.faults import Fault, State, motions
 from pyharness.checks.integrators.protocol import Motion, request
 from pyharness.compare.orders import ORDER_SLACK
-from pyharness.model.attitude import angle_between, product
+from pyharness.model.attitude import angle_between
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.scenes.moderate import KINDS, draw_moderate
@@ -29,6 +29,9 @@ _ORDER_ONE = 1.5  # a measured order below this counts as 1
 _SEVERAL = 4  # steps that must show the order 1
 _LATE = 3  # tolerances before the last that must show the order too
 _LEAST = 1e-300  # in place of an error of 0
+# An error above this many roundings, times the square root of the number of steps, is that of the
+# formula.
+_ROUNDINGS = 240.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +67,19 @@ class Problem:
         bound = bound_of(self.scene, self.truth, any_torque=True)
         return bound.over(float(np.abs(self.truth.omega).max()))
 
+    @cached_property
+    def faulty(self) -> list[tuple[Fault, State]]:
+        """Return the known faults that have an effect, with their states at the smallest step."""
+        return list(motions(self.scene, self.times, self.step_size(LEVELS - 1)))
+
+    def faulty_states(self, fault: Fault, level: int) -> State:
+        """Return the states of a fault, a member of `faulty`, at the step size of a level."""
+        if fault.of_step:
+            found = fault.motion(self.scene, self.times, self.step_size(level))
+            assert found is not None
+            return found
+        return next(state for each, state in self.faulty if each is fault)
+
     def step_size(self, level: int) -> float:
         """Return the step size of a level, from 0 to `LEVELS` - 1 (s)."""
         return self.scene.step_size / 2.0**level
@@ -76,6 +92,10 @@ class Problem:
     def most_steps(self) -> float:
         """Return the number of the smallest steps until the last time."""
         return float(self.times[-1] / self.step_size(LEVELS - 1))
+
+    def floor(self, rounding: float) -> float:
+        """Return the largest error that may be that of the roundings, of this relative size."""
+        return _ROUNDINGS * rounding * math.sqrt(self.most_steps)
 
     def request(self, level: int) -> bytes:
         """Return the line of JSON that requests the states at a level of accuracy."""
@@ -146,9 +166,19 @@ class Convergence:
         return all(1.0 - ORDER_SLACK <= each < _ORDER_ONE for each in (self.order, far))
 
     @property
+    def converges(self) -> bool:
+        """Return whether the errors fall at least with the order 1, up to its accuracy."""
+        return self.order is None or self.order >= 1.0 - ORDER_SLACK
+
+    @property
     def is_higher(self) -> bool:
         """Return whether the order is above 1, or the errors are only rounding errors."""
         return self.order is None or self.order >= _ORDER_ONE
+
+    def predicted(self, level: int) -> float:
+        """Return the error at a level that the next level and the order predict."""
+        ratio = self.settings[level] / self.settings[level + 1]
+        return self.errors[level + 1] * math.pow(ratio, self.order or 0.0)
 
 
 def convergence(
@@ -182,10 +212,12 @@ def convergence(
         last = seen[-1]
         # An error that ceases to fall shows in the last tolerances alone.
         firsts = {0, max(0, last - _LATE)} if overall else {last - 1}
-        order = min(
+        powers = [
             _power(errors[first] / errors[last], settings[first] / settings[last])
             for first in firsts
-        )
+            if math.isfinite(errors[first])
+        ]
+        order = min(powers, default=0.0)
     return Convergence(part, tuple(settings), tuple(errors), order)
 
 
@@ -194,72 +226,6 @@ def _power(errors: float, settings: float) -> float:
     if math.isnan(errors) or errors <= 0.0:  # the error of the smaller step is infinite
         return 0.0
     return math.log(errors) / math.log(settings)
-
-
-@dataclass(frozen=True, eq=False)
-class Drift:
-    """The drift of conserved quantities in a long motion without torque.
-
-    Attributes
-    ----------
-    times : ndarray, shape (n,)
-        Times, s.
-    energy, momentum : ndarray, shape (n,)
-        Differences of energy and of the magnitude of the angular momentum from those at time 0,
-        relative to these.
-    direction : ndarray of shape (n,), or None
-        Angle between the angular momentum in space and that at time 0 (rad); None without attitude.
-    """
-
-    times: Array
-    energy: Array
-    momentum: Array
-    direction: Array | None
-
-    def named(self) -> dict[str, Array]:
-        """Return the quantities by name; the direction is left out if it is not known."""
-        found = {"energy": self.energy, "momentum": self.momentum}
-        return found if self.direction is None else {**found, "direction": self.direction}
-
-
-def growth_power(times: Array, drift: Array) -> float | None:
-    """Return p if the largest drift up to a time grows with its power p; None if it is rounding.
-
-    The power is that from a quarter of the last time to the last.
-    """
-    quarter = times <= times[-1] / 4.0
-    early, late = float(np.abs(drift[quarter]).max()), float(np.abs(drift).max())
-    if not math.isfinite(late) or early <= 0.0:
-        return None
-    return math.log(late / early) / math.log(4.0)
-
-
-def drift_of(scene: Scene, times: Array, motion: Motion) -> Drift:
-    """Return the drift of the conserved quantities of a motion without torque.
-
-    `times` (s) are those of the rows of `motion`.
-    """
-    moments = np.array(scene.moments)
-    with np.errstate(all="ignore"):
-        energies = (moments * motion.omega**2).sum(axis=1)
-        lengths = np.linalg.norm(moments * motion.omega, axis=1)
-        first = moments * np.array(scene.omega)
-        energy = energies / (first @ np.array(scene.omega)) - 1.0
-        momentum = lengths / np.linalg.norm(first) - 1.0
-        direction = None
-        if motion.attitude is not None:
-            start = _in_space(np.array([scene.attitude]), first[None, :])[0]
-            there = _in_space(motion.attitude, moments * motion.omega)
-            sine = np.linalg.norm(np.cross(there, start), axis=1)
-            direction = np.arctan2(sine, there @ start)
-    return Drift(times, energy, momentum, direction)
-
-
-def _in_space(attitude: Array, vectors: Array) -> Array:
-    """Return vectors about the body axes as vectors about the axes of space, shape (n, 3)."""
-    q = attitude.T
-    turned = product(product(q, (np.zeros(len(vectors)), *vectors.T)), (q[0], *-q[1:]))
-    return np.array(turned[1:]).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,6 +240,32 @@ class Judged:
     def finest(self) -> Motion:
         """Return the answer with the smallest step size or tolerance."""
         return self.answers[-1]
+
+    @cached_property
+    def lost(self) -> int:
+        """Return the number of rows that are not finite and should be.
+
+        With large steps an integrator may overflow, if the next smaller step is finite and its
+        error predicts an error of 1 by the measured order.
+        """
+        rows = self.finest.lost
+        for level in range(LEVELS - 2, -1, -1):
+            lost, next_lost = (each.lost for each in self.answers[level : level + 2])
+            predicted = max(each.predicted(level) for each in self.convergences)
+            if lost and not next_lost and predicted >= 1.0:
+                break
+            rows += lost
+        return rows
+
+    def error(self, level: int) -> float:
+        """Return the larger of the errors of omega (relative) and of the attitude (rad).
+
+        It is not below the tolerance, and not below rounding errors.
+        """
+        problem, finest = self.problem, self.finest
+        by_tolerance = finest.control == "tolerance"
+        least = problem.tolerance(level) if by_tolerance else problem.floor(finest.rounding)
+        return max(least, *(each.errors[level] for each in self.convergences))
 
     def of(self, part: str) -> Convergence | None:
         """Return the measured order of omega or of the attitude, or None if it was not computed."""

@@ -50,6 +50,12 @@ class Motion:
     rounding: float = ROUNDINGS["binary64"]
     refusal: str = ""
 
+    @property
+    def lost(self) -> int:
+        """Return the number of rows in which a number is not finite."""
+        parts = [self.omega] if self.attitude is None else [self.omega, self.attitude]
+        return int((~np.isfinite(np.hstack(parts)).all(axis=1)).sum())
+
 
 def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: float) -> bytes:
     """Return the line of JSON that requests the states of a scene at `times` (s).
@@ -95,12 +101,12 @@ def read_motion(line: bytes, rows: int) -> Motion:
     if given.get("attitude") is None:
         return Motion(omega, control=control, rounding=rounding)
     attitude = _rows("attitude", given["attitude"], rows, 4)
-    norms = np.linalg.norm(attitude, axis=1)
-    if not norms.all():
-        raise PortError(f"attitude, row {int(norms.argmin()) + 1}: all four numbers are 0")
-    off = float(np.abs(norms - 1.0).max())
-    with np.errstate(invalid="ignore"):
+    with np.errstate(all="ignore"):
+        norms = np.hypot.reduce(attitude, axis=1)  # without squares, which would overflow earlier
         unit = attitude / norms[:, None]
+    if not norms.all():
+        raise PortError(f"attitude, row {int((norms == 0.0).argmax()) + 1}: all four numbers are 0")
+    off = float(np.abs(norms - 1.0).max())
     return Motion(omega, unit, off if math.isfinite(off) else math.inf, control, rounding)
 
 

@@ -1,15 +1,22 @@
 """The recognition of known faults of an integrator, by its errors and its orders of convergence."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from pyharness.checks.integrators.faults import OUTPUTS, State, as_output, motions
-from pyharness.checks.integrators.problem import LEVELS, Judged, drift_of, errors_between
+from pyharness.checks.integrators.drift import drift_of
+from pyharness.checks.integrators.faults import OUTPUTS, Fault, State, as_output
+from pyharness.checks.integrators.problem import Judged, convergence, errors_between
+from pyharness.compare.orders import ORDER_SLACK
 
-# A motion is that of a known fault if it explains all but this part of the error.
+# A motion is that of a known fault if it explains all but this part of the error, and if the rest
+# falls at least with this power of the step size or tolerance.
 _UNEXPLAINED = 0.1
+_FALLS = 1.0 - ORDER_SLACK
+_OF_MOTIONS = 1e-10  # errors of the motions of faults
 _CONSERVED = 8.0  # rounding errors in a step, of a quantity that is conserved
 
 FIRST_ORDER = {
@@ -20,9 +27,11 @@ FIRST_ORDER = {
     "first-order-attitude": "the attitude converges with order 1, and omega with a higher order: "
     "the attitude advances with the omega of one end of the step (first-order splitting)",
     "torque-held": "the order is 1 under a torque that varies with time, and higher otherwise: "
-    "the torque of a step is that at one end of the step",
+    "the torque of a step is that at one end of the step, or at another wrong time",
 }
 """The faults that measured orders show, each with a sentence that says what is wrong."""
+UNKNOWN = "unknown"
+"""The name of any other fault."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +48,7 @@ def recognised(results: Sequence[Judged]) -> list[Finding]:
 
     The faults of most problems are first.
 
-    A fault explains the errors in a problem if its motion leaves at most a tenth of them. In the
-    problems that no such fault explains, the orders of convergence are interpreted.
+    In the problems that no motion of a fault explains, the orders of convergence are interpreted.
     """
     names: dict[str, tuple[str, list[str]]] = {}
 
@@ -62,36 +70,79 @@ def recognised(results: Sequence[Judged]) -> list[Finding]:
 
 def _explained(judged: Judged) -> list[tuple[str, str]]:
     """Return names and sentences of the faults that explain the errors in one problem."""
-    if all(each.is_higher for each in judged.convergences):
+    true = judged.convergences
+    if judged.lost or all(each.is_higher for each in true):
         return []
-    problem, motion = judged.problem, judged.finest
-    errors = [x for x in problem.errors(motion) if x is not None]
-    known = list(motions(problem.scene, problem.times, problem.step_size(LEVELS - 1)))
-    scores = []
-    for fault, state in known:
-        left = [x for x in errors_between(state, motion) if x is not None]
-        scores.append((max(left), fault, left, state))
-    worst, fault, left, _ = min(scores, key=lambda each: each[0])
-    if worst <= _UNEXPLAINED * max(errors):
-        return [(fault.name, fault.says)]
+    converges = all(each.converges for each in true)
+    if converges and judged.finest.control == "tolerance":
+        return []
+    # The motion of any other fault does not approach the true one.
+    known = [(f, state) for f, state in judged.problem.faulty if f.of_step or not converges]
+    both = _best(judged, known, range(len(true)))
+    if both is not None:
+        return [(both.name, both.says)]
     # One fault of omega, and one of the attitude that is given out.
-    omega_is_right = judged.convergences[0].is_higher
-    assert problem.truth.attitude is not None
-    true = State(problem.truth.omega, problem.truth.attitude)
-    _, first, left, state = min(scores, key=lambda each: each[2][0])
-    named = []
-    if not omega_is_right:
-        if left[0] > _UNEXPLAINED * errors[0]:
-            return []
-        named.append((first.name, first.says))
-    if motion.attitude is not None:
-        base = true if omega_is_right else state
-        for name in OUTPUTS:
-            other = State(base.omega, as_output(name, base.attitude, problem.scene))
-            angle = errors_between(other, motion)[1]
-            if angle is not None and angle <= _UNEXPLAINED * errors[1]:
-                named.append((name, next(f.says for f, _ in known if f.name == name)))
-    return named
+    first = None if true[0].is_higher or len(true) == 1 else _best(judged, known, range(1))
+    if first is None:
+        return []
+    base = first
+    outputs = []
+    for fault, _ in judged.problem.faulty:
+        if fault.name in OUTPUTS:
+
+            def states(level: int, name: str = fault.name) -> State:
+                state = judged.problem.faulty_states(base, level)
+                return State(state.omega, as_output(name, state.attitude, judged.problem.scene))
+
+            if _approaches(judged, base, states, range(2)):
+                outputs.append((fault.name, fault.says))
+    return [(first.name, first.says), *outputs]
+
+
+def _best(
+    judged: Judged, known: Sequence[tuple[Fault, State]], parts: Sequence[int]
+) -> Fault | None:
+    """Return the fault whose motion the integrator approaches; None if there is no such fault.
+
+    `known` has faults with their states at the smallest step, and `parts` the indices of the
+    compared members of `PARTS`.
+    """
+    most = _UNEXPLAINED * max(judged.convergences[k].errors[-1] for k in parts)
+    scored = []
+    for number, (fault, state) in enumerate(known):
+        left = errors_between(state, judged.finest)
+        worst = max(left[k] or 0.0 for k in parts)
+        if worst <= most:
+            scored.append((worst, number, fault))
+    for _, _, fault in sorted(scored, key=lambda each: each[:2]):
+        if _approaches(judged, fault, partial(judged.problem.faulty_states, fault), parts):
+            return fault
+    return None
+
+
+def _approaches(
+    judged: Judged, fault: Fault, states: Callable[[int], State], parts: Sequence[int]
+) -> bool:
+    """Return whether the answers approach the states of a fault as the steps become smaller.
+
+    What falls so fast is also near the discretisation error, the change from one step to the next.
+    """
+    pairs = enumerate(judged.answers)
+    errors = [errors_between(states(level), motion) for level, motion in pairs]
+    floor = max(judged.problem.floor(judged.finest.rounding), _OF_MOTIONS)
+    for k in parts:
+        true = judged.convergences[k]
+        values = [x if x is not None else math.inf for x in (each[k] for each in errors)]
+        least = _FALLS
+        if fault.of_step and true.order is not None and not true.is_higher:
+            least += max(true.order, 0.0)
+        orders = [
+            convergence(true.part, true.settings, values, floor, overall).order
+            for overall in (True, False)
+        ]
+        if values[-1] > floor and any(order is None or order < least for order in orders):
+            return False
+    return True
 
 
 def _by_orders(results: Sequence[Judged]) -> list[tuple[str, str]]:
@@ -102,7 +153,7 @@ def _by_orders(results: Sequence[Judged]) -> list[tuple[str, str]]:
     )
     for judged in results:
         omega, attitude = judged.of("omega"), judged.of("attitude")
-        if judged.finest.control == "tolerance" or omega is None:
+        if judged.finest.control == "tolerance" or judged.lost or omega is None:
             continue
         name = ""
         if omega.is_first:

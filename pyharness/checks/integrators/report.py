@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pyharness.checks.check import Check
+from pyharness.checks.integrators.drift import growth_power
 from pyharness.checks.integrators.judging import Verdict
-from pyharness.checks.integrators.problem import PARTS, Convergence, growth_power
+from pyharness.checks.integrators.problem import PARTS, Convergence
 from pyharness.checks.report import checks_report, listed_singly, references, summary_page, verdict
 from pyharness.model.report import (
     Column,

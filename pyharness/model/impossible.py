@@ -2,13 +2,17 @@
 
 import sys
 import warnings
-from typing import Protocol
+from collections.abc import Iterable
+from typing import Any, Protocol
 
 # Modules whose stack frames are between the user's call and the creation of the scene.
 _BETWEEN = (
     *("copy", "dataclasses", "pyharness.dynamics.scene_reader"),
     *("pyharness.model.scene", "pyharness.model.scene_file", __name__),
 )
+
+# The largest moment over an excess that rounding of moments or elements may cause.
+_ROUNDED = 2**50
 
 
 class ImpossibleBodyWarning(UserWarning):
@@ -32,6 +36,15 @@ class ImpossibleBodyWarning(UserWarning):
 class _Body(Protocol):
     @property
     def is_impossible(self) -> bool: ...
+
+
+def breaks_triangle(moments: Iterable[Any]) -> bool:
+    """Return whether the largest of three moments, floats or Fractions, exceeds the sum of the rest.
+
+    A flat body, whose largest moment equals the sum, does not, however its numbers are rounded.
+    """
+    low, middle, high = sorted(moments)
+    return bool((high - middle - low) * _ROUNDED > high)
 
 
 def warn_of_impossible(body: _Body) -> None:

@@ -17,8 +17,6 @@ Exact = tuple[Fraction, Fraction, Fraction]
 Array = NDArray[np.float64]
 
 _ALIKE = 1e-12  # allowed difference of elements that should be equal, over the largest element
-# The most by which rounding of the matrix may change a moment, relative to the largest moment.
-_ROUNDED = Fraction(1, 1 << 50)
 _KEPT = 256  # number of matrices whose principal frames are cached
 
 
@@ -134,16 +132,6 @@ def principal_axes(inertia: Matrix) -> tuple[Triple, Array]:
     """
     found = principal_frame(inertia)
     return found.moments, found.axes.copy()
-
-
-def breaks_triangle(inertia: Matrix) -> bool:
-    """Return whether the largest principal moment of a matrix exceeds the sum of the other two.
-
-    `inertia` is the inertia matrix (kg m2). In a flat body the largest moment equals the sum. An
-    excess that may only be due to rounding errors of the matrix elements is ignored.
-    """
-    low, middle, high = sorted(principal_frame(inertia).exact_moments)
-    return high - low - middle > _ROUNDED * high
 
 
 def _turned(axis: Exact) -> Exact:

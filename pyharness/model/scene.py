@@ -13,7 +13,7 @@ from pyharness.model.attitude import Quaternion, Rotation, unit_quaternion
 from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
-from pyharness.model.impossible import warn_of_impossible
+from pyharness.model.impossible import breaks_triangle, warn_of_impossible
 from pyharness.model.state_torque import StateTorque, checked_torque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import (
@@ -265,8 +265,8 @@ class Scene:
     def is_impossible(self) -> bool:
         """Whether no rigid body has the moments of inertia of the scene.
 
-        The largest moment then exceeds the sum of the other two. The result is false for a body
-        with coefficients. An inertia that changes with time is that at time 0.
+        The largest moment then exceeds the sum of the other two, by more than rounding errors
+        (2**-50 of it) explain. The result is false for a body with coefficients. An inertia that changes with time is that at time 0.
         """
         moments, inertia = self.moments, self.inertia
         if isinstance(self.changing, ChangingMoments):
@@ -274,13 +274,10 @@ class Scene:
         elif self.changing is not None:
             inertia = self.changing.at(0.0)
         if inertia is not None:
-            from pyharness.model.inertia import breaks_triangle
+            from pyharness.model.inertia import principal_frame
 
-            return breaks_triangle(inertia)
-        if moments is None:
-            return False
-        low, middle, high = sorted(moments)
-        return high > low + middle
+            return breaks_triangle(principal_frame(inertia).exact_moments)
+        return moments is not None and breaks_triangle(moments)
 
     @property
     def law(self) -> TorqueLaw:

@@ -19,6 +19,7 @@ from pyharness import (
     subset,
 )
 from pyharness.cli.main import main
+from pyharness.model.impossible import breaks_triangle
 
 IMPOSSIBLE = (200.0, 10.0, 20.0)
 BODY = "[body]\nmoments = [200.0, 10.0, 20.0]\n[initial]\nomega = [1.0, 2.0, 3.0]\n"
@@ -62,6 +63,19 @@ def test_a_body_that_can_exist_and_what_is_made_of_a_scene_warn_of_nothing() -> 
         solve(scene, [-1e-3, 3.0], attitude=True)
         run_program(scene, subset("runge-kutta"))
         compare_programs(scene)
+
+
+def test_plates_in_decimals_are_possible_as_moments_and_as_inertia() -> None:
+    plates = [(i / 100, j / 100, (i + j) / 100) for i in range(1, 100) for j in range(i, 100)]
+    assert not any(map(breaks_triangle, plates))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for first, middle, last in plates[1::41]:
+            for factor, is_impossible in ((1.0, False), (1.0 + 3e-15, True)):
+                moments = first, middle, last * factor
+                for given in ({"moments": moments}, {"inertia": np.diag(moments)}):
+                    scene = Scene("", (1.0, 2.0, 3.0), **given)
+                    assert scene.is_impossible is is_impossible, given
 
 
 def test_the_command_line_says_it_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

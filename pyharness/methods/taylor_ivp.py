@@ -14,7 +14,7 @@ from numpy.polynomial.polynomial import polyval
 from scipy.integrate import DenseOutput, OdeSolver
 
 from pyharness.methods.recorded import kernel_tape
-from pyharness.methods.taylor_step import LONGEST_TRIAL, taylor_step
+from pyharness.methods.taylor_step import LONGEST_TRIAL, Step, taylor_step
 from pyharness.model.errors import InputError
 from pyharness.model.symbols import Recorder, called_once, recorded_twice
 from pyharness.model.tape import Tape
@@ -26,6 +26,12 @@ _MOST_OPERATIONS = 20_000
 _LEAST_RTOL = 100.0 * np.finfo(float).eps
 # The least error that is distinguished from 0; its reciprocal is a number too.
 _LEAST_SCALE = 2.0**-1000
+# `solve_ivp` takes an event function that is 0 at the start for one that changes sign in the first
+# step if it has another root there, and misses pairs of roots. The state changes by this part in
+# the first step, and following steps grow at most so many times, as those of SciPy's methods.
+_FIRST_CHANGE = 0.01
+_MOST_GROWTH = 10.0
+_FIRST_PARTS = 1e-12, 1e-2  # of the step that the tolerances allow
 
 
 class Taylor(OdeSolver):  # type: ignore[misc]
@@ -114,13 +120,14 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         share = self.atol.min(initial=math.inf) / longest if longest else 0.0
         self._relative = min(1.0, float(self.rtol.min(initial=1.0) + share))
         span = abs(self.t_bound - self.t)
-        self._longest = (
-            span if first_step is None else (self._longer_than_spacing("first_step", first_step))
-        )
+        self._trial = min(span, LONGEST_TRIAL)
+        self._terms = np.zeros((1, self.n))
+        if first_step is None:
+            self._longest = self._first_step(span)
+        else:
+            self._longest = self._longer_than_spacing("first_step", first_step)
         if self._longest > span:
             raise InputError(f"first_step is {first_step}; allowed: up to {span:g}, the time span")
-        self._trial = min(self._longest, LONGEST_TRIAL)
-        self._terms = np.zeros((1, self.n))
 
     def _longer_than_spacing(self, name: str, value: Any) -> float:
         found = number(name, value)
@@ -129,15 +136,33 @@ class Taylor(OdeSolver):  # type: ignore[misc]
             raise InputError(f"{name} is {found:g}; allowed: a number larger than {least:g} at t0")
         return found
 
-    def _step_impl(self) -> tuple[bool, str | None]:
-        rest = abs(self.t_bound - self.t)
-        longest = min(rest, self.max_step, self._longest)
-        trial = min(self._trial, longest)
+    def _first_step(self, span: float) -> float:
+        if not (self.n and span):
+            return span
+        scale = self._scale()
+        step = self._step_of(scale, self._trial, span)
+        if step.h == 0.0:
+            return span
+        change = _FIRST_CHANGE * max(1.0, float(np.abs(self.y / scale).max()))
+        sizes = np.abs(step.terms[1:] / scale).max(axis=1)
+        # Half the change is in the first term, a quarter in the second, and so on.
+        with np.errstate(divide="ignore", over="ignore"):
+            parts = 0.5 * (change / sizes) ** (1.0 / np.arange(1, len(sizes) + 1))
+        first = float(np.clip(parts.min(), *_FIRST_PARTS)) * abs(step.h)
+        return min(span, max(first, 10.0 * math.ulp(self.t)))
+
+    def _step_of(self, scale: Array, trial: float, longest: float) -> Step:
         step = taylor_step(
-            self._tape, self.t, self.y, self._scale(), self._relative,
+            self._tape, self.t, self.y, scale, self._relative,
             self.direction * trial, self.direction * longest,
         )  # fmt: skip
         self.nfev += step.expansions
+        return step
+
+    def _step_impl(self) -> tuple[bool, str | None]:
+        rest = abs(self.t_bound - self.t)
+        longest = min(rest, self.max_step, self._longest)
+        step = self._step_of(self._scale(), min(self._trial, longest), longest)
         if step.h == 0.0:
             return False, self.TOO_SMALL_STEP
         end = self.t + step.h
@@ -145,7 +170,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         self._terms = step.terms
         # A step that was cut says nothing of the next one.
         self._trial = max(self._trial, abs(step.h)) if is_cut else abs(step.h)
-        self._longest = math.inf
+        self._longest = max(self._longest, _MOST_GROWTH * abs(step.h))
         self.t = self.t_bound if is_cut and longest == rest else end
         self.y = step.state
         return True, None

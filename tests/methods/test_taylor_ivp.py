@@ -157,6 +157,28 @@ def test_a_terminal_event_ends_an_infinite_time_span() -> None:
     assert found.t[-1] == pytest.approx(math.sqrt(20.0 / 9.81), rel=1e-12)
 
 
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-12])
+@pytest.mark.parametrize("speed", [1e-3, 10.0, 1e4])
+@pytest.mark.parametrize("end", [1e6, math.inf])
+def test_a_cannon_on_the_ground_is_not_stopped_by_its_start(
+    end: float, speed: float, tolerance: float
+) -> None:
+    # The solution has three terms, so that the tolerances allow one step for all of it.
+    for earth in (0.0, 6.4e6):
+
+        def ground(t: Any, y: Any, earth: float = earth) -> Any:
+            return y[0] - earth
+
+        ground.terminal, ground.direction = True, -1  # type: ignore[attr-defined]
+        found = solve_ivp(
+            lambda t, y: [y[1], -0.5], (0.0, end), [earth, speed], method=Taylor,
+            rtol=tolerance, atol=1e-3 * tolerance, events=[lambda t, y: y[1], ground],
+        )  # fmt: skip
+        apex, impact = found.t_events
+        assert apex == pytest.approx([2.0 * speed], rel=1e-6)
+        assert impact == pytest.approx([4.0 * speed], rel=1e-4 if earth else 1e-9)
+
+
 def test_a_singularity_fails() -> None:
     found = solve_ivp(lambda t, y: [y[0] ** 2], (0.0, 2.0), [1.0], method=Taylor)
     assert not found.success

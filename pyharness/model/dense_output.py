@@ -16,6 +16,7 @@ POINTS = points(NODES)
 TO_COEFFICIENTS = to_coefficients(NODES)
 # Times whose polynomials are evaluated together, so that little memory is needed.
 _BLOCK = 20_000
+_ROUNDED = 4.0  # units in the last place by which a time such as n*dt may be beyond an end
 # Weights of the barycentric formula.
 _WEIGHTS: Array = np.where(np.arange(NODES) % 2, -1.0, 1.0)
 _WEIGHTS[[0, -1]] /= 2.0
@@ -99,7 +100,8 @@ class DenseOutput:
         Parameters
         ----------
         t : float or array_like, shape (n,)
-            Times from `t_min` to `t_max` (s), in any order.
+            Times from `t_min` to `t_max` (s), in any order. A time at most 4 units in the last place
+            beyond an end is taken for the end.
 
         Returns
         -------
@@ -143,17 +145,18 @@ class DenseOutput:
         return found
 
     def _checked(self, t: Any) -> tuple[Array, tuple[int, ...]]:
-        allowed = f"allowed: numbers from {self.t_min:g} to {self.t_max:g} s"
+        allowed = f"allowed: numbers from {self.t_min:.16g} to {self.t_max:.16g} s"
         try:
             times = np.asarray(t, dtype=np.float64)
         except (TypeError, ValueError):
             raise InputError(f"dense output: a time is no number; {allowed}") from None
         if times.ndim > 1:
             raise InputError(f"dense output: times with {times.ndim} dimensions; allowed: one")
-        outside = times[~((times >= self.t_min) & (times <= self.t_max))]
+        inner = np.clip(times, self.t_min, self.t_max)
+        outside = times[~(np.abs(times - inner) <= _ROUNDED * np.spacing(np.abs(inner)))]
         if outside.size:
-            raise InputError(f"dense output: t = {outside[0]:g} s; {allowed}")
-        return np.atleast_1d(times), times.shape
+            raise InputError(f"dense output: t = {outside[0]:.16g} s; {allowed}")
+        return np.atleast_1d(inner), times.shape
 
     @staticmethod
     def _shaped(rows: Array, shape: tuple[int, ...]) -> Array:

@@ -186,6 +186,7 @@ def test_shapes_and_defaults() -> None:
     ("given", "message"),
     [
         (2.5, "dense output: t = 2.5 s; allowed: numbers from 0 to 2 s"),
+        (2.0 + 5.0 * 2.0**-51, "dense output: t = 2.000000000000002 s; allowed: numbers from 0 to 2"),
         ([0.5, -1e-9], "dense output: t = -1e-09 s; allowed"),
         (math.nan, "dense output: t = nan s; allowed"),
         ("now", "dense output: a time is no number; allowed"),
@@ -197,6 +198,15 @@ def test_refused_times(given: Any, message: str, call: Callable[[DenseOutput, An
     sol = sol_of(solve(BRICK, 2.0, dense_output=True))
     with pytest.raises(InputError, match=f"^{message}"):
         call(sol, given)
+
+
+@pytest.mark.parametrize(("end", "count"), [(0.3, 3), (-0.6, 6), (0.7, 7), (1.2, 12)])
+def test_the_last_of_equally_spaced_times_may_be_rounded_up(end: float, count: int) -> None:
+    sol = sol_of(solve(BRICK, end, dense_output=True))
+    times = np.arange(count + 1) * math.copysign(0.1, end)
+    assert abs(times[-1]) > abs(end)
+    for call in (sol, sol.derivative):
+        assert call(times)[:, -1].tolist() == call(end).tolist() == call(times[-1]).tolist()
 
 
 def test_an_overflow_ends_the_function() -> None:

@@ -95,6 +95,8 @@ class Roots:
         The magnitude below which a value of the function can't be distinguished from 0.
     near : ndarray, shape (n,)
         The magnitude below which a value of the polynomial can't be distinguished from 0.
+    lasting : ndarray, shape (n,)
+        How long (s) the function remains 0, negative before time 0; 0 for a root.
     """
 
     time: Array
@@ -103,6 +105,7 @@ class Roots:
     curvature: Array
     noise: Array
     near: Array
+    lasting: Array
 
     def only(self, kept: Index) -> "Roots":
         """Return the roots that an index or a mask selects."""
@@ -198,7 +201,8 @@ def _at(fits: Fits, x: Array, change: Index, number: Index, near: Array) -> Root
     slopes = fits.coefficients[number] @ _DERIVATIVE.T
     slope = values_at(slopes, x) / half
     curvature = values_at(slopes @ _DERIVATIVE.T, x) / half / half
-    return Roots(time, change, slope, curvature, fits.noise[number], near[number])
+    lasting = np.zeros(len(time))
+    return Roots(time, change, slope, curvature, fits.noise[number], near[number], lasting)
 
 
 def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:

@@ -12,96 +12,25 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
-from pyharness.methods.event_functions import EventFunction
-from pyharness.methods.event_roots import (
-    FIT_ERROR,
-    NODES,
-    POINTS,
-    TO_COEFFICIENTS,
-    Fits,
-    Index,
-    Roots,
-    isolated,
-    joined,
-    may_vanish,
+from pyharness.methods.event_fits import (
+    ROUNDING,
+    Solution,
+    fitted,
+    with_noise,
+    zero_intervals,
 )
+from pyharness.methods.event_functions import EventFunction
+from pyharness.methods.event_roots import FIT_ERROR, Index, Roots, isolated, joined, may_vanish
 from pyharness.methods.periodic_events import improved, repeated
 from pyharness.model.array_type import Array
-from pyharness.model.chebyshev import nodes
-from pyharness.model.dense_output import DenseOutput, Pieces
 
-# Largest of the last coefficients of a polynomial that has converged, relative to its values.
-_LAST = 2e-14
-_TAIL = 3  # coefficients whose size is an estimate of those left out
-# Divisions of an interval in two, after which the function is not smooth.
-_MOST_DIVISIONS = 44
-_MOST_PIECES = 100_000  # that are divided at the same time
 _BLOCK = 4_000  # polynomials whose roots are isolated together
-_SHIFT = 2.0**-26  # relative difference of an argument, by which a derivative is estimated
-_ROUNDING = 2.0**-50  # of the arguments of a function
 _STATE_ROUNDING = 2.0**-46  # of polynomials of the state, over their largest values
-# A double root is known at best to the error of omega, relative to omega.
-_COARSEST = 1e-10
 _POLISHES = 3
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """The solution of a scene, as the search for events uses it.
-
-    Attributes
-    ----------
-    pieces : Pieces
-        The polynomials of omega and attitude.
-    sol : DenseOutput
-        The dense output, whose polynomials may be the same.
-    tolerance : float
-        The tolerance of omega; 0 for a method with a fixed step.
-    """
-
-    pieces: Pieces
-    sol: DenseOutput
-    tolerance: float
-
-    def states(self, times: Array) -> Array:
-        """Return omega and attitude at `times` (s), one row for each."""
-        return _normalised(self.pieces(times))
-
-    def values(self, g: EventFunction, times: Array, states: Array | None = None) -> Array:
-        """Return the values of an event's function at `times` (s)."""
-        states = self.states(times) if states is None else states
-        rates = self.sol.rates(times, states) if g.event.needs_rates else None
-        return g(times, states, rates)
-
-    def exact_values(self, g: EventFunction, times: Array) -> Array:
-        """Return the values of an event's function at `times` (s), without the polynomials."""
-        return self.values(g, times, _normalised(self.sol.states(times)))
-
-    def noise(self, g: EventFunction, times: Array) -> Array:
-        """Return, for each time, the error of an event's function due to errors of its arguments.
-
-        These are the rounding error of time and the error of omega and attitude.
-        """
-        states = self.states(times)
-        rates = self.sol.rates(times, states) if g.event.needs_rates else None
-        value = g(times, states, rates)
-        shift = _SHIFT * np.abs(times)
-        later = np.where(times + shift > times, times + shift, times)
-        found = _ROUNDING * np.abs(g(later, states, rates) - value) / _SHIFT
-        # A tolerance in excess of the limit would hide pairs of roots.
-        own = max(_ROUNDING, min(self.tolerance, _COARSEST))
-        for columns, is_rate in ((states, False), (rates, True)):
-            if columns is None:
-                continue
-            largest = np.abs(columns[:, :3]).max(axis=1, initial=0.0)
-            for k in range(3 if is_rate else columns.shape[1]):
-                moved = columns.copy()
-                moved[:, k] += _SHIFT * (largest if k < 3 else 1.0)
-                other = g(times, states, moved) if is_rate else g(times, moved, rates)
-                found += own * np.abs(other - value) / _SHIFT
-        return found
+# A time is exact if the sign changes within so many of its rounding errors on either side of it.
+_EXACT = 8.0
+_WIDER = 16.0  # factor on the half width of an interval, until the sign changes in it
 
 
 def event_roots(g: EventFunction, solution: Solution) -> Roots:
@@ -111,106 +40,24 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
     at an end has the sign change to, or from, the values beside it.
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        fits, rough = _fitted(g, solution)
-        fits = fits.only(may_vanish(fits))
-        fits = _with_noise(g, solution, fits)
+        fits, rough = fitted(g, solution)
+        zeros = zero_intervals(g, solution, fits)
+        fits = with_noise(g, solution, fits.only(may_vanish(fits)))
         found = [rough]
         for begin in range(0, len(fits.low), _BLOCK):
             found.append(isolated(fits.only(slice(begin, begin + _BLOCK))))
         roots = _distinct(g, solution, joined(found))
-        roots = _merged(g, solution, joined([roots, _at_ends(g, solution)]))
-        return _polished(g, solution, roots)
-
-
-def _normalised(states: Array) -> Array:
-    if states.shape[-1] > 3:
-        states[..., 3:] /= np.linalg.norm(states[..., 3:], axis=-1, keepdims=True)
-    return states
-
-
-def _fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
-    """Return polynomials through the values of a function, and the roots where it has none."""
-    edges = solution.pieces.edges
-    low, high = edges[:-1], edges[1:]
-    smallest = (high - low) * 2.0**-_MOST_DIVISIONS
-    coefficients = solution.pieces.coefficients
-    basis = chebyshev.chebvander(POINTS, coefficients.shape[1] - 1)
-    inner = _normalised(basis @ coefficients)
-    times = nodes(low, high, POINTS)
-    values = solution.values(g, times.ravel(), inner.reshape(-1, inner.shape[2])).reshape(
-        times.shape
-    )
-    first, last = values[:, 0].copy(), values[:, -1]
-    # Adjacent intervals have the same value at their common end.
-    first[1:] = last[:-1]
-    done: list[Fits] = []
-    rough: list[Roots] = []
-    while low.size:
-        c = values @ TO_COEFFICIENTS.T
-        largest = np.abs(values).max(axis=1)
-        tail = np.abs(c[:, -_TAIL:]).max(axis=1)
-        is_done = tail <= _LAST * largest
-        near = np.flatnonzero(~is_done)
-        is_done[near] = tail[near] <= _noise_of(g, solution, low[near], high[near])
-        fits = Fits(low, high, first, last, c, np.zeros(len(low)))
-        done.append(fits.only(is_done))
-        is_rough = ~is_done & (
-            (high - low <= np.maximum(smallest, 64.0 * np.spacing(np.abs(low) + np.abs(high))))
-            | (len(low) > max(_MOST_PIECES, 2 * len(edges)))
-        )
-        rough.append(_sign_changes(times[is_rough], values[is_rough], first[is_rough]))
-        split = ~is_done & ~is_rough
-        middle = 0.5 * low[split] + 0.5 * high[split]
-        ends = np.column_stack([low[split], middle, middle, high[split]])
-        low, high = ends.reshape(-1, 2).T
-        smallest = np.repeat(smallest[split], 2)
-        first, last = first[split], last[split]
-        if not low.size:
-            break
-        times = nodes(low, high, POINTS)
-        values = solution.values(g, times.ravel()).reshape(times.shape)
-        centre = values[0::2, -1]
-        first, last = np.column_stack([first, centre, centre, last]).reshape(-1, 2).T
-    return _all_fits(done), joined(rough)
-
-
-def _all_fits(parts: list[Fits]) -> Fits:
-    return Fits(*(np.concatenate([getattr(x, name) for x in parts]) for name in vars(parts[0])))
-
-
-def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> Array:
-    """Return the noise of a function on intervals, the largest at three of their nodes."""
-    if not low.size:
-        return np.zeros(0)
-    times = nodes(low, high, POINTS)[:, NODES // 6 :: NODES // 3]
-    noise = solution.noise(g, times.ravel()).reshape(times.shape)
-    return np.asarray(noise.max(axis=1))
-
-
-def _with_noise(g: EventFunction, solution: Solution, fits: Fits) -> Fits:
-    """Return the polynomials with their noise, without those that can't be distinguished from 0."""
-    noise = _noise_of(g, solution, fits.low, fits.high) + _ROUNDING * fits.sizes
-    fits = replace(fits, noise=noise)
-    return fits.only(fits.sizes > 2.0 * noise)
-
-
-def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
-    """Return the sign changes between adjacent nodes of intervals, without further refinement."""
-    values = values.copy()
-    values[:, 0] = first
-    is_negative = values < 0.0
-    row, column = np.nonzero(is_negative[:, 1:] != is_negative[:, :-1])
-    change = np.where(is_negative[row, column], 1, -1)
-    zeros = np.zeros(len(row))
-    middle = 0.5 * times[row, column] + 0.5 * times[row, column + 1]
-    return Roots(middle, change, zeros, zeros, zeros, zeros)
+        roots = joined([roots, _at_ends(g, solution)])
+        roots = roots.only(~zeros.contain(g, solution, roots))
+        roots = _polished(g, solution, _merged(g, solution, roots))
+        return joined([roots, zeros.roots(g.event.counts_touches)])
 
 
 def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
     """Return roots with the noise at their own times, without extrema that are not near 0."""
     if not roots.time.size:
         return roots
-    noise = solution.noise(g, roots.time) + _ROUNDING / FIT_ERROR * roots.near
+    noise = solution.noise(g, roots.time) + ROUNDING / FIT_ERROR * roots.near
     noise = np.minimum(noise, roots.noise)
     value = solution.values(g, roots.time)
     # A value beyond 0, as seen from those beside the extremum, is on the other side of two roots.
@@ -234,7 +81,48 @@ def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
         other = solution.values(g, trial)
         better = np.abs(other) < np.abs(value)
         time, value = np.where(better, trial, time), np.where(better, other, value)
-    return replace(roots, time=time)
+    return replace(roots, time=_bisected(g, solution, time, roots.change))
+
+
+def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index) -> Array:
+    """Return the times of roots, those of inexact changes of sign by bisection.
+
+    A root of odd multiplicity is lost in the errors of polynomials, but not of signs.
+    """
+    edges = solution.pieces.edges
+    bounds = np.concatenate([edges[:1], 0.5 * times[:-1] + 0.5 * times[1:], edges[-1:]])
+    piece = np.clip(np.searchsorted(edges, times) - 1, 0, len(edges) - 2)
+    rounding = np.spacing(np.abs(times)) + np.spacing(edges[piece + 1] - edges[piece])
+    found, width = times.copy(), _EXACT * rounding
+    wide = np.flatnonzero(changes)
+    low, high = times.copy(), times.copy()
+    open_ones: list[Index] = []
+    while wide.size:
+        low[wide] = np.maximum(times[wide] - width[wide], bounds[wide])
+        high[wide] = np.minimum(times[wide] + width[wide], bounds[wide + 1])
+        has_change = _have_change(g, solution, low[wide], high[wide], changes[wide])
+        open_ones.append(wide[has_change & (width[wide] > _EXACT * rounding[wide])])
+        is_whole = (low[wide] == bounds[wide]) & (high[wide] == bounds[wide + 1])
+        wide = wide[~(has_change | is_whole)]
+        width[wide] *= _WIDER
+    k = np.concatenate(open_ones) if open_ones else wide
+    while k.size:
+        middle = 0.5 * low[k] + 0.5 * high[k]
+        k, middle = (x[(middle > low[k]) & (middle < high[k])] for x in (k, middle))
+        is_late = solution.values(g, middle) * changes[k] >= 0.0
+        low[k], high[k] = np.where(is_late, low[k], middle), np.where(is_late, middle, high[k])
+        found[k] = high[k]
+    return found
+
+
+def _have_change(
+    g: EventFunction, solution: Solution, low: Array, high: Array, changes: Index
+) -> Index:
+    """Return in which intervals a function has a change of sign."""
+    values = solution.values(g, np.concatenate([low, high]))
+    first, last = values.reshape(2, -1) * changes
+    found: Index = (first < 0.0) & (last > 0.0)
+    return found
 
 
 def _at_ends(g: EventFunction, solution: Solution) -> Roots:
@@ -247,7 +135,7 @@ def _at_ends(g: EventFunction, solution: Solution) -> Roots:
     is_root = np.abs(values) <= noise
     found = ends[is_root]
     zeros = np.zeros(len(found))
-    return Roots(found, zeros.astype(int), zeros, zeros, noise[is_root], zeros)
+    return Roots(found, zeros.astype(int), zeros, zeros, noise[is_root], zeros, zeros)
 
 
 def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
@@ -355,19 +243,15 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
     end = solution.pieces.edges[-1 if side > 0 else 0]
     if side * end <= 0.0:
         return np.zeros(0)
-    kept = side * roots.time >= 0.0
-    time, change = side * roots.time[kept][::side], side * roots.change[kept][::side]
-    is_end = (time == 0.0) | (time == side * end)
-    is_zero = np.zeros(len(time), dtype=bool)
-    bounds = np.concatenate([[0.0], time, [side * end]])
+    roots = roots.only((side * roots.time >= 0.0) & (side * (roots.time + roots.lasting) >= 0.0))
+    time, change, lasting = (side * x[::side] for x in (roots.time, roots.change, roots.lasting))
+    is_end = (lasting == 0.0) & ((time == 0.0) | (time == side * end))
+    last, first = np.append(0.0, time + lasting), np.append(time, side * end)
     for k in np.flatnonzero(is_end):
-        beside = bounds[k + 2] if time[k] == 0.0 else bounds[k]
-        inner = np.array([side * (0.5 * time[k] + 0.5 * beside)])
-        value = solution.values(g, inner)[0]
-        # A function that is 0 throughout has no event.
-        is_zero[k] = abs(value) <= solution.noise(g, inner)[0]
+        beside = first[k + 1] if time[k] == 0.0 else last[k]
+        value = solution.values(g, np.array([side * (0.5 * time[k] + 0.5 * beside)]))[0]
         change[k] = np.sign(value) * (1 if time[k] == 0.0 else -1)
-    accepted = ((change == g.event.direction) | (g.event.direction == 0)) & ~is_zero
+    accepted = (change == g.event.direction) | (g.event.direction == 0)
     if not g.event.counts_touches:
         accepted &= (change != 0) & ~is_end
     found: Array = side * time[accepted]

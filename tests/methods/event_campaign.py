@@ -20,7 +20,7 @@ from pyharness.model.array_type import Array
 LARGEST = 1e-12
 _EPS = 2.0**-52
 BODY = Scene("body", omega=(0.1, 2.0, 0.1), moments=(1.0, 2.0, 3.0))
-KINDS = ("polynomial", "edges", "cosine", "sine", "squared sine", "modulated")
+KINDS = ("polynomial", "edges", "cosine", "sine", "squared sine", "modulated", "odd")
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,8 @@ def planted(kind: str, rng: np.random.Generator) -> Planted:
     end = float(rng.choice([1.0, 10.0, 40.0]) * rng.uniform(0.5, 1.0))
     if kind in ("polynomial", "edges"):
         return _product(end, kind == "edges", rng)
+    if kind == "odd":
+        return _of_odd_multiplicity(end, rng)
     rate, phase = rng.uniform(1.0, 40.0), rng.uniform(0.0, 2.0 * np.pi)
     n: Any = np.arange(-2, int(rate * end / np.pi) + 4)
     if kind == "cosine":
@@ -106,6 +108,20 @@ def _product(end: float, at_edges: bool, rng: np.random.Generator) -> Planted:
     double = 4000.0 * _EPS * largest / (end * np.array(curvature))
     rounding = 4.0 * _EPS * end + np.where(powers == 2, double, 0.0)
     return Planted(function, end, roots, changes, rounding)
+
+
+def _of_odd_multiplicity(end: float, rng: np.random.Generator) -> Planted:
+    """Return a product of factors to the powers 1, 3, 5 and 7, whose signs are exact."""
+    roots = end * (np.arange(3) + rng.uniform(0.3, 0.7, 3)) / 3.0
+    powers = rng.permutation([1, rng.choice([3, 5, 7]), rng.choice([1, 3])])
+    sign = rng.choice([-1.0, 1.0])
+
+    def function(t: Any, omega: Any) -> Any:
+        factors = [(t - root) ** int(n) for root, n in zip(roots, powers, strict=True)]
+        return sign * factors[0] * factors[1] * factors[2]
+
+    changes = sign * np.array([1, -1, 1])
+    return Planted(function, end, roots, changes, np.full(3, 4.0 * _EPS * end))
 
 
 @dataclass

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from pyharness import InputError, Scene, TorqueLaw, case_scene, load, solve
 from pyharness.events import crosses, extremum, flip, rest, tilt
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.torques import damping, opaque
+from pyharness.torques import damping, opaque, pulses
 from tests.methods.event_campaign import BODY, KINDS, Tally, campaign, planted, run
 
 METHODS = ("auto", "closed-form", "taylor", "dop853", "gauss-4", "reference")
@@ -153,10 +153,59 @@ def test_function_without_a_derivative() -> None:
     assert steep == pytest.approx([4.4], rel=1e-12)
 
 
-def test_function_that_is_0_everywhere_has_no_events() -> None:
+@pytest.mark.parametrize("end", [1.0, 2.7, -2.0, 40.0])
+def test_roots_of_odd_multiplicity_are_as_exact_as_the_sign(end: float) -> None:
+    # Omega is the time.
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=TorqueLaw((1.0, 0.0, 0.0)))
+    root = math.copysign(1.0, end)
+    for direction in (0, root, -root):
+        events = [
+            with_attributes(lambda t, omega, n=n: (omega[0] - root) ** n, False, direction)
+            for n in (1, 3, 5, 7)
+        ]
+        expected = [root] if root * direction >= 0.0 else []
+        for found in events_of(solve(scene, end, events=events))[0]:
+            assert found.tolist() == pytest.approx(expected, abs=2.0**-52 * abs(end))
+
+
+def test_function_that_is_0_everywhere_has_one_event_and_no_change_of_sign() -> None:
     spin = Scene("spin", omega=(0.0, 0.0, 2.0), moments=(1.0, 1.0, 3.0))
-    assert times_of(spin, 9.0, crosses(1)) == []
-    assert times_of(spin, 9.0, crosses(3, 2.0)) == []
+    for times in (9.0, -9.0, [-9.0, 9.0]):
+        for event in (crosses(1), crosses(3, 2.0)):
+            assert times_of(spin, times, event) == [0.0]
+        assert times_of(spin, times, crosses(1, direction=1)) == times_of(spin, times, flip(1)) == []
+
+
+@pytest.mark.parametrize("direction", [-1, 0, 1])
+def test_an_interval_of_zeros_is_one_event_wherever_the_integration_ends(direction: int) -> None:
+    # Omega is 0, rises from 1 s to 1 in 2 s, and falls from 3 s to 0 in 4 s.
+    push = pulses([1.0, 3.0], [1.0, 1.0], [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)])
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=push)
+    dead = 0.25  # of a function that is 0 about 0.5
+    knots: list[tuple[Callable[..., Any], list[tuple[float, int]]]] = [
+        (lambda t, omega: omega[0], [(0.0, 0), (4.0, -1)]),
+        (lambda t, omega: omega[0] - 1.0, [(2.0, 1)]),
+        (lambda t, omega: (omega[0] - 1.0) ** 3, [(2.0, 1)]),
+        (lambda t, omega: np.sign(np.round(2.0 * omega[0] - 1.0)), [(1.25, 1), (3.25, -1)]),
+        (
+            lambda t, omega: np.maximum(omega[0] - 0.5 - dead, 0.0)
+            + np.minimum(omega[0] - 0.5 + dead, 0.0),
+            [(1.25, 1), (3.25, -1)],
+        ),
+    ]
+    functions = [with_attributes(function, False, direction) for function, _ in knots]
+    for end in (0.5, 1.5, 2.0, 2.2, 2.9, 3.6, 4.0, 4.4, 9.0):
+        found = events_of(solve(scene, end, events=functions))[0]
+        for times, (_, events) in zip(found, knots, strict=True):
+            expected = [t for t, change in events if t <= end and direction in (0, change)]
+            assert times.tolist() == pytest.approx(expected, abs=1e-12), end
+
+
+@pytest.mark.parametrize("end", [20.0, 33.0, 40.0, 60.0, 100.0, 300.0])
+def test_a_body_that_comes_to_rest_slowly_has_no_events(end: float) -> None:
+    ball = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=damping(1.0))
+    events = [crosses(1), flip(1), extremum(1)]
+    assert [x.tolist() for x in events_of(solve(ball, end, events=events))[0]] == [[], [], []]
 
 
 def scipy_events(scene: Scene, end: float, event: Callable[..., Any]) -> list[float]:

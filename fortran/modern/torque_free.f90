@@ -19,6 +19,8 @@ module torque_free
 
   real(dp), parameter :: FLAT = 4e-9_dp       ! difference whose square is negligible
   real(dp), parameter :: FAINT = 1e-240_dp    ! squares of smaller perturbations would underflow
+  ! Smaller numbers may have lost digits, after coefficients and omega were brought near 1.
+  real(dp), parameter :: TINY_FACTOR = 1e-290_dp, TINY_SQUARE = 1e-250_dp
   real(dp), parameter :: LARGE_PHASE = 1e15_dp
   real(dp), parameter :: TWO_PI = 6.28318530717958648_dp
 
@@ -135,6 +137,11 @@ contains
       status = REFUSED
       return
     end if
+    if (any(abs(a) < TINY_FACTOR .and. abs(coefficients) > 0.0_dp) &
+        .and. count(abs(w) > 0.0_dp) > 1) then
+      status = REFUSED
+      return
+    end if
     a = a(orbit%axes)
     w = w(orbit%axes)
     s = abs(a)
@@ -182,8 +189,12 @@ contains
     orbit%levels = 0
     orbit%frequency = 0.0_dp
     orbit%frequency_low = 0.0_dp
-    if (.not. modulus > 0.0_dp) then
+    if (.not. (s(1) > 0.0_dp .and. ((s(3) > 0.0_dp .and. abs(w(2)) > 0.0_dp) .or. &
+                                    (s(2) > 0.0_dp .and. abs(w(3)) > 0.0_dp)))) then
       orbit%kind = STEADY
+    else if (.not. modulus >= TINY_SQUARE) then
+      orbit%kind = STEADY
+      if (count(abs(w) > 0.0_dp) > 1) status = REFUSED
     else if (orbit%amplitude(3) <= FAINT*modulus) then
       ! About the middle axis, except for a negligible perturbation.
       orbit%kind = STEADY

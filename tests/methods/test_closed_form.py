@@ -282,3 +282,23 @@ def test_amplification_before_the_last_time_counts_near_the_separatrix() -> None
     assert alone.ended == both.ended == "sensitive"
     assert both.growth >= alone.growth > 1e7
     assert both.error >= (alone.error or 0.0) > 1e-9
+
+
+@pytest.mark.filterwarnings("ignore::pyharness.ImpossibleBodyWarning")
+@pytest.mark.parametrize(
+    ("moments", "omega", "time"),
+    [
+        ((8.3e20, 7.3e210, 1.0), (0.2, 0.0, -5.4e-12), 3e-11),
+        ((3.2e-125, 1.45e23, 3.1e124), (-0.8, 0.056, 0.0), 1.1e-7),
+        ((1.6e119, 6.4e-120, 2.8e119), (-1.1e-78, 2.2, -1.2e-67), 7.5e-23),
+    ],
+)
+def test_coefficients_that_underflow_are_refused(
+    moments: Triple, omega: Triple, time: float
+) -> None:
+    scene = Scene("", omega, moments=moments)
+    with pytest.raises(InputError, match="underflows"):
+        solve(scene, [time], "closed-form")
+    # A steady rotation has no rates that could be lost.
+    steady = Scene("", (0.5, 0.0, 0.0), moments=moments)
+    assert solve(steady, [time], "closed-form").omega.tolist() == [[0.5, 0.0, 0.0]]

@@ -93,7 +93,8 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
     starts : iterable of numbers, shape (n,)
         The times (s) at which the pulses begin, in any order, at least 1 and at most 10 000.
     durations : iterable of numbers, shape (n,)
-        The durations (s), above 0. A pulse may begin when another ends, but not before.
+        The durations (s), above 0. A pulse may begin when another ends, but not before. Its impulse
+        is torque times duration, even if its end is rounded.
     torque : three numbers, or iterable of three numbers, shape (n, 3)
         The torque about the body axes (N m) of all pulses, or of each.
 
@@ -149,12 +150,20 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
                 f"begins at {after:g} s; allowed: pulses that do not overlap"
             )
     times, values = [_before(ordered[0][0], ends[0])], [(0.0, 0.0, 0.0)]
-    for n, (begin, _, each) in enumerate(ordered):
-        if times[-1] == begin:
-            times.pop()
-            values.pop()
-        times += [begin, ends[n]]
-        values += [each, (0.0, 0.0, 0.0)]
+    begun = acting = 0.0  # start and duration (s) of the last pulses, which touch and are equal
+    for n, (begin, length, each) in enumerate(ordered):
+        if n and ends[n - 1] == begin and ordered[n - 1][2] == each:
+            acting += length
+            del times[-2:], values[-2:]
+        else:
+            begun, acting = begin, length
+            if times[-1] == begin:
+                del times[-1], values[-1]
+        # The end is rounded, and the impulse is not: torque times duration.
+        factor = acting / (ends[n] - begun)
+        x, y, z = each
+        times += [begun, ends[n]]
+        values += [(factor * x, factor * y, factor * z), (0.0, 0.0, 0.0)]
     found = _torque([_held(times, list(axis)) for axis in zip(*values, strict=True)])
     different = any(each != torques[0] for each in torques)
     return ready_term(

@@ -312,6 +312,16 @@ def test_solve_agrees_with_the_reference(name: str, body: dict[str, Any]) -> Non
     assert np.abs(found.omega - wanted).max() < 1e-10 * np.abs(wanted).max()
 
 
+@pytest.mark.parametrize("start", [1.0, 1e3, 1e6, 1e9])
+def test_the_impulse_of_a_late_pulse_is_torque_times_duration(start: float) -> None:
+    ball = {"omega": (0.0, 0.0, 0.0), "moments": (1.0, 1.0, 1.0)}
+    alone = pulses([start], [0.02], (50.0, 0.0, 0.0))
+    train = pulses([start, start + 0.02], [0.02, 0.03], [(20.0, 0.0, 0.0), (20.0, 0.0, 0.0)])
+    for torque in (alone, train):
+        found = solve(Scene("", **ball, torque=torque), [2.0 * start])
+        assert found.omega[0, 0] == pytest.approx(1.0, abs=4e-15)
+
+
 @pytest.mark.parametrize("duration", [1e-2, 1e-5, 1e-7])
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_short_pulse_on_a_body_at_rest_sets_its_scale(duration: float, side: float) -> None:
@@ -325,7 +335,10 @@ def test_short_pulse_on_a_body_at_rest_sets_its_scale(duration: float, side: flo
         found = solve(scene, [side * 10.0], tolerance=tolerance)
         error = np.abs(found.omega - truth).max() / np.abs(truth).max()
         assert found.error is not None
-        assert error <= found.error <= tolerance
+        assert found.growth is not None
+        # Near rounding errors the estimate is one by order of magnitude.
+        assert error <= found.error + 4e-15 * found.growth
+        assert found.error <= tolerance
 
 
 @pytest.mark.parametrize("duration", [1e-6, 1e-8])

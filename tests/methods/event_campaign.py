@@ -113,7 +113,7 @@ def _product(end: float, at_edges: bool, rng: np.random.Generator) -> Planted:
 def _of_odd_multiplicity(end: float, rng: np.random.Generator) -> Planted:
     """Return a product of factors to the powers 1, 3, 5 and 7, whose signs are exact."""
     roots = end * (np.arange(3) + rng.uniform(0.3, 0.7, 3)) / 3.0
-    powers = rng.permutation([1, rng.choice([3, 5, 7]), rng.choice([1, 3])])
+    powers = rng.permutation([1, 1, rng.choice([3, 5, 7])])
     sign = rng.choice([-1.0, 1.0])
 
     def function(t: Any, omega: Any) -> Any:

@@ -8,8 +8,9 @@ import numpy as np
 
 from pyharness.methods import dense
 from pyharness.methods.closed_form import period_of
+from pyharness.methods.event_fits import Solution
 from pyharness.methods.event_functions import EventFunction
-from pyharness.methods.events import Solution, found_events, no_events
+from pyharness.methods.events import found_events, no_events
 from pyharness.methods.periodic_events import PERIODS, are_of_omega
 from pyharness.methods.registry import METHODS
 from pyharness.methods.sides import row_names

@@ -90,12 +90,13 @@ class Solution:
             moved = states.copy()
             moved[:, k] += _SHIFT * (largest if k < 3 else 1.0)
             found += own * np.abs(self.values(g, times, moved) - value) / _SHIFT
-        for k in range(0 if rates is None else 3):
-            moved = rates.copy()
-            moved[:, k] += _SHIFT * np.abs(rates[:, :3]).max(axis=1)
-            found += ROUNDING * np.abs(g(times, states, moved) - value) / _SHIFT
+        if rates is not None:
+            largest = np.abs(rates[:, :3]).max(axis=1)
+            for k in range(3):
+                moved = rates.copy()
+                moved[:, k] += _SHIFT * largest
+                found += ROUNDING * np.abs(g(times, states, moved) - value) / _SHIFT
         return found
-
 
     @cached_property
     def _largest(self) -> Array:
@@ -273,7 +274,9 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
     low, high = fits.low[begins], fits.high[ends]
     earlier = np.minimum(fits.low[begins - 1], low)
     later = np.maximum(fits.high[(ends + 1) % len(sizes)], high)
-    low = _refined(g, solution, low, earlier, np.maximum(2.0 * sizes[begins], noise[begins] / _SUDDEN))
+    low = _refined(
+        g, solution, low, earlier, np.maximum(2.0 * sizes[begins], noise[begins] / _SUDDEN)
+    )
     high = _refined(g, solution, high, later, np.maximum(2.0 * sizes[ends], noise[ends] / _SUDDEN))
     noise = noise[begins]
     earlier, later = _beside(solution, low, -1), _beside(solution, high, 1)

@@ -100,7 +100,7 @@ class DenseOutput:
         Parameters
         ----------
         t : float or array_like, shape (n,)
-            Times from `t_min` to `t_max` (s), in any order. A time at most 4 units in the last place
+            Times from `t_min` to `t_max` (s), in any order. A time up to 4 units in the last place
             beyond an end is taken for the end.
 
         Returns

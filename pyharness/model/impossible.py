@@ -39,7 +39,7 @@ class _Body(Protocol):
 
 
 def breaks_triangle(moments: Iterable[Any]) -> bool:
-    """Return whether the largest of three moments, floats or Fractions, exceeds the sum of the rest.
+    """Return whether the largest of three floats or Fractions exceeds the sum of the others.
 
     A flat body, whose largest moment equals the sum, does not, however its numbers are rounded.
     """

@@ -266,7 +266,8 @@ class Scene:
         """Whether no rigid body has the moments of inertia of the scene.
 
         The largest moment then exceeds the sum of the other two, by more than rounding errors
-        (2**-50 of it) explain. The result is false for a body with coefficients. An inertia that changes with time is that at time 0.
+        (2**-50 of it) explain. The result is false for a body with coefficients. An inertia that
+        changes with time is that at time 0.
         """
         moments, inertia = self.moments, self.inertia
         if isinstance(self.changing, ChangingMoments):

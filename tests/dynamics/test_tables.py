@@ -314,11 +314,10 @@ def test_solve_agrees_with_the_reference(name: str, body: dict[str, Any]) -> Non
 
 @pytest.mark.parametrize("start", [1.0, 1e3, 1e6, 1e9])
 def test_the_impulse_of_a_late_pulse_is_torque_times_duration(start: float) -> None:
-    ball = {"omega": (0.0, 0.0, 0.0), "moments": (1.0, 1.0, 1.0)}
     alone = pulses([start], [0.02], (50.0, 0.0, 0.0))
     train = pulses([start, start + 0.02], [0.02, 0.03], [(20.0, 0.0, 0.0), (20.0, 0.0, 0.0)])
     for torque in (alone, train):
-        found = solve(Scene("", **ball, torque=torque), [2.0 * start])
+        found = solve(Scene("", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), torque=torque), [2.0 * start])
         assert found.omega[0, 0] == pytest.approx(1.0, abs=4e-15)
 
 

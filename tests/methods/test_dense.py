@@ -186,7 +186,10 @@ def test_shapes_and_defaults() -> None:
     ("given", "message"),
     [
         (2.5, "dense output: t = 2.5 s; allowed: numbers from 0 to 2 s"),
-        (2.0 + 5.0 * 2.0**-51, "dense output: t = 2.000000000000002 s; allowed: numbers from 0 to 2"),
+        (
+            2.0 + 5.0 * 2.0**-51,
+            "dense output: t = 2.000000000000002 s; allowed: numbers from 0 to 2",
+        ),
         ([0.5, -1e-9], "dense output: t = -1e-09 s; allowed"),
         (math.nan, "dense output: t = nan s; allowed"),
         ("now", "dense output: a time is no number; allowed"),

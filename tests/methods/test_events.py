@@ -173,7 +173,9 @@ def test_function_that_is_0_everywhere_has_one_event_and_no_change_of_sign() -> 
     for times in (9.0, -9.0, [-9.0, 9.0]):
         for event in (crosses(1), crosses(3, 2.0)):
             assert times_of(spin, times, event) == [0.0]
-        assert times_of(spin, times, crosses(1, direction=1)) == times_of(spin, times, flip(1)) == []
+        assert (
+            times_of(spin, times, crosses(1, direction=1)) == times_of(spin, times, flip(1)) == []
+        )
 
 
 @pytest.mark.parametrize("direction", [-1, 0, 1])
@@ -188,8 +190,9 @@ def test_an_interval_of_zeros_is_one_event_wherever_the_integration_ends(directi
         (lambda t, omega: (omega[0] - 1.0) ** 3, [(2.0, 1)]),
         (lambda t, omega: np.sign(np.round(2.0 * omega[0] - 1.0)), [(1.25, 1), (3.25, -1)]),
         (
-            lambda t, omega: np.maximum(omega[0] - 0.5 - dead, 0.0)
-            + np.minimum(omega[0] - 0.5 + dead, 0.0),
+            lambda t, omega: (
+                np.maximum(omega[0] - 0.5 - dead, 0.0) + np.minimum(omega[0] - 0.5 + dead, 0.0)
+            ),
             [(1.25, 1), (3.25, -1)],
         ),
     ]

@@ -188,9 +188,9 @@ contains
   end subroutine set_values
 
   pure subroutine saturate(tape, t_low, h, a)
-    !! Replace large exponentials by smaller ones if a value overflows, unless a derivative shows the
-    !! difference: a logistic function, or the reciprocal of a hyperbolic cosine, is finite where an
-    !! exponential in it overflows.
+    !! Replace large exponentials by smaller ones if a value overflows, unless a derivative shows
+    !! the difference: a logistic function, or the reciprocal of a hyperbolic cosine, is finite
+    !! where an exponential in it overflows.
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t_low, h  !! s
     real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)

@@ -80,7 +80,7 @@ contains
     logical :: is_rejected                    ! whether a longer step was rejected
     logical :: has_values                     ! whether terms 0 of all slots are known
     integer :: is_short
-    integer :: i, k, n, n_before, tries, last_term
+    integer :: i, n, n_before, tries, last_term
     type(step_limit_t) :: limit
 
     n = tape%n_unknowns

@@ -23,9 +23,14 @@ module tape_series
   real(dp), parameter :: LARGEST = 1e290_dp
   real(dp), parameter :: SMALL_ENOUGH = 1e20_dp ! for all powers of an exponential that are likely
   real(dp), parameter, public :: LARGE_ARGUMENT = 210.0_dp
-  integer, parameter :: MOST_POWER = 300, POWERS_APART = 7, DIFFERENT = 20
-  ! Powers of 2 for all exponentials, to see what depends on them.
-  integer, parameter :: LARGE = 1000, ONE = 0, OF_SLOT = -1, NONE = -2
+  ! What replaces exponentials of large arguments: nothing, a power of 2, a larger one, moderate
+  ! numbers, or powers of 2 that differ between operations (from ONE_WAY on).
+  integer, parameter :: NONE = 0, EQUAL = 1, LARGE = 2, MODERATE = 3, ONE_WAY = 4, ANOTHER_WAY = 5
+  integer, parameter :: LEAST_POWER = 167, MOST_POWER = 300, HUGE_POWER = 1000, APART = 600
+  ! What replaces exponentials of small arguments, if these are LARGE and MODERATE.
+  real(dp), parameter :: SMALL(LARGE:MODERATE) = 2.0_dp**[-303, -140]
+  ! Relative change of time and unknowns, since a factor may be 0 by chance.
+  real(dp), parameter :: MOVED = 2.0_dp**(-10)
   ! Largest part of a derivative that may depend on them.
   real(dp), parameter :: UNSEEN = 2.0_dp**(-150)
   ! Largest terms of perturbations that a step leaves out, relative.
@@ -188,45 +193,96 @@ contains
   end subroutine set_values
 
   pure subroutine saturate(tape, t_low, h, a)
-    !! Replace large exponentials by smaller ones if a value overflows, unless a derivative shows
-    !! the difference: a logistic function, or the reciprocal of a hyperbolic cosine, is finite
-    !! where an exponential in it overflows.
+    !! Replace large exponentials by smaller ones if a value overflows, unless a derivative shows a
+    !! difference: a logistic function, or the reciprocal of a hyperbolic cosine, is finite where an
+    !! exponential in it overflows.
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t_low, h  !! s
     real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)
-    real(dp), dimension(tape%n_unknowns) :: found, large_ones, ones
-    logical :: is_large
+    real(dp) :: inputs(0:tape%n_unknowns) ! time and unknowns
+    real(dp) :: most                      ! of the unknowns
+    logical :: is_large, is_unseen
+    integer :: i, last
 
     if (all(abs(a(0, :)) <= LARGEST)) return
-    call find_derivatives(tape, t_low, h, LARGE, a, large_ones)
-    call find_derivatives(tape, t_low, h, ONE, a, ones)
-    call find_derivatives(tape, t_low, h, OF_SLOT, a, found)
-    ! NaN is not allowed.
-    if (all(abs(found - large_ones) <= UNSEEN*max(abs(found), abs(ones)))) return
-    call set_values_with(tape, t_low, h, NONE, a, is_large)
+    call compare_derivatives(tape, t_low, h, ONE_WAY, a, is_unseen)
+    if (is_unseen) then
+      last = FIRST_UNKNOWN + tape%n_unknowns - 1
+      inputs = a(0, TIME_SLOT:last)
+      most = maxval(abs(inputs(1:)))
+      if (most == 0.0_dp) most = 1.0_dp
+      a(0, TIME_SLOT) = inputs(0) + MOVED*h
+      do i = 1, tape%n_unknowns
+        a(0, FIRST_UNKNOWN - 1 + i) = inputs(i) + MOVED*fraction_of(i)*most
+      end do
+      call compare_derivatives(tape, t_low, h, ANOTHER_WAY, a, is_unseen)
+      a(0, TIME_SLOT:last) = inputs
+    end if
+    call set_values_with(tape, t_low, h, merge(EQUAL, NONE, is_unseen), a, is_large)
   end subroutine saturate
 
-  pure subroutine find_derivatives(tape, t_low, h, power, a, derivatives)
-    !! Compute the derivatives of the unknowns with a power of 2 in place of large exponentials.
+  pure subroutine compare_derivatives(tape, t_low, h, way, a, is_unseen)
+    !! Compare the derivatives of the unknowns with different numbers in place of exponentials.
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t_low, h  !! s
-    integer, intent(in) :: power
+    integer, intent(in) :: way        !! ONE_WAY or ANOTHER_WAY
+    real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)
+    logical, intent(out) :: is_unseen !! whether the exponentials do not matter
+    real(dp), dimension(tape%n_unknowns) :: found, large_ones, scale
+
+    call find_derivatives(tape, t_low, h, LARGE, a, large_ones)
+    call find_derivatives(tape, t_low, h, MODERATE, a, scale)
+    call find_derivatives(tape, t_low, h, way, a, found)
+    ! NaN is not allowed, and a pole is no scale.
+    where (.not. abs(scale) <= LARGEST) scale = 0.0_dp
+    is_unseen = all(abs(found - large_ones) <= UNSEEN*max(abs(found), abs(scale)))
+  end subroutine compare_derivatives
+
+  pure real(dp) function replacement(powers, n)
+    !! Return what replaces the exponential of a large argument that is operation n. Powers of 2 are
+    !! rounded alike.
+    integer, intent(in) :: powers, n
+
+    select case (powers)
+    case (EQUAL)
+      replacement = 2.0_dp**MOST_POWER
+    case (LARGE)
+      replacement = 2.0_dp**HUGE_POWER
+    case (MODERATE)
+      replacement = 1.0_dp + fraction_of(n)
+    case default
+      replacement = 2.0_dp**(LEAST_POWER + int(APART*fraction_of(powers*n)))
+    end select
+  end function replacement
+
+  pure real(dp) function fraction_of(n)
+    !! Return a number from 0 to 1 that has no relation with those of other n.
+    integer, intent(in) :: n
+
+    fraction_of = modulo(1e4_dp*sin(real(n, dp)), 1.0_dp)
+  end function fraction_of
+
+  pure subroutine find_derivatives(tape, t_low, h, powers, a, derivatives)
+    !! Compute the derivatives of the unknowns with powers of 2 in place of exponentials.
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: t_low, h  !! s
+    integer, intent(in) :: powers
     real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)
     real(dp), intent(out) :: derivatives(:)
     logical :: is_large
     integer :: i
 
-    call set_values_with(tape, t_low, h, power, a, is_large)
+    call set_values_with(tape, t_low, h, powers, a, is_large)
     do i = 1, size(derivatives)
       derivatives(i) = value_of(tape, size(tape%constants) - size(derivatives) + i, a)
     end do
   end subroutine find_derivatives
 
-  pure subroutine set_values_with(tape, t_low, h, power, a, is_large)
+  pure subroutine set_values_with(tape, t_low, h, powers, a, is_large)
     !! Compute term 0 of all slots, and all terms of the tables.
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t_low, h  !! s
-    integer, intent(in) :: power      !! of 2, in place of large exponentials; or NONE, or OF_SLOT
+    integer, intent(in) :: powers     !! in place of exponentials: NONE, EQUAL, LARGE, ...
     real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)
     logical, intent(out) :: is_large  !! whether an exponential or its powers may overflow
     integer :: n
@@ -246,13 +302,14 @@ contains
           a(0, out) = sqrt(a(0, first))
         case (EXPONENTIAL)
           ! Term 0 of the second slot says that the exponential is constant.
-          a(0, out + 1) = merge(1.0_dp, 0.0_dp, power /= NONE .and. a(0, first) > LARGE_ARGUMENT)
-          if (a(0, out + 1) == 0.0_dp) then
-            a(0, out) = exp(a(0, first))
-          else if (power == OF_SLOT) then
-            a(0, out) = 2.0_dp**(MOST_POWER - POWERS_APART*mod(n, DIFFERENT))
+          a(0, out + 1) = merge(1.0_dp, 0.0_dp, powers /= NONE .and. a(0, first) > LARGE_ARGUMENT)
+          if (a(0, out + 1) /= 0.0_dp) then
+            a(0, out) = replacement(powers, n)
+          else if (any(powers == [LARGE, MODERATE]) .and. a(0, first) < -LARGE_ARGUMENT) then
+            ! A product with a large one may be of any size.
+            a(0, out) = SMALL(powers)
           else
-            a(0, out) = 2.0_dp**power
+            a(0, out) = exp(a(0, first))
           end if
           if (.not. a(0, out) <= SMALL_ENOUGH) is_large = .true.
         case (TANGENT)

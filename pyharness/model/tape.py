@@ -173,7 +173,9 @@ def _value(table: Table, time: float) -> float:
 # For arguments of type float. A division by zero raises ZeroDivisionError.
 FLOATS: Functions[float] = Functions(float, _sqrt, _exp, math.tanh, sine, cosine, _value)
 # Large exponentials that overflow are replaced by powers of 2, as in tape_series.f90.
-_LARGE_ARGUMENT, _LEAST_POWER, _MOST_POWER, _ALL_LARGE = 210.0, 167.0, 300.0, 1000.0
+_LARGE_ARGUMENT = 210.0
+# The number for small arguments, if they are replaced too.
+_SMALL = {"large": 2.0**-303, "moderate": 2.0**-140}
 _UNSEEN = 2.0**-150
 
 
@@ -186,20 +188,28 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     found = evaluate(tape, inputs, FLOATS)
     if all(map(math.isfinite, found)) or all(each.kind != "exp" for each in tape.operations):
         return found
-    # The power differs between arguments, so that a quotient of two exponentials is seen.
-    own, large, ones = (
-        evaluate(tape, inputs, replace(FLOATS, exp=partial(_saturated, *powers)))
-        for powers in ((_LEAST_POWER, _MOST_POWER), (_ALL_LARGE, _ALL_LARGE), (0.0, 0.0))
+    own, other, large, moderate = (
+        evaluate(tape, inputs, replace(FLOATS, exp=partial(_saturated, kind)))
+        for kind in ("own", "other", "large", "moderate")
     )
+    # A pole is no scale.
+    scales = (abs(x) if math.isfinite(x) else 0.0 for x in moderate)
     if all(
-        abs(x - y) <= _UNSEEN * max(abs(x), abs(z))
-        for x, y, z in zip(own, large, ones, strict=True)
+        max(abs(x - z), abs(y - z)) <= _UNSEEN * max(abs(x), scale) and math.isfinite(y)
+        for x, y, z, scale in zip(own, other, large, scales, strict=True)
     ):
         return own
     return found
 
 
-def _saturated(least: float, most: float, x: float) -> float:
-    if x <= _LARGE_ARGUMENT:
+def _saturated(kind: str, x: float) -> float:
+    """Return what replaces an exponential; powers of 2 are rounded alike."""
+    if x < -_LARGE_ARGUMENT and kind in _SMALL:
+        return _SMALL[kind]
+    if not x > _LARGE_ARGUMENT:
         return _exp(x)
-    return math.exp2(least + (most - least) * math.fmod(math.frexp(x)[0] * 1e4, 1.0))
+    if kind == "large":
+        return 2.0**1000
+    # It differs between arguments, so that a quotient of two exponentials is seen.
+    part = math.fmod(math.frexp(min(x, 1e308))[0] * (1e7 if kind == "other" else 1e4), 1.0)
+    return 1.01 + part if kind == "moderate" else math.ldexp(1.0, 167 + int(600.0 * part))

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from pyharness import Scene, Stepper, Taylor, prepare, solve, solve_many
 from pyharness.model.state_torque import recorded
+from pyharness.truth.reference import reference
 
 CENTRE, WIDTH = 20.0, 0.02
 
@@ -81,3 +82,30 @@ def test_value_in_floats(name: str) -> None:
 def test_torque_that_depends_on_the_exponential_is_an_overflow(torque: Any) -> None:
     for method in ("auto", "dop853"):
         assert solve(_scene(torque), 25.0, method, 1e-6).ended == "overflow"
+
+
+# Torques of omega3, and whether their values in floats are numbers.
+RATIOS: dict[str, tuple[Callable[..., Any], bool]] = {
+    "to one": (lambda t, w: np.exp(690.0 * w) / (np.exp(700.0 * w) - 1.0), True),
+    "of ratios": (
+        lambda t, w: np.exp(700 * w) / np.exp(699 * w) - np.exp(701 * w) / np.exp(699.5 * w),
+        True,
+    ),
+    "times 0": (lambda t, w: np.sin(t) * np.exp(698 * w) / (1.0 + np.exp(700 * w)), True),
+    "of a pole": (lambda t, w: (np.exp(800 * w) + 1.0) / (np.exp(800 * w) - 1.0), True),
+    "lost": (lambda t, w: np.exp(900.0 * w) * np.exp(-899.0 * w), False),
+    "lost and times 0": (lambda t, w: np.sin(t) * np.exp(898 * w) / np.exp(900 * w), False),
+}
+
+
+@pytest.mark.parametrize("method", ["auto", "dop853"])
+@pytest.mark.parametrize("name", RATIOS)
+def test_ratio_of_exponentials_is_right_or_an_overflow(name: str, method: str) -> None:
+    torque, is_number = RATIOS[name]
+    scene = Scene(
+        "", (0.0, 0.0, 0.99), moments=(1, 1, 1), torque=lambda t, w: [0.0, 0.0, torque(t, w[2])]
+    )
+    found = solve(scene, [0.1], method, 1e-11)
+    assert found.ended == ("complete" if is_number else "overflow")
+    if is_number:
+        assert found.omega == pytest.approx(reference(scene, [0.1]).omega, abs=1e-9)

@@ -82,7 +82,7 @@ class Run:
         is the longest allowed step (s). The result contains the solution at `times` (s), or dense
         output if `times` is None. Times in the result are in the unit of time `self.unit`, which is
         a number of seconds. The integration begins with `state`, if given, at the time `begin`
-        (s). Raise NoNumberError if Radau's linear algebra refuses a number.
+        (s). Raise NoNumberError if Radau's linear algebra refuses a number, or the time is NaN.
         """
         from scipy.integrate import solve_ivp
 
@@ -147,6 +147,8 @@ class Run:
 
     def _counted(self, time: float, state: Sequence[float]) -> list[float]:
         self.evaluations += 1
+        if math.isnan(time):
+            raise NoNumberError  # the first step follows from the rates, which may be NaN after 0
         if self.evaluations > self.most:
             raise self.work_error(time * self.unit)
         if self.unit == 1.0:

@@ -20,6 +20,7 @@ def _scene(torque: Any) -> Scene:
 UNDEFINED = {
     "root of time": (lambda t, w: [np.sqrt(0.5 - t), 0.0, 0.0], "t = 0.5 s: the square root", 1),
     "root at the start": (lambda t, w: [np.sqrt(t), 0.0, 0.0], "t = 0 s: the square root", 0),
+    "root of the past": (lambda t, w: [np.sqrt(-t), 0.0, 0.0], "t = 0 s: the square root", 0),
     "0/0": (lambda t, w: [0.1 * np.sin(t) / t, 0.0, 0.0], "t = 0 s: 0/0; write", 0),
     "sign": (lambda t, w: [-w[0] / np.sqrt(w[0] ** 2), 0.0, 0.0], "s: the square root", 0),
 }

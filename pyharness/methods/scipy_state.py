@@ -98,6 +98,7 @@ def solve_state(
     run = _StateRun(scene, times[-1], name, effort, most, tolerance)
     nothing = np.empty((0, len(run.start)))
     if run.is_singular():
+        run.check_undefined()
         _check_attitude(scene)
         return rows_of([], nothing, 1, len(times), "overflow")
     if times[-1] == 0.0:
@@ -108,6 +109,8 @@ def solve_state(
         rest = np.tile(run.start, (len(times), 1))
         return rows_of(times, rest, run.evaluations, len(times), "complete")
     found = _refined(run, times, tolerance, scale)
+    if not found.is_complete:
+        run.check_undefined()
     count = len(found.state)
     ended = "overflow" if not found.is_complete else "complete" if run.is_bounded else "unchecked"
     return rows_of(times[:count], found.state, run.evaluations, len(times), ended)
@@ -242,11 +245,12 @@ class _StateRun(Run):
         start = (*scene.omega, *(scene.attitude or ()))
         own = self._between_breaks(slopes)
         if torque.tape is None:
-            own = _guarded(slopes, isinstance(torque.function, CompiledTorque))
+            own = self._guarded(slopes, isinstance(torque.function, CompiledTorque))
         super().__init__(start, own, rate, end, name, effort, limit)
         self.name = name
         self.is_smooth = torque.tape is not None
         self._between = -math.inf, math.inf
+        self._undefined: float | None = None
         self._integrations = 0
         self._reached, self._largest, self._stuck = 0.0, 0.0, 0
         self._spans, self.is_bounded = [Span(end, math.inf)], True
@@ -262,6 +266,42 @@ class _StateRun(Run):
 
         return between
 
+    def _guarded(self, slopes: RightHandSide, is_compiled: bool) -> RightHandSide:
+        """Return a right-hand side that raises InputError if an opaque function fails.
+
+        It records the time of a NaN, which is no failure if SciPy passes it by shorter steps.
+        """
+
+        def guarded(time: float, state: Sequence[float]) -> list[float]:
+            try:
+                found = slopes(time, state)
+            except InputError:
+                raise
+            except Exception as error:
+                raise TimedError(
+                    f"[torque]: the function raised {type(error).__name__} at t = {{time}} s: "
+                    f"{printable(str(error))}; allowed: a function that returns three components "
+                    "in N m",
+                    float(time),
+                ) from error
+            # A large omega may be about to become infinite, and a compiled function may lack the
+            # attitude.
+            is_odd = any(map(math.isnan, found)) and max(map(abs, state[:3])) <= _ORDINARY
+            if is_odd and not is_compiled:
+                self._undefined = float(time)
+            return found
+
+        return guarded
+
+    def check_undefined(self) -> None:
+        """Raise InputError if an opaque function has returned NaN since the last step."""
+        if self._undefined is not None:
+            raise TimedError(
+                "[torque]: the function returned NaN at t = {time} s; allowed: three finite "
+                "components in N m",
+                self._undefined,
+            )
+
     def after_step(self, time: float, state: Sequence[float]) -> None:
         """Record the time (s) and |omega|; raise NoNumberError if the steps are too short."""
         self._stuck = self._stuck + 1 if time == self._reached else 0
@@ -271,6 +311,8 @@ class _StateRun(Run):
         omega = max(map(abs, state[:3]))
         if math.isfinite(omega):
             self._largest = max(self._largest, float(omega))
+            if not self._stuck:
+                self._undefined = None
 
     def is_singular(self) -> bool:
         """Return whether a rate at time 0 is not finite.
@@ -380,32 +422,3 @@ def _interior(first: float, second: float) -> tuple[float, float]:
     """Return the smallest and largest time between two times, without these."""
     inner = math.nextafter(first, second), math.nextafter(second, first)
     return min(inner), max(inner)
-
-
-def _guarded(slopes: RightHandSide, is_compiled: bool) -> RightHandSide:
-    """Return a right-hand side that raises InputError if an opaque function fails or is NaN."""
-
-    def guarded(time: float, state: Sequence[float]) -> list[float]:
-        try:
-            found = slopes(time, state)
-        except InputError:
-            raise
-        except Exception as error:
-            raise TimedError(
-                f"[torque]: the function raised {type(error).__name__} at t = {{time}} s: "
-                f"{printable(str(error))}; allowed: a function that returns three components in "
-                "N m",
-                float(time),
-            ) from error
-        # A large omega may be about to become infinite, and a compiled function may lack the
-        # attitude.
-        is_odd = any(map(math.isnan, found)) and max(map(abs, state[:3])) <= _ORDINARY
-        if is_odd and not is_compiled:
-            raise TimedError(
-                "[torque]: the function returned NaN at t = {time} s; allowed: three finite "
-                "components in N m",
-                float(time),
-            )
-        return found
-
-    return guarded

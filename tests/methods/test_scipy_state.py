@@ -229,6 +229,16 @@ def test_an_opaque_function_that_returns_nan_is_refused_with_the_time(
 
 
 @pytest.mark.parametrize("name", METHODS)
+def test_a_nan_in_a_trial_step_is_passed_by_shorter_steps(name: str) -> None:
+    """Near its end omega3 is e**-15.6; trial steps pass 0, where the torque is NaN."""
+    torque = opaque(lambda t, w: (0.0, 0.0, 50.0 * w[2] * np.log(w[2])))
+    scene = Scene("", (0.0, 0.0, 0.9), (1.0, 1.0, 1.0), torque=torque)
+    found = scipy_method(name)(scene, [0.1], 1e-7)
+    assert found.ended == "complete"
+    assert found.omega[0, 2] == pytest.approx(0.9 ** math.exp(5.0), abs=1e-7)
+
+
+@pytest.mark.parametrize("name", METHODS)
 @pytest.mark.parametrize("later", [0.0, 0.4])
 def test_an_exception_of_an_opaque_function_is_the_cause_of_an_input_error(
     name: str, later: float

@@ -199,24 +199,26 @@ contains
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t_low, h  !! s
     real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)
-    real(dp) :: inputs(0:tape%n_unknowns) ! time and unknowns
-    real(dp) :: most                      ! of the unknowns
+    real(dp) :: unknowns(tape%n_unknowns), time, most
     logical :: is_large, is_unseen
-    integer :: i, last
+    integer :: i
 
     if (all(abs(a(0, :)) <= LARGEST)) return
     call compare_derivatives(tape, t_low, h, ONE_WAY, a, is_unseen)
     if (is_unseen) then
-      last = FIRST_UNKNOWN + tape%n_unknowns - 1
-      inputs = a(0, TIME_SLOT:last)
-      most = maxval(abs(inputs(1:)))
+      time = a(0, TIME_SLOT)
+      unknowns = [(a(0, FIRST_UNKNOWN - 1 + i), i=1, tape%n_unknowns)]
+      most = maxval(abs(unknowns))
       if (most == 0.0_dp) most = 1.0_dp
-      a(0, TIME_SLOT) = inputs(0) + MOVED*h
+      a(0, TIME_SLOT) = time + MOVED*h
       do i = 1, tape%n_unknowns
-        a(0, FIRST_UNKNOWN - 1 + i) = inputs(i) + MOVED*fraction_of(i)*most
+        a(0, FIRST_UNKNOWN - 1 + i) = unknowns(i) + MOVED*fraction_of(i)*most
       end do
       call compare_derivatives(tape, t_low, h, ANOTHER_WAY, a, is_unseen)
-      a(0, TIME_SLOT:last) = inputs
+      a(0, TIME_SLOT) = time
+      do i = 1, tape%n_unknowns
+        a(0, FIRST_UNKNOWN - 1 + i) = unknowns(i)
+      end do
     end if
     call set_values_with(tape, t_low, h, merge(EQUAL, NONE, is_unseen), a, is_large)
   end subroutine saturate

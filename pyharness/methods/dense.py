@@ -147,7 +147,7 @@ def _first_edges(
     attitude = found.attitude is not None or scene.torque.needs_attitude
     steps: dict[float, float] = {}
     for end in ends:
-        steps |= step_lengths(scene, attitude, end, tolerance, bounds)[0]
+        steps |= step_lengths(scene, attitude, end, tolerance, bounds)
     step_ends = np.array(sorted(steps))
     lengths = np.array([steps[each] for each in step_ends])
     more: list[float] = []

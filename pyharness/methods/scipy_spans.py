@@ -1,22 +1,29 @@
-"""The spans of an integration by SciPy under a recorded torque, each with its longest step.
+"""The Taylor series of a recorded torque, beside an integration of it by SciPy.
 
-SciPy's methods see a torque only where they evaluate it, and may pass a short change of it. The
-steps of its Taylor series are as short as the torque demands, so that they bound SciPy's steps.
+SciPy's methods see a torque only where they evaluate it, and may pass a short change of it. Where
+their results differ from the series, its steps, which are as short as the torque demands, bound
+theirs.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
-from pyharness.methods.stepper import step_lengths
+import numpy as np
+
+from pyharness.methods.stepper import steps_to
+from pyharness.model.array_type import Array
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 
 # SciPy's longest step over the steps of the series. LSODA evaluates a torque once in a step.
 _PART = 0.5
-# Of the series: stiff equations, which SciPy's implicit methods solve, have too many.
+# Of the series: equations so stiff that it has more are left to SciPy's implicit methods.
 _MOST_STEPS = 20_000
 # Largest ratio of the steps of the series in a span.
 _RATIO = 8.0
+# Tolerance of a step of the series, over that of the result.
+_FINER = 0.01
 
 
 class Span(NamedTuple):
@@ -26,31 +33,54 @@ class Span(NamedTuple):
     longest: float
 
 
-def spans_of(scene: Scene, end: float, tolerance: float) -> tuple[list[Span], bool]:
-    """Return the spans from time 0 to `end` (s), and whether the series reaches `end`.
+class Beside(NamedTuple):
+    """The rows of a series at the requested times, and the spans that its steps bound."""
 
-    A span ends where a table of the torque changes.
-    """
+    rows: Array  # shape (n, 3) or (n, 7)
+    spans: list[Span]
+
+
+def bounds_of(scene: Scene, end: float) -> list[float]:
+    """Return the times (s) at which a table of the torque changes before `end`, and `end`."""
     torque = scene.torque
     assert isinstance(torque, StateTorque)
-    assert torque.tape is not None
-    inside = {time for time in torque.tape.breaks if 0.0 < time / (end or 1.0) < 1.0}
-    bounds = sorted({*inside, end}, key=abs)
+    breaks = [] if torque.tape is None else torque.tape.breaks
+    return sorted({*(time for time in breaks if 0.0 < time / (end or 1.0) < 1.0), end}, key=abs)
+
+
+def series_beside(scene: Scene, times: Sequence[float], tolerance: float) -> Beside | None:
+    """Return the series of a scene with a recorded torque; None if it does not reach the end.
+
+    `times` (s) are in order away from 0.
+    """
+    end, bounds = times[-1], bounds_of(scene, times[-1])
     attitude = scene.attitude is not None
-    lengths, reached = step_lengths(scene, attitude, end, tolerance, bounds, _MOST_STEPS)
+    rows = [[*scene.omega, *(scene.attitude or ())]] if times[0] == 0.0 else []
+    lengths: dict[float, float] = {}
+    reached = 0.0
+    for before, stepper in steps_to(scene, attitude, end, _FINER * tolerance, _MOST_STEPS):
+        reached = stepper.time
+        lengths[reached] = abs(reached - before)
+        after = len(rows)
+        while after < len(times) and abs(times[after]) <= abs(reached):
+            after += 1
+        rows += stepper.at(times[len(rows) : after]).T.tolist()
     if reached != end:
-        return [Span(time, math.inf) for time in bounds], False
+        return None
+    return Beside(np.array(rows), _spans(lengths, bounds))
+
+
+def _spans(lengths: dict[float, float], bounds: Sequence[float]) -> list[Span]:
     spans: list[Span] = []
     least, most, last = math.inf, 0.0, 0.0
-    for time in sorted({*lengths, *bounds}, key=abs):
-        # A step that a bound has cut says nothing.
-        length = lengths.get(time, least)
+    for time, length in lengths.items():
+        if time in bounds:
+            # It was cut, and says nothing.
+            spans.append(Span(time, _PART * (length if least == math.inf else least)))
+            least, most, last = math.inf, 0.0, 0.0
+            continue
         if max(most, length) > _RATIO * min(least, length) and last:
             spans.append(Span(last, _PART * least))
             least, most = math.inf, 0.0
-            length = lengths.get(time, math.inf)
         least, most, last = min(least, length), max(most, length), time
-        if time in bounds:
-            spans.append(Span(time, _PART * least))
-            least, most, last = math.inf, 0.0, 0.0
-    return spans, True
+    return spans

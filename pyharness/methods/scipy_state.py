@@ -25,7 +25,7 @@ from pyharness.methods.scipy_run import (
     Run,
     rows_of,
 )
-from pyharness.methods.scipy_spans import Span, spans_of
+from pyharness.methods.scipy_spans import Span, bounds_of, series_beside
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.compiled_torque import CompiledTorque
 from pyharness.model.errors import InputError, TimedError, printable
@@ -57,6 +57,8 @@ _MOST_GUESSES = 200
 _MOST_STUCK = 50
 # An omega that has grown by this factor when the phase is too large grows without bound.
 _UNBOUNDED = 1e3
+# Largest difference from the series of a recorded torque, in tolerances.
+_AGREEMENT = 0.5
 _ORDINARY = 1e100  # rad/s; products of such are numbers
 # Local tolerances of the two integrations that determine the smallest tolerance.
 _TRIAL = (1e-7, 1e-8)
@@ -90,12 +92,12 @@ def solve_state(
     |omega|, and the attitude as an angle (rad). `effort` is the factor on the work limit, and
     `most` is the limit in right-hand sides of a body without torque. The trajectory ends early,
     with the ending ``overflow``, before a time at which omega grows without bound or the torque is
-    singular. Its ending is ``unchecked`` if the series of a recorded torque, which bounds the
-    steps, does not reach the last time. Raise InputError if an opaque function raises an exception,
-    if the torque needs an attitude that the scene does not have, or if the tolerance or the work
-    limit can't be met.
+    singular. Its ending is ``unchecked`` if the series of a recorded torque, with which it is
+    compared, does not reach the last time. Raise InputError if an opaque function raises an
+    exception, if the torque needs an attitude that the scene does not have, or if the tolerance or
+    the work limit can't be met.
     """
-    run = _StateRun(scene, times[-1], name, effort, most, tolerance)
+    run = _StateRun(scene, times[-1], name, effort, most)
     nothing = np.empty((0, len(run.start)))
     if run.is_singular():
         run.check_undefined()
@@ -103,17 +105,35 @@ def solve_state(
         return rows_of([], nothing, 1, len(times), "overflow")
     if times[-1] == 0.0:
         return rows_of(times, np.array([run.start]), 1, 0, "complete")
-    scale = run.expected_omega()
-    if scale == 0.0:
-        # The body is at rest, and no torque acts.
-        rest = np.tile(run.start, (len(times), 1))
-        return rows_of(times, rest, run.evaluations, len(times), "complete")
-    found = _refined(run, times, tolerance, scale)
+    found = _solved(run, times, tolerance)
+    is_checked = True
+    if run.is_smooth:
+        beside = series_beside(scene, times, tolerance)
+        is_checked = beside is not None
+        if beside and not _agrees(found, beside.rows, tolerance):
+            run.spans = beside.spans
+            found = _solved(run, times, tolerance)
     if not found.is_complete:
         run.check_undefined()
     count = len(found.state)
-    ended = "overflow" if not found.is_complete else "complete" if run.is_bounded else "unchecked"
+    ended = "overflow" if not found.is_complete else "complete" if is_checked else "unchecked"
     return rows_of(times[:count], found.state, run.evaluations, len(times), ended)
+
+
+def _solved(run: "_StateRun", times: Sequence[float], tolerance: float) -> _Rows:
+    scale = run.expected_omega()
+    if scale == 0.0:
+        # The body is at rest, and no torque acts.
+        return _Rows(np.tile(run.start, (len(times), 1)), True, 0.0)
+    return _refined(run, times, tolerance, scale)
+
+
+def _agrees(found: _Rows, rows: Array, tolerance: float) -> bool:
+    if len(found.state) < len(rows):
+        return False
+    largest = max(found.largest, float(np.abs(rows[:, :3]).max()))
+    first, second = found._replace(largest=largest), _Rows(rows, True, largest)
+    return _difference(first, second) <= _AGREEMENT * tolerance
 
 
 def _check_attitude(scene: Scene) -> None:
@@ -136,7 +156,7 @@ def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
     The torque of the scene depends on the state, and `time` is in s. `name` and `most` are those of
     `solve_state`. The estimate is 0 if the method does not reach the end.
     """
-    run = _StateRun(scene, time, name, 1.0, most, _TRIAL[-1])
+    run = _StateRun(scene, time, name, 1.0, most)
     scale = 0.0 if run.is_singular() else run.expected_omega()
     if scale == 0.0:
         return 0.0
@@ -221,9 +241,7 @@ class _StateRun(Run):
     The time reached and the largest |omega| are recorded after each step.
     """
 
-    def __init__(
-        self, scene: Scene, end: float, name: str, effort: float, most: float, tolerance: float
-    ) -> None:
+    def __init__(self, scene: Scene, end: float, name: str, effort: float, most: float) -> None:
         torque = scene.torque
         assert isinstance(torque, StateTorque)
         if torque.needs_attitude and scene.attitude is None:
@@ -253,9 +271,7 @@ class _StateRun(Run):
         self._undefined: float | None = None
         self._integrations = 0
         self._reached, self._largest, self._stuck = 0.0, 0.0, 0
-        self._spans, self.is_bounded = [Span(end, math.inf)], True
-        if self.is_smooth and end and not self.is_singular():
-            self._spans, self.is_bounded = spans_of(scene, end, tolerance)
+        self.spans = [Span(time, math.inf) for time in bounds_of(scene, end)]
 
     def _between_breaks(self, slopes: RightHandSide) -> RightHandSide:
         """Return a right-hand side in which a table changes after a breakpoint, not at it."""
@@ -362,7 +378,7 @@ class _StateRun(Run):
         rows = np.empty((0, len(self.start)))
         state, begin, self._largest = self.start, 0.0, 0.0
         # SciPy does not know where a table changes: each integration ends there.
-        for end, most in self._spans:
+        for end, most in self.spans:
             own = [time for time in times[len(rows) :] if abs(time) <= abs(end)]
             wanted = own if own and own[-1] == end else [*own, end]
             self._between = _interior(begin, end)

@@ -11,6 +11,8 @@ from pyharness.model.tape import OMEGA, Tape, slot_values
 
 # An operand that is smaller, relative to its value at the beginning, is about to become 0.
 _NEARLY_ZERO = 1e-6
+# Its largest ratio to its value before the last step, which is short beside those of the motion.
+_SHRUNK = 0.9
 # An omega that is larger, relative to the one at the beginning, grows without bound.
 _UNBOUNDED = 1e6
 
@@ -34,23 +36,34 @@ class SingularError(TimedError):
         return type(self), (self.what, self.time)
 
 
-def undefined_operation(tape: Tape, begin: Sequence[float], end: Sequence[float]) -> str | None:
+def undefined_operation(
+    tape: Tape, begin: Sequence[float], before: Sequence[float], end: Sequence[float]
+) -> str | None:
     """Return what is not defined at the end of an integration, and what to write instead.
 
-    `begin` and `end` are the inputs of the tape where the integration begins and where it ends. The
-    result is None if omega or a quotient becomes infinite.
+    `begin` and `end` are the inputs of the tape where the integration begins and where it ends, and
+    `before` those where its last step began. The result is None if omega or a quotient becomes
+    infinite.
     """
     first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))
     if last > _UNBOUNDED * (first or 1.0):
         return None
     with np.errstate(all="ignore"):
-        before, values = (slot_values(tape, list(map(np.float64, x)), ARRAYS) for x in (begin, end))
+        at_begin, earlier, values = (
+            slot_values(tape, list(map(np.float64, inputs)), ARRAYS)
+            for inputs in (begin, before, end)
+        )
 
     def vanishes(slot: int) -> bool:
-        size = abs(before[slot]) if begin != end and np.isfinite(before[slot]) else 0.0
-        return not abs(values[slot]) > _NEARLY_ZERO * size
+        """Return whether a slot becomes 0: it is small, and halved by a step that is tiny."""
+        size, step = (abs(x[slot]) if np.isfinite(x[slot]) else 0.0 for x in (at_begin, earlier))
+        if begin == end:
+            size = step = 0.0
+        return not abs(values[slot]) > min(_NEARLY_ZERO * size, _SHRUNK * step)
 
     for kind, operands, *_ in tape.operations:
+        if kind == "quotient" and begin != end and values[operands[0]] == earlier[operands[0]] == 0:
+            continue
         if kind == "sqrt" and (values[operands[0]] < 0.0 or vanishes(operands[0])):
             return (
                 "the square root of a number that becomes 0 or negative; write a smooth function, "

@@ -2,7 +2,7 @@
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -259,7 +259,9 @@ class Stepper:
 
     def _singular(self) -> SingularError:
         """Return the exception for a time at which no step is short enough."""
-        what = undefined_operation(self._tape, self._origin, [self._time, *self._state.tolist()])
+        before = [self._begin, *self._last.terms[0].tolist()]
+        end = [self._time, *self._state.tolist()]
+        what = undefined_operation(self._tape, self._origin, before, end)
         return SingularError(what, self._time)
 
     def _set(self, place: slice, values: Sequence[float]) -> None:
@@ -288,31 +290,34 @@ class Stepper:
         return self._breaks[place - 1] if place else None
 
 
-def step_lengths(
-    scene: Scene,
-    attitude: bool,
-    end: float,
-    tolerance: float,
-    bounds: Sequence[float],
-    most: int = _MOST_STEPS,
-) -> tuple[dict[float, float], float]:
-    """Return the steps (s) of a Taylor series from time 0 to `end`, and the time that it reaches.
+def steps_to(
+    scene: Scene, attitude: bool, end: float, tolerance: float, most: int = _MOST_STEPS
+) -> Iterator[tuple[float, Stepper]]:
+    """Yield the time (s) at which a step of a Taylor series begins, and the stepper after it.
 
-    The steps are given by their ends and lengths. Those that end at one of the `bounds`, which may
-    have cut them, are not included. A series ends before a singularity, and after `most` steps.
+    The steps go from time 0 to `end`. They end before a singularity, and after `most` steps.
     """
-    if scene.changing is not None:
-        scene = with_constant_body(scene)
-    stepper = Stepper(scene, max(tolerance, _FINEST), attitude=attitude)
-    cuts = frozenset(bounds)
-    found: dict[float, float] = {}
+    stepper = Stepper(with_constant_body(scene), max(tolerance, _FINEST), attitude=attitude)
     with suppress(SingularError):
         while abs(stepper.time) < abs(end) and stepper.steps < most:
             before = stepper.time
-            after = stepper.step(end - before)
-            if after not in cuts:
-                found[after] = abs(after - before)
-    return found, stepper.time
+            stepper.step(end - before)
+            yield before, stepper
+
+
+def step_lengths(
+    scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
+) -> dict[float, float]:
+    """Return the lengths (s) of the steps of a Taylor series from time 0 to `end`, by their ends.
+
+    Steps that end at one of the `bounds`, which may have cut them, are not included.
+    """
+    cuts = frozenset(bounds)
+    return {
+        stepper.time: abs(stepper.time - before)
+        for before, stepper in steps_to(scene, attitude, end, tolerance)
+        if stepper.time not in cuts
+    }
 
 
 def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:

@@ -9,7 +9,7 @@ import pytest
 
 from pyharness import InputError, Scene, opaque, solve
 from pyharness.methods.registry import SCIPY_METHODS
-from pyharness.methods.scipy_spans import spans_of
+from pyharness.methods.scipy_spans import series_beside
 from pyharness.model.state_torque import StateTorque
 
 SPHERE = Scene("", (0.0, 0.0, 1.0), moments=(2.0, 2.0, 3.0))
@@ -55,8 +55,11 @@ def test_spans_are_short_where_the_torque_is(sign: float) -> None:
         "", SPHERE.omega, moments=SPHERE.moments,
         torque=lambda t, w: [0.0, 0.0, np.exp(-(((sign * t - 14.0) / 0.01) ** 2))],
     )  # fmt: skip
-    spans, is_whole = spans_of(scene, 20.0 * sign, 1e-9)
-    assert is_whole
+    times = [0.0, 15.0 * sign, 20.0 * sign]
+    beside = series_beside(scene, times, 1e-9)
+    assert beside is not None
+    assert np.abs(beside.rows - solve(scene, np.sort(times)).omega[:: int(sign)]).max() < 1e-9
+    spans = beside.spans
     assert spans[-1].end == 20.0 * sign
     own = next(each for each in spans if abs(each.end) >= 14.0)
     assert own.longest < 0.02
@@ -74,6 +77,18 @@ def test_kink_is_unchecked() -> None:
     for more in ({"dense_output": True}, {"events": lambda t, w: w[0] - 2.0}):
         with pytest.raises(InputError, match="allowed: a smooth torque, or opaque"):
             solve(KINK, 6.0, "dop853", 1e-6, **more)
+
+
+@pytest.mark.parametrize("method", ["radau", "lsoda"])
+def test_stiff_torque_takes_the_steps_of_the_implicit_method(method: str) -> None:
+    """Those of the series are limited by its stability."""
+    scene = Scene(
+        "", (0.1, 0.2, 0.3), moments=(1.0, 1.5, 2.2),
+        torque=lambda t, w: [-1e3 * (w[0] - np.sin(t)), -1e3 * w[1], -1e3 * w[2]],
+    )  # fmt: skip
+    found = solve(scene, 5.0, method, 1e-5)
+    assert found.ended == "complete"
+    assert found.evaluations < 10_000
 
 
 def test_opaque_torque_has_no_spans() -> None:

@@ -81,7 +81,7 @@ def test_kink_is_unchecked() -> None:
 
 @pytest.mark.parametrize("method", ["radau", "lsoda"])
 def test_stiff_torque_takes_the_steps_of_the_implicit_method(method: str) -> None:
-    """Those of the series are limited by its stability."""
+    """The steps of the series are limited by its stability."""
     scene = Scene(
         "", (0.1, 0.2, 0.3), moments=(1.0, 1.5, 2.2),
         torque=lambda t, w: [-1e3 * (w[0] - np.sin(t)), -1e3 * w[1], -1e3 * w[2]],

@@ -75,11 +75,7 @@ def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
 
 
 def _prepared(load: EnsembleLoad) -> Callable[[], object]:
-    """Return a function that solves all bodies of a load (a set of bodies) by the closed form.
-
-    The function calls a solver that `prepare` sets up once for the moments of the bodies, before
-    the function is returned.
-    """
+    """Return a function that solves all bodies of a load (a set of bodies) by the closed form."""
     solver, out = prepare(load.scene, "closed-form"), np.empty_like(load.omega0)
     return lambda: solver.many(load.omega0, HORIZON, out=out)
 

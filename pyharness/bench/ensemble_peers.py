@@ -144,11 +144,7 @@ def _integrator(
 
 
 def _batches(rows: Array, size: int) -> Array:
-    """Return the array `rows`, with k numbers for each body, divided into batches of bodies.
-
-    A batch has `size` bodies, and the result has the shape (batches, k, size). The last batch is
-    padded with copies of the last row.
-    """
+    """Return the array `rows`, with k numbers for each body, divided into batches of bodies."""
     lacking = -len(rows) % size
     filled = np.concatenate([rows, np.repeat(rows[-1:], lacking, axis=0)])
     return np.ascontiguousarray(filled.reshape(-1, size, rows.shape[1]).transpose(0, 2, 1))

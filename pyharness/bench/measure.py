@@ -347,10 +347,6 @@ def _first_calls(
 
 
 def _at_rounding(errors: Sequence[float | None]) -> bool:
-    """Return whether rounding limits the errors of a contender (solver) with ever finer steps.
-
-    `errors` are its errors from coarse to fine steps. Rounding limits them if none of the last
-    three errors is below the smallest earlier error, and if the smallest error is below 1e-10.
-    """
+    """Return whether rounding limits the errors of a contender (solver) with ever finer steps."""
     known = [error for error in errors if error is not None]
     return len(known) > 3 and min(known[-3:]) >= min(known[:-3]) and min(known) < 1e-10

@@ -94,11 +94,7 @@ def heyoka_maker(scene: Scene, formula: Formula | None = None) -> Maker:
 
 
 def _right_hand_side(scene: Scene) -> RightHandSide:
-    """Return the right-hand side of a scene's equations of motion, for SciPy's integrators.
-
-    It computes with Python floats, not with arrays. The unknowns are omega, and also the attitude
-    quaternion if the scene has an attitude.
-    """
+    """Return the right-hand side of a scene's equations of motion, for SciPy's integrators."""
     if isinstance(scene.torque, StateTorque):
         return slopes_of(scene)
     slopes = scene.right_hand_side()

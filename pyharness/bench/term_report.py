@@ -136,11 +136,7 @@ def _over_dop853(finding: Finding, load: Workload) -> float | None:
 
 
 def _preparing(finding: Finding, load: Workload, method: str) -> float | None:
-    """Return the time (s) to prepare a solver for the shortest end time of a scene, or None.
-
-    heyoka compiles an integrator for each tolerance, and the time is the median of all. Ours is the
-    time of the first preparation, after which parts are kept.
-    """
+    """Return the time (s) to prepare a solver for the shortest end time of a scene, or None."""
     first = next(each for each in finding.workloads if each.label == load.label)
     times = [row.preparing for row in _rows(finding, first, method)]
     return (times[0] if method == OURS else statistics.median(times)) if times else None

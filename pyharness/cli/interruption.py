@@ -177,10 +177,7 @@ def _show_warning(
 
 
 def _quiet_of(hook: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return a hook for unraisable exceptions that suppresses KeyboardInterrupt after Ctrl-C.
-
-    Any other exception is passed to `hook`.
-    """
+    """Return a hook for unraisable exceptions that suppresses KeyboardInterrupt after Ctrl-C."""
 
     def report_unraisable(unraisable: Any) -> None:
         if not (came() and issubclass(unraisable.exc_type, KeyboardInterrupt)):

@@ -145,11 +145,7 @@ def _listed(mark: Path, kind: str) -> Iterable[str]:
 
 
 def _beside(folder: Path) -> tuple[Path, Path]:
-    """Return two temporary paths for the time when the folder `folder` is replaced.
-
-    The first path is for the folder with the new content, the second path for the folder with the
-    previous content. Both are in the parent folder of `folder`.
-    """
+    """Return two temporary paths for the time when the folder `folder` is replaced."""
     new, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{what}") for what in ("new", "old"))
     return new, old
 

@@ -234,10 +234,7 @@ def _answered(solver: Solver, omega: Array) -> End:
 
 
 def _printed(result: Any) -> End:
-    """Return the last row of a compiled program's run as an `End` (result at one time).
-
-    `result` is the tuple that the extension's function `run_program` returned.
-    """
+    """Return the last row of a compiled program's run as an `End` (result at one time)."""
     rows, _, n_rows, status, evaluations, variable, _ = result
     if status == STOPPED:
         return not_finite(f"stopped at step {n_rows} by {STOP_VARIABLES[variable - 1]}")

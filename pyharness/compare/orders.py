@@ -212,12 +212,7 @@ def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
 
 
 def _fastest(scene: Scene, omega: Array) -> float:
-    """Return the fastest rate (rad/s) that a step has to resolve.
-
-    The rate is the larger of two: the largest angular frequency of the sines and cosines of a
-    torque law, and a bound on the rate at which Euler's equations change a perturbation of the
-    solution `omega` (rad/s).
-    """
+    """Return the fastest rate (rad/s) that a step has to resolve."""
     sizes = np.abs(np.vstack([scene.omega, omega]))
     others = np.roll(sizes, -1, axis=1) + np.roll(sizes, -2, axis=1)
     waves = () if isinstance(scene.torque, StateTorque) else scene.law.sines + scene.law.cosines

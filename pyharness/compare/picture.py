@@ -135,11 +135,7 @@ def _line(axes: "Axes", time: np.ndarray, values: np.ndarray, label: str) -> Non
 
 
 def _frame(axes: "Axes", truth: np.ndarray) -> None:
-    """Limit the vertical range of a panel to values near the reference solution.
-
-    `truth` has the values of a component of the reference omega (rad/s). The curve of a program
-    that diverges is cut off at the limits.
-    """
+    """Limit the vertical range of a panel to values near the reference solution."""
     if not len(truth):
         return
     low, high = float(truth.min()), float(truth.max())

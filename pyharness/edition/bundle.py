@@ -74,10 +74,7 @@ def _add(
 
 
 def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
-    """Yield the exported and the local name of each name in a JavaScript import statement.
-
-    `found` is the match of the statement, with the names in braces.
-    """
+    """Yield the exported and the local name of each name in a JavaScript import statement."""
     for each in (found["names"] or "").split(","):
         name, _, alias = each.strip().partition(" as ")
         if name:
@@ -85,12 +82,7 @@ def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
 
 
 def _as_constant(found: re.Match[str], path: Path, modules: list[Path]) -> str:
-    """Return the declaration of constants that replaces a JavaScript import in the script.
-
-    The declaration has as many lines as the import statement. `found` is the match of the statement
-    in the module `path`. `modules` has the paths of the modules that are already in the script, in
-    their order.
-    """
+    """Return the declaration of constants that replaces a JavaScript import in the script."""
     number = modules.index((path.parent / found["path"]).resolve())
     renamed = ", ".join(f"{name}: {here}" for name, here in _names(found))
     lines = "\n" * found[0].count("\n")

@@ -168,13 +168,7 @@ def _first() -> dict[str, Any]:
 
 
 def _row(run: Trajectory, number: int, error: float) -> list[str]:
-    """Return the cells of the row for one step, as texts, in the table of a program's results.
-
-    `number` is the index of the step, from 0. The cells are the number of the step, the time (s),
-    omega (rad/s), the translational velocity (m/s), and the variable TIME of the program (s). The
-    next cell, for the error code IER of the collocation programs, is empty. The last cell is
-    `error`, the error of omega (rad/s).
-    """
+    """Return the cells of the row for one step, as texts, in the table of a program's results."""
     assert run.velocity is not None
     values = [run.time[number], *run.omega[number], *run.velocity[number]]
     values.append(run.recorded_time[number])

@@ -97,10 +97,7 @@ def _name(program: str, case: int, listing: str, word: str) -> str:
 
 
 def _stored(texts: dict[str, str], name: str, text: str) -> str:
-    """Store a page under its name, or return the name of an equal page that is already stored.
-
-    The pages of the original programs in the words of the machine are stored in any case.
-    """
+    """Store a page under its name, or return the name of an equal page that is already stored."""
     program = name.partition("-case-")[0]
     same = [known for known in texts if known.startswith(program) and texts[known] == text]
     if same and not name.removeprefix(program)[len("-case-N-") :].startswith("cdc48"):

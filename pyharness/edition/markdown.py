@@ -126,10 +126,7 @@ def _all(tokens: Sequence["Token"]) -> Iterator["Token"]:
 
 
 def _anchor(tokens: Sequence["Token"]) -> None:
-    """Add to the headings the same anchors as on GitHub, so that links to headings work.
-
-    `tokens` are the tokens of a parsed document, which are changed in place.
-    """
+    """Add to the headings the same anchors as on GitHub, so that links to headings work."""
     seen: dict[str, int] = {}
     for opening, content in pairwise(tokens):
         if opening.type == "heading_open":

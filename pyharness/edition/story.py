@@ -164,10 +164,7 @@ def _largest_error(case: int, program: str, listing: str) -> float:
 
 
 def _ratios(case: int) -> dict[str, float]:
-    """Return how many times larger the error of each corrected collocation program is in a case.
-
-    The errors are compared with that of the corrected Runge-Kutta program.
-    """
+    """Return how many times larger the error of each corrected collocation program is in a case."""
     errors = {name: _largest_error(case, name, "corrected") for name in PROGRAMS}
     least = errors.pop("runge-kutta")
     return {name: error / least for name, error in errors.items()}

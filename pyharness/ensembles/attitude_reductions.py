@@ -83,10 +83,7 @@ def _in_space(batch: Batch) -> Array:
 
 
 def _tilt_squares(batch: Batch, given: Given) -> tuple[Array, Array]:
-    """Return the squares of the cosine and the sine of half the angle of an axis from its start.
-
-    Both have the shape (n, samples).
-    """
+    """Return the squares of the cosine and the sine of half the angle of an axis from its start."""
     squares = batch.attitudes(given["samples"]) ** 2
     is_own = _is_own(batch, given, len(squares))[:, None, :]
     along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)

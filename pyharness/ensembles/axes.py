@@ -120,12 +120,7 @@ def _drawn(axis: Axis) -> Floats:
 
 
 def _between(first: float, last: float, made: Callable[[float, float], Floats]) -> Floats:
-    """Return ``made(first, last)``, but without an overflow if `last - first` is not finite.
-
-    `made` is a function that returns values between two ends, for example evenly spaced values. If
-    the difference of the ends overflows, `made` is called with halved ends, and its values are
-    doubled.
-    """
+    """Return ``made(first, last)``, but without an overflow if `last - first` is not finite."""
     if math.isfinite(last - first):
         return made(first, last)
     # Halving and doubling are exact, because numbers of that size are far from underflow.

@@ -138,12 +138,7 @@ def _attitude(scene: Scene, own: Columns, n: int) -> Array | None:
 
 
 def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | None:
-    """Return the three components of a quantity in n scenes, shape (n, 3), or None.
-
-    None means that no axis of the sweep varies a component. `name` is the quantity, such as
-    ``omega``, whose components are ``omega.1`` to ``omega.3``. `own` maps the name of each varied
-    component to its n values. `base` has the values of the components that do not vary.
-    """
+    """Return the three components of a quantity in n scenes, shape (n, 3), or None."""
     fields = [f"{name}.{axis}" for axis in (1, 2, 3)]
     if not any(field in own for field in fields):
         return None
@@ -217,10 +212,6 @@ def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) ->
 
 
 def _on_sphere(height: Array, longitude: Array) -> Array:
-    """Return unit vectors, shape (n, 3), given by their third component and their longitude.
-
-    `height` is the third component. `longitude` (rad) is the angle about the third axis, from the
-    first axis. Equal intervals of the third component correspond to equal areas of the unit sphere.
-    """
+    """Return unit vectors, shape (n, 3), given by their third component and their longitude."""
     across = np.sqrt(1.0 - height * height)
     return np.stack([across * np.cos(longitude), across * np.sin(longitude), height], axis=1)

@@ -29,12 +29,7 @@ def deaf_children() -> Iterator[None]:
 
 
 def _start_tracker() -> None:
-    """Start Python's resource tracker so that it does not warn about leftover semaphores.
-
-    The tracker is a process that removes semaphores that other processes have not removed. After
-    Ctrl-C the tracker ends later than this process. Its warnings would then be printed after the
-    last line of this process.
-    """
+    """Start Python's resource tracker so that it does not warn about leftover semaphores."""
     warning = "ignore:resource_tracker"
     sys.warnoptions.append(warning)
     try:

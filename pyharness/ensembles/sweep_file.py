@@ -287,12 +287,7 @@ def _choices(sweep: Sweep, field: str, default: str | None) -> Iterable[str]:
 
 
 def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
-    """Yield each combination of program, method, listing and reading that occurs on the axes.
-
-    A listing is a version of a program, and a reading an interpretation of doubtful cards. A
-    combination has the names of the program, method, listing and reading, as far as axes of the
-    sweep's grid vary them. Axes with the same dimension vary together.
-    """
+    """Yield each combination of program, method, listing and reading that occurs on the axes."""
     words = [axis for axis in axes if axis.is_choice]
     counts = {axis.dimension: axis.count for axis in words}
     for at in itertools.product(*map(range, counts.values())):

@@ -32,8 +32,7 @@ def compiled_call(solver: Any) -> CompiledCall:
 def get_include() -> str:
     """Return the folder of the headers for C code.
 
-    With `pyharness.h` C code calls prepared solvers. `free_rotor.h` has the closed form of a body
-    without torque in itself, and needs neither Python nor this package.
+    With `pyharness.h` C code calls prepared solvers.
 
     Returns
     -------
@@ -45,6 +44,6 @@ def get_include() -> str:
     >>> from pathlib import Path
     >>> from pyharness import get_include
     >>> sorted(path.name for path in Path(get_include()).glob("*.h"))
-    ['free_rotor.h', 'pyharness.h']
+    ['pyharness.h']
     """
     return str(Path(__file__).parent.parent / "include")

@@ -267,10 +267,7 @@ def _terms(options: argparse.Namespace) -> int:
 
 
 def _choose_bodies(options: argparse.Namespace, default: int) -> int:
-    """Return the number of bodies that --bodies requests, or the default.
-
-    The number and the seed in `options` are set, if the user left them out.
-    """
+    """Return the number of bodies that --bodies requests, or the default."""
     n = default if options.bodies is None else shared.whole(options.bodies, "--bodies")
     if not 1 <= n <= _MOST_BODIES:
         raise InputError(f"--bodies: {n}; allowed: 1 to {_MOST_BODIES}")

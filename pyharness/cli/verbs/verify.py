@@ -176,13 +176,7 @@ def _title(chosen: Selection) -> list[str]:
 
 
 def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
-    """Return a list with one line that reports checks which could not be made, or an empty list.
-
-    Without a FORTRAN compiler, the decks (the thesis's programs in fixed form) are not checked.
-    With --external, the check of a published number passes if the method refuses the problem, for
-    example as too long. In the printed report, only this line shows that nothing was compared.
-    `chosen` is the selection of checks, and `checks` has their results.
-    """
+    """Return a list with one line that reports checks which could not be made, or an empty list."""
     if chosen.may_ask("decks") and compiler() is None:
         return ["decks: not run, as there is no gfortran on the PATH"]
     count = sum(check.passed and check.value is None for check in checks)

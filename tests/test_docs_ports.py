@@ -30,21 +30,21 @@ def test_a_command_of_the_guide_runs(command: str, tmp_path: Path) -> None:
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST_", "GITHUB_"))}
     tools = tmp_path / "tools"
     tools.mkdir()
-    for name, words in (("python", ""), ("python3", ""), ("pytest", " -m pytest -p no:zarr")):
-        (tools / name).write_text(f'#!/bin/sh\nexec "{sys.executable}"{words} "$@"\n')
+    for name in ("python", "python3"):
+        (tools / name).write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
         (tools / name).chmod(0o755)
     done = subprocess.run(
         ["sh", "-e", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False,
         env={**kept, "PATH": f"{tools}:{os.environ['PATH']}"},
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
-    assert re.search(r"all well|each noticed|\d+ passed", done.stdout)
+    assert re.search(r"all well|each noticed", done.stdout)
     for name in re.findall(r"[\w.]+\.(?:md|xml|json)\b", command.partition("--also")[2]):
         assert (tmp_path / name).stat().st_size > 100
 
 
 def test_the_guide_has_commands_of_each_part() -> None:
-    for part in ("--draws", "--self-test", "--also", "pytest ", "verify-port.sh", "make -C"):
+    for part in ("--draws", "--self-test", "--also", "verify-port.sh", "make -C"):
         assert any(part in command for command in COMMANDS), part
 
 

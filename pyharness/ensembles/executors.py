@@ -103,7 +103,9 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
     # Processes are spawned and not forked, because a fork of a process with threads may hang, and
     # NumPy and Zarr start threads.
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, context, end_with_parent)
+    # The pool creates semaphores, with which Python would otherwise start its own tracker.
+    with deaf_children():
+        pool = ProcessPoolExecutor(workers, context, end_with_parent)
     waiting: dict[Future[Arrays], int] = {}
     rest = iter(chunks)
     try:

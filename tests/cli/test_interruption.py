@@ -105,11 +105,13 @@ def test_what_is_left_to_the_resource_tracker_is_removed_without_a_word() -> Non
     script = (
         "import os\n"
         "from multiprocessing import get_context, resource_tracker\n"
-        "from pyharness.ensembles.children import deaf_children\n"
-        "with deaf_children(): lock = get_context('spawn').Lock()\n"
-        "print(lock._semlock.name)\n"
-        "resource_tracker.register('/mp-none-of-this-name', 'semaphore')\n"
-        "os._exit(130)"
+        "from pyharness.ensembles import executors\n"
+        "def interrupted(*_):\n"
+        "    print(get_context('spawn').Lock()._semlock.name)\n"
+        "    resource_tracker.register('/mp-none-of-this-name', 'semaphore')\n"
+        "    os._exit(130)\n"
+        "executors.ProcessPoolExecutor = interrupted\n"
+        "next(executors._by_pool(None, [], 1))"
     )
     # The resource tracker keeps the streams open, so that its last message is captured too.
     found = subprocess.run(

@@ -10,7 +10,6 @@ import re
 import shlex
 import subprocess
 import sys
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -32,21 +31,6 @@ from tests.instruction_sets import LEVELS, level_here
 
 Capture = pytest.CaptureFixture[str]
 COMPARE = ["compare", "--case", "3"]
-MISTAKES = tomllib.loads((Path(__file__).parent / "mistakes.toml").read_text())
-
-
-@pytest.mark.parametrize(("command", "words"), MISTAKES.items(), ids=range(len(MISTAKES)))
-def test_mistake_is_one_line_and_exit_code_2(
-    command: str, words: str, capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(shlex.split(command.replace("NINES", "9" * 5000))) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    assert captured.err.startswith("pyharness: ")
-    assert words in captured.err
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_help_and_version(printed: Printed) -> None:

@@ -34,7 +34,7 @@ quick: .venv/ready-to-test
 	@$(BIN)/python -m tests.quick $(ARGS)
 
 mutate: .venv/ready-to-test
-	@$(BIN)/python -m tests.mutations $(ARGS)
+	@$(BIN)/python -m tests.campaigns.mutations $(ARGS)
 
 cross-check: .venv/ready-to-test
 	@FC=$(FC) $(BIN)/python -m tests.cross $(ARGS)

@@ -30,7 +30,6 @@ from pyharness.bench.ensemble_report import Ensembles, ensemble_report, ours_ove
 from pyharness.cli.main import main
 from pyharness.model.trajectory import Array
 from pyharness.views.render import render
-from tests.issue_limit import IDLE, independent
 
 Capture = pytest.CaptureFixture[str]
 # Settings that give an error of 1e-8.
@@ -167,26 +166,3 @@ def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) 
     assert "heyoka-batch needs heyoka, which is not installed" in capsys.readouterr().err
     assert main([*COMMAND[:-2], "--methods", "closed-form"]) == 0
     assert "heyoka-batch, heyoka-ensemble, " in capsys.readouterr().out
-
-
-LOOP = """\tvmovapd\t(%rdx), %zmm16
-\tvfmadd213pd\t2496(%rdx), %zmm15, %zmm26
-\tvaddpd\t%zmm26, %zmm14, %zmm3
-\tvmovapd\t%zmm3, -64(%rdx)
-\taddq\t$64, %rdx
-\tjne\t.L1""".splitlines()
-
-
-def test_without_dependencies_the_instructions_stay() -> None:
-    changed = independent(LOOP, "zmm")
-    assert [line.split()[0] for line in changed] == [line.split()[0] for line in LOOP]
-    assert changed[-2:] == LOOP[-2:]
-    memory_of = re.compile(r"-?\d*\(%rdx\)")
-    assert [memory_of.findall(line) for line in changed] == [
-        memory_of.findall(line) for line in LOOP
-    ]
-    for line in changed[:3]:
-        *sources, target = re.findall(r"%zmm(\d+)", line)
-        assert int(target) != IDLE
-        assert {*map(int, sources)} <= {IDLE}
-    assert f"%zmm{IDLE}, -64(%rdx)" in changed[3]

@@ -21,8 +21,8 @@ from pyharness.checks.port_process import PortError
 from pyharness.cli.main import main
 from pyharness.model.attitude import angle_between
 from pyharness.scenes.moderate import KINDS, draw_moderate
-from tests.checks import integrator_campaign
-from tests.checks.integrator_campaign import (
+from tests.campaigns import integrator_campaign
+from tests.campaigns.integrator_campaign import (
     METHODS,
     Drawn,
     drawn,

@@ -31,7 +31,7 @@ MODERN = (
 # Tests that call the kernels, each in its own way. What the other tests do with the results is the
 # same in every build.
 CALLING = (
-    "tests/fuzz",
+    "tests/campaigns/fuzz",
     "tests/methods",
     *(f"tests/model/test_{name}.py" for name in ("attitude", "conversions", "effort", "values")),
     "tests/original",

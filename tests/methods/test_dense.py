@@ -18,7 +18,7 @@ from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.trajectory import Trajectory
 from pyharness.scenes.random_scenes import draw as draw_law
 from pyharness.scenes.state_scenes import SUDDEN, draw, draw_ready
-from tests.methods import dense_campaign
+from tests.campaigns import dense_campaign
 
 MOMENTS = (1.0, 2.0, 3.0)
 OMEGA = (0.1, 2.0, 0.1)

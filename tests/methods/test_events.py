@@ -14,7 +14,7 @@ from pyharness import InputError, Scene, TorqueLaw, case_scene, load, solve
 from pyharness.events import crosses, extremum, flip, rest, tilt
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.torques import damping, opaque, pulses
-from tests.methods.event_campaign import BODY, KINDS, Tally, campaign, planted, run
+from tests.campaigns.event_campaign import BODY, KINDS, Tally, campaign, planted, run
 
 METHODS = ("auto", "closed-form", "taylor", "dop853", "gauss-4", "reference")
 

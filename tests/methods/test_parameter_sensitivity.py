@@ -19,8 +19,8 @@ from pyharness.events import crosses
 from pyharness.model.attitude import product
 from pyharness.model.changing import ChangingMoments
 from pyharness.torques import damping, opaque, recorded, table
-from tests.methods import parameter_campaign
-from tests.methods.parameter_campaign import KINDS, LIMIT, random_scene
+from tests.campaigns import parameter_campaign
+from tests.campaigns.parameter_campaign import KINDS, LIMIT, random_scene
 
 LAW = TorqueLaw((0.1, -0.2, 0.05), sines=[((0.1, 0.2, 0.3), 1.3)])
 BRICK = Scene("brick", (0.3, 1.1, -0.7), moments=(3.0, 2.0, 1.2))

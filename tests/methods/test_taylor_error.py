@@ -11,8 +11,8 @@ from pyharness.model.scene import Triple
 from pyharness.model.trajectory import ROUNDING, Trajectory
 from pyharness.truth.reference import reference
 from tests import as_written
-from tests.estimates import truth
-from tests.estimates.scenes import Draw, drawn
+from tests.campaigns.estimates import truth
+from tests.campaigns.estimates.scenes import Draw, drawn
 
 BODY = (1.0, 2.0, 2.7)
 WAVES = TorqueLaw(

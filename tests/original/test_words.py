@@ -22,8 +22,8 @@ from pyharness.original.printer import page
 from pyharness.original.programs import WORD_NAMES
 from pyharness.original.vectors import answers
 from pyharness.original.word import RULES, WORDS, Word
+from tests.campaigns.words_campaign import FLOATS, differing
 from tests.original.exact_words import disagreements
-from tests.original.words_campaign import FLOATS, differing
 
 CDC, ROUNDED = WORDS["cdc48"], WORDS["cdc48-rounded"]
 
@@ -31,7 +31,7 @@ CDC, ROUNDED = WORDS["cdc48"], WORDS["cdc48-rounded"]
 @pytest.mark.bitwise
 @pytest.mark.parametrize("name", FLOATS)
 def test_bits_are_those_of_numpy(name: str) -> None:
-    """Test 8000 operations; `python -m tests.original.words_campaign` draws a million."""
+    """Test 8000 operations; `python -m tests.campaigns.words_campaign` draws a million."""
     assert differing(name, 8_000, "test") == []
 
 

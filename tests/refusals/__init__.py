@@ -1,1 +1,1 @@
-"""What is refused: calls and commands in tables, the wording in `messages.txt` alone."""
+"""Refused calls and commands in tables; the wording of messages stands in `messages.txt`."""

@@ -24,7 +24,8 @@ from pyharness.truth.certificate import prove
 from pyharness.truth.certificate_checker import NotProvedError, System, check, check_file
 from pyharness.truth.enclosed import Balls, decimals, rounded_up
 from pyharness.truth.reference import Reference, reference
-from tests import intervals, lohner
+from tests import intervals
+from tests.campaigns import lohner
 
 Record = dict[str, Any]
 WAVES = Scene(

@@ -1,5 +1,5 @@
 // Sine and cosine (rad), by sums of two floats (hi + lo), to 0.5000013 units in the last place
-// (proved in tests/function_errors); almost all are therefore correctly rounded.
+// (proved in tests/campaigns/function_errors); almost all are therefore correctly rounded.
 //
 // The functions of an engine differ from those of the C library in some 3 % of arguments. Correctly
 // rounded functions differ from those of the C library in some 0.14 %, by one unit in the last

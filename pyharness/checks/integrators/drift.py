@@ -25,7 +25,7 @@ CHANGE = Basis(
     "change of energy or angular momentum without torque (relative, or rad) in 8 s: 16 times the "
     "error in a short motion with the same step or tolerance, in proportion to time; 64 times "
     "without attitude",
-    "`python -m tests.checks.integrator_campaign 40 1`, where the largest ratio to it is .23",
+    "`python -m tests.campaigns.integrator_campaign 40 1`, where the largest ratio to it is .23",
 )
 
 

@@ -1,0 +1,1 @@
+"""Campaigns that run for minutes or hours; the weekly workflow runs them with a new seed."""

@@ -1,0 +1,196 @@
+"""`python -m tests.campaigns.event_campaign COUNT SEED`: search for planted roots of functions.
+
+Each function depends on time alone, and has known simple and double roots: some at random times,
+some pairs within a step of the integrator, some at the ends of the integration or of its intervals.
+The command prints the numbers of planted, missed and invented roots, and the largest error of a
+time, relative to the last time. Exit status 1 if a root is missed or invented, or if a time has a
+larger error than LARGEST plus the one that rounding explains.
+"""
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pyharness import Scene, solve
+from pyharness.model.array_type import Array
+
+LARGEST = 1e-12
+_EPS = 2.0**-52
+BODY = Scene("body", omega=(0.1, 2.0, 0.1), moments=(1.0, 2.0, 3.0))
+KINDS = ("polynomial", "edges", "cosine", "sine", "squared sine", "modulated", "odd")
+
+
+@dataclass(frozen=True)
+class Planted:
+    """A function with known roots from time 0 to `end` (s), and the rounding error of each root."""
+
+    function: Callable[..., Any]
+    end: float
+    roots: Array
+    changes: Any
+    rounding: Array
+
+
+def planted(kind: str, rng: np.random.Generator) -> Planted:
+    """Return a random function of a kind in `KINDS`."""
+    end = float(rng.choice([1.0, 10.0, 40.0]) * rng.uniform(0.5, 1.0))
+    if kind in ("polynomial", "edges"):
+        return _product(end, kind == "edges", rng)
+    if kind == "odd":
+        return _of_odd_multiplicity(end, rng)
+    rate, phase = rng.uniform(1.0, 40.0), rng.uniform(0.0, 2.0 * np.pi)
+    n: Any = np.arange(-2, int(rate * end / np.pi) + 4)
+    if kind == "cosine":
+        # Pairs of roots at a distance of down to 1e-6 rad.
+        gap = 10.0 ** rng.uniform(-6.0, 0.0)
+        n = np.arange(-1, int(rate * end / (2.0 * np.pi)) + 3)
+        both = np.array([2.0 * np.pi * n - gap, 2.0 * np.pi * n + gap])
+        angles = np.sort(both.ravel())
+        roots = (angles - phase) / rate
+        changes = np.where(np.arange(len(roots)) % 2, -1, 1)
+        rounding = np.full(len(roots), 8.0 * _EPS * (1.0 + rate * end) / (rate * np.sin(gap)))
+        level = np.cos(gap)
+        return _within(lambda t, w: np.cos(rate * t + phase) - level, end, roots, changes, rounding)
+    roots = np.asarray((np.pi * n - phase) / rate)
+    simple = np.full(len(roots), 8.0 * _EPS * (1.0 + rate * end) / rate)
+    signs = np.where(n % 2, -1, 1)
+    if kind == "sine":
+        return _within(lambda t, w: np.sin(rate * t + phase), end, roots, signs, simple)
+    if kind == "squared sine":
+        return _within(lambda t, w: np.sin(rate * t + phase) ** 2, end, roots, 0 * n, simple)
+    decay = rng.uniform(0.0, 30.0) / end
+    return _within(
+        lambda t, w: np.exp(-decay * t) * np.sin(rate * t + phase), end, roots, signs, simple
+    )
+
+
+def _within(
+    function: Callable[..., Any], end: float, roots: Array, changes: Any, rounding: Array
+) -> Planted:
+    kept = (roots > 1e-9 * end) & (roots < end * (1.0 - 1e-9))
+    return Planted(function, end, roots[kept], changes[kept], rounding[kept])
+
+
+def _product(end: float, at_edges: bool, rng: np.random.Generator) -> Planted:
+    """Return a product of factors, with roots at random times or at simple fractions of the end."""
+    count = int(rng.integers(1, 5))
+    if at_edges:
+        roots = end * rng.choice(np.arange(17), count, replace=False) / 16.0
+    else:
+        roots = rng.uniform(0.0, end, count)
+        if count > 1 and rng.random() < 0.5:
+            # Two roots within a step.
+            roots[1] = min(roots[0] + end * 10.0 ** rng.uniform(-5.0, -2.0), end)
+    roots = np.sort(roots)
+    powers = rng.integers(1, 3, len(roots))
+    # Double roots are not near to others, because rounding errors would combine them.
+    if len(roots) > 1 and np.diff(roots).min() < 1e-2 * end:
+        powers[:] = 1
+    sign = rng.choice([-1.0, 1.0])
+
+    def function(t: Any, omega: Any) -> Any:
+        found = sign + 0.0 * t
+        for root, power in zip(roots, powers, strict=True):
+            found = found * (t - root) ** int(power)
+        return found
+
+    after = sign * np.array([np.prod([1.0 if p % 2 == 0 or k <= j else -1.0
+                                      for k, p in enumerate(powers)])
+                             for j in range(len(roots))])  # fmt: skip
+    changes = np.where(powers % 2, after, 0).astype(int)
+    # A double root is the root of the derivative of a polynomial with rounding errors.
+    largest = np.abs(function(np.linspace(0.0, end, 1001), None)).max()
+    curvature = [2.0 * abs(np.prod([(r - x) ** int(p) for x, p in zip(roots, powers, strict=True)
+                                    if x != r])) for r in roots]  # fmt: skip
+    double = 4000.0 * _EPS * largest / (end * np.array(curvature))
+    rounding = 4.0 * _EPS * end + np.where(powers == 2, double, 0.0)
+    return Planted(function, end, roots, changes, rounding)
+
+
+def _of_odd_multiplicity(end: float, rng: np.random.Generator) -> Planted:
+    """Return a product of factors to the powers 1, 3, 5 and 7, whose signs are exact."""
+    roots = end * (np.arange(3) + rng.uniform(0.3, 0.7, 3)) / 3.0
+    powers = rng.permutation([1, 1, rng.choice([3, 5, 7])])
+    sign = rng.choice([-1.0, 1.0])
+
+    def function(t: Any, omega: Any) -> Any:
+        factors = [(t - root) ** int(n) for root, n in zip(roots, powers, strict=True)]
+        return sign * factors[0] * factors[1] * factors[2]
+
+    changes = sign * np.array([1, -1, 1])
+    return Planted(function, end, roots, changes, np.full(3, 4.0 * _EPS * end))
+
+
+@dataclass
+class Tally:
+    """The results of a campaign so far."""
+
+    roots: int = 0
+    missed: int = 0
+    invented: int = 0
+    wrong: int = 0
+    largest: float = 0.0
+    largest_alone: float = 0.0
+    examples: list[str] = field(default_factory=list)
+
+
+def run(kind: str, seed: int, tally: Tally) -> None:
+    """Search for the roots of one random function, and add the result to the tally."""
+    given = planted(kind, np.random.default_rng(seed))
+
+    def rising(t: Any, omega: Any) -> Any:
+        return given.function(t, omega)
+
+    rising.direction = 1  # type: ignore[attr-defined]
+    found = solve(BODY, given.end, events=[given.function, rising])
+    assert found.t_events is not None
+    times, rises = found.t_events
+    tally.roots += len(given.roots)
+    tally.missed += max(0, len(given.roots) - len(times))
+    tally.invented += max(0, len(times) - len(given.roots))
+    what = f"{kind} {seed}: {given.roots.tolist()}, found {times.tolist()}"
+    if len(times) != len(given.roots):
+        tally.examples.append(what)
+        return
+    inner = (given.roots > 0.0) & (given.roots < given.end)
+    expected = given.roots[inner & (given.changes == 1)]
+    got = rises[(rises > 0.0) & (rises < given.end)]
+    error = np.abs(times - given.roots)
+    excess = np.max(np.maximum(error - given.rounding, 0.0) / given.end, initial=0.0)
+    tally.largest = max(tally.largest, float(excess))
+    is_exact = given.rounding < 1e-13 * given.end
+    alone = float(np.max(error[is_exact], initial=0.0) / given.end)
+    tally.largest_alone = max(tally.largest_alone, alone)
+    if excess > LARGEST or len(got) != len(expected):
+        tally.wrong += 1
+        tally.examples.append(f"{what}, error {excess:.1e}, rises {rises.tolist()}")
+
+
+def campaign(count: int, seed: int) -> Tally:
+    """Return the results for random functions with at least `count` roots in all."""
+    tally = Tally()
+    number = seed * 1_000_000
+    while tally.roots < count:
+        run(KINDS[number % len(KINDS)], number, tally)
+        number += 1
+    return tally
+
+
+def main(arguments: list[str]) -> int:
+    """Run the campaign, print its results and return the exit status."""
+    tally = campaign(int(arguments[0]), int(arguments[1]))
+    print(
+        f"{tally.roots} roots planted, {tally.missed} missed, {tally.invented} invented, "
+        f"{tally.wrong} functions with a wrong time or direction; largest error of a time "
+        f"{tally.largest:.1e} of the last time beyond rounding, and {tally.largest_alone:.1e} "
+        "where rounding explains at most 1e-13"
+    )
+    print(*tally.examples[:10], sep="\n")
+    return 1 if tally.missed or tally.invented or tally.wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,1 +1,1 @@
-"""Refused calls and commands in tables; the wording of messages stands in `messages.txt`."""
+"""Tables of refused calls and commands; `messages.txt` has the wording of their messages."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, compare_programs, prepare, solve, solve_many
+from pyharness import Scene, TorqueLaw, compare_programs, prepare, solve, solve_many
 from pyharness.cli.main import main
 from pyharness.methods.batch import Solver
 from pyharness.methods.plan import plan
@@ -101,8 +101,6 @@ def test_comparison_takes_the_defaults_of_its_methods() -> None:
 
 def test_plan_is_of_the_default(printed: Printed) -> None:
     assert printed("plan --case 5") == printed("plan --case 5 --tolerance 1e-12")
-    with pytest.raises(InputError):
-        plan(draw("defaults", 0).scene, "quick", 1e-13)
 
 
 def test_document_has_the_default_of_every_method() -> None:

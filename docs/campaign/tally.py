@@ -159,9 +159,14 @@ class Tally:
         """Return the cells of the table, beginning with the names of the results."""
         return [[name, *row.cells()] for name, row in sorted(self.rows.items())]
 
-    def markdown(self) -> str:
-        """Return the counts and quantiles as a table in Markdown."""
-        return table(_HEAD, self.lines())
+    def markdown(self, above: float = 0.0) -> str:
+        """Return the counts and quantiles as a table in Markdown.
+
+        Rows have a broken promise, or their largest error over its limit is at least `above`.
+        """
+        rows = {name: row for name, row in sorted(self.rows.items())
+                if row.broken or row.largest >= above}  # fmt: skip
+        return table(_HEAD, [[name, *row.cells()] for name, row in rows.items()])
 
     def text(self) -> str:
         """Return the counts and quantiles as text."""

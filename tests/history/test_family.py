@@ -24,7 +24,7 @@ from pyharness.truth.reference import reference
 
 Capture = pytest.CaptureFixture[str]
 
-PAGE = (Path(__file__).parent.parent.parent / "docs/explanation/family.md").read_text()
+PAGE = (Path(__file__).parent.parent.parent / "docs/explanation/methods.md").read_text()
 GROWING = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))  # 1 / (1 - t)
 
 # A step rounds by some ten units in the last place of the largest omega. The motions of the cases
@@ -73,7 +73,7 @@ def test_orders_are_those_derived_or_better(
 
 
 def test_derived_orders() -> None:
-    """Orders for n = 1 ... 5, after as many corrections as necessary; family.md states the same."""
+    """Orders for n = 1 ... 5, after as many corrections as necessary; methods.md states the same."""
     wanted = {
         ("collocation", "thesis"): [2, 2, 4, 4, 6],
         ("collocation", "gauss"): [2, 4, 6, 8, 10],

@@ -1,8 +1,8 @@
 """The document `docs/contributing/promises.md`, made from the stored tally of a campaign.
 
 The text is in the template `promises.md.in`, the tally in `tally.json`, and explanations of
-broken promises in `exceptions.toml`. The command ``python -m tests.campaigns.proved --merge FILE --page``
-replaces the tally by the sum of other ones, and writes the document anew.
+broken promises in `exceptions.toml`. The command ``python -m tests.campaigns.proved --merge FILE
+--page`` replaces the tally by the sum of other ones, and writes the document anew.
 """
 
 import tomllib

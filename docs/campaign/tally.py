@@ -1,7 +1,7 @@
 """The counts of a campaign against proved solutions: their file, and their table.
 
-The campaign is ``python -m tests.campaigns.proved``. A tally is of constant size: quotients of error and
-estimate are counted in a histogram of 100 bins for each power of 10.
+The campaign is ``python -m tests.campaigns.proved``. A tally is of constant size: quotients of
+error and estimate are counted in a histogram of 100 bins for each power of 10.
 """
 
 import json
@@ -206,7 +206,8 @@ def command(count: int, seed: str, first: int, groups: Iterable[str], whole: boo
     """Return the command of a run of the campaign, which is `whole` if it leaves no result out."""
     name = seed if seed.replace("-", "").isalnum() else repr(seed)
     chosen = ",".join(groups)
-    return f"python -m tests.campaigns.proved {count} {name} {first} --groups {chosen}{' --all' * whole}"
+    run = f"python -m tests.campaigns.proved {count} {name} {first}"
+    return f"{run} --groups {chosen}{' --all' * whole}"
 
 
 def read(path: Path) -> Tally:

@@ -24,7 +24,9 @@ __all__ = ["CHANGING", "DAMPED", "GROWING", "TWO", "Member", "answers", "chosen"
            "steady_rotations", "torque_free"]  # fmt: skip
 
 BRICK = Scene("brick", (0.1, 1.0, 0.2), moments=(1.0, 2.0, 2.5))
-CHANGING = replace(BRICK, moments=ChangingMoments([[40.0, 1.5, -0.25], [30.0, 0.5], [20.0]]))
+CHANGING = Scene(
+    "changing", (0.1, 1.0, 1.0), moments=ChangingMoments([[40.0, 1.5, -0.25], [30.0, 0.5], [20.0]])
+)
 DAMPED = replace(BRICK, torque=torques.damping(0.1))
 GROWING = Scene("growing", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))  # 1 / (1 - t)
 TWO = subset("two-term")

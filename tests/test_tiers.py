@@ -15,13 +15,16 @@ def test_long(): busy()
 @pytest.mark.campaign
 def test_marked(): busy()
 def test_short(): pass
+@pytest.mark.sampled
+@pytest.mark.parametrize("n", [1, 2])
+def test_some(n): pass
 """
 
 
 @pytest.mark.parametrize(
     ("mark", "passed", "failed"),
-    [(["-m", tiers.FAST], ["test_short"], ["test_long"]),
-     ([], ["test_long", "test_marked", "test_short"], [])],
+    [(["-m", tiers.FAST], ["test_short", "test_some[1]"], ["test_long"]),
+     ([], ["test_long", "test_marked", "test_short", "test_some[1]", "test_some[2]"], [])],
 )  # fmt: skip
 def test_a_long_test_is_marked(
     mark: list[str], passed: list[str], failed: list[str],
@@ -29,7 +32,7 @@ def test_a_long_test_is_marked(
 ) -> None:  # fmt: skip
     monkeypatch.setattr(tiers, "LIMIT", 0.05)
     monkeypatch.setattr(tiers, "_slowness", lambda: 1.0)
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = campaign\n")
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n campaign\n sampled\n")
     (tmp_path / f"test_{len(mark)}.py").write_text(TESTS)
     pytest.main(
         [str(tmp_path), "-p", "no:cacheprovider", "-p", "no:zarr", "-v", *mark], plugins=[tiers]
@@ -37,4 +40,5 @@ def test_a_long_test_is_marked(
     said = capsys.readouterr().out
     for outcome, names in (("PASSED", passed), ("FAILED", failed)):
         assert [name for name in names if f"{name} {outcome}" not in said] == []
+    assert ("test_some[2]" in said) == (not mark)
     assert ("mark it with @pytest.mark.campaign" in said) == bool(failed)

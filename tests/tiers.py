@@ -14,6 +14,18 @@ _USUAL = 0.045  # s
 _MODULES = 20
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark as campaigns all but the first parameters of a test that is marked `sampled`."""
+    begun: set[str] = set()
+    for item in items:
+        function = item.nodeid.partition("[")[0]
+        if item.get_closest_marker("sampled"):
+            if function in begun:
+                item.add_marker("campaign")
+            begun.add(function)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     """Fail a test of the fast tier that takes too long."""

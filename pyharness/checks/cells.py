@@ -1,7 +1,6 @@
 """Checks that the Fortran programs and their Python twins agree bit for bit.
 
-A check is made in every cell, which is a program with a case of Table 1, defects and readings.
-Further checks use scenes drawn at random.
+A cell is a program with a case of Table 1, some of its defects and readings.
 """
 
 from collections.abc import Iterator
@@ -27,13 +26,7 @@ _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
 def cells(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks that the Fortran programs and their Python versions agree bit for bit.
-
-    There is a check for each cell: a program with a case of Table 1 of the thesis, a subset of the
-    program's defects, and a subset of its readings. A reading is an interpretation of a doubtful
-    card. If `chosen.thin` is set, as in the self-test, only a few cells are checked. A deferred
-    check is computed only if it is requested.
-    """
+    """Yield a deferred check for each cell, or for a few cells if `chosen.thin` is set."""
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
     for listing, case in all_cells():
@@ -45,22 +38,12 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
-    """Return the name of the check that a suite makes of one cell.
-
-    `suite` is the name of the suite, a group of checks. A cell is a listing (a program with a
-    choice of its defects, and of its readings of doubtful cards) and the number of a case of Table
-    1 of the thesis.
-    """
+    """Return the name of the check that a suite makes of one cell."""
     return Name(suite, listing.program, f"case-{case}", listing_name(listing))
 
 
 def random_programs(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks that Fortran and Python versions of a program agree in random scenes.
-
-    `chosen` has the seed and the number of scenes. For each scene, a program is also drawn, with
-    some of its defects, some of its readings (interpretations of doubtful cards), and the options
-    of its stop test. A deferred check is computed only if it is requested.
-    """
+    """Yield deferred checks in scenes drawn at random, with random listings and stop tests."""
     for number in range(chosen.draws):
         yield Attempt(chosen.drawn(number, "program"), partial(_of_draw, chosen.seed, number))
 
@@ -77,10 +60,9 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 def _agreement(name: Name, listing: Listing, scene: Scene, is_listed: bool, *options: Any) -> Check:
     """Return the check that the Fortran and the Python version of a program agree to the last bit.
 
-    `listing` is the program with a choice of its defects, and `scene` is the problem that it
-    solves. If `is_listed`, a difference is known and recorded in `data/divergences.toml`. The check
-    then fails if the difference no longer occurs. `options` are the constant of the Runge-Kutta
-    program's stop test (1/s) and whether the test may stop the run.
+    If `is_listed`, a difference is known (`data/divergences.toml`), and the check fails if it no
+    longer occurs. `options` are the constant of the Runge-Kutta program's stop test (1/s) and
+    whether the test may stop the run.
     """
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))

@@ -31,23 +31,10 @@ BITS = Basis(
 class Name:
     """The name of a check; its parts, joined by slashes, form the id, as in ``cells/two-term``.
 
-    Attributes
-    ----------
-    suite : str
-        The group of the check: a kind of checks of `verify`, or a trial of `stress`.
-    subject : str
-        The program or method that is judged.
-    circumstance : str
-        The problem that is solved, as in ``case-3``.
-    setting : str
-        The tolerance, the step size, or the listing, which is a version of a program.
-    quantity : str
-        The quantity that is compared with a limit.
-    command, options : str
-        The command of pyharness that makes the check, such as ``verify``, and the options that
-        repeat it in addition to ``--only``.
-    scene : Scene or None
-        The scene of the problem, which can be saved in a file; None if there is none.
+    `suite` is a kind of checks of `verify` or a trial of `stress`, `subject` the program or method,
+    `circumstance` the problem (``case-3``), `setting` the tolerance, step size or listing, and
+    `quantity` the number that is compared. `options` repeat the check in addition to ``--only``;
+    `scene` can be saved in a file.
     """
 
     suite: str
@@ -63,8 +50,7 @@ class Name:
     def id(self) -> str:
         """Return the non-empty parts of the name joined by slashes; ids are unique within a run.
 
-        The order is suite, subject, circumstance, setting and quantity. In the suites ``random``
-        and ``external`` the circumstance is before the subject.
+        In the suites ``random`` and ``external`` the circumstance is before the subject.
         """
         who = self.subject, self.circumstance
         who = who[::-1] if self.suite in _CIRCUMSTANCE_FIRST else who
@@ -72,10 +58,7 @@ class Name:
 
     @property
     def place(self) -> str:
-        """Return the parts of the name after suite and subject, joined by slashes.
-
-        They are circumstance, setting and quantity. Empty parts are omitted.
-        """
+        """Return the parts of the name after suite and subject, joined by slashes."""
         return "/".join(filter(None, (self.circumstance, self.setting, self.quantity)))
 
     @property
@@ -84,15 +67,11 @@ class Name:
         return f"python -m pyharness {self.command} --only {self.id}{self.options}"
 
     def of(self, quantity: str) -> "Name":
-        """Return this name with another `quantity`, the quantity that the check compares."""
+        """Return this name with another `quantity`."""
         return replace(self, quantity=quantity)
 
     def bounded(self, value: float, limit: float, basis: Basis, note: str = "") -> "Check":
-        """Return the check that `value` does not exceed `limit`; a value of NaN fails.
-
-        `basis` is the reason for the limit. `note` describes the fault or the observation in a few
-        words, for reports.
-        """
+        """Return the check that `value` does not exceed `limit`; a value of NaN fails."""
         # Values of NumPy's types occur here and can't be written as JSON.
         found, allowed = float(value), float(limit)
         return Check(self, not math.isnan(found) and found <= allowed, found, allowed, basis, note)
@@ -105,10 +84,9 @@ class Name:
         limit: float | None = None,
         basis: Basis | None = None,
     ) -> "Check":
-        """Return a check whose result `passed` the caller has decided; `note` gives the reason.
+        """Return a check whose result `passed` the caller has decided, with `note` as the reason.
 
-        `value` and `limit` do not affect the result and are only shown in reports. A limit requires
-        its `basis`.
+        `value` and `limit` are only shown.
         """
         return Check(self, bool(passed), value, limit, basis, note)
 
@@ -146,10 +124,7 @@ class Check:
 
     @property
     def suite(self) -> str:
-        """Return the name of the suite (group of checks) to which the check belongs.
-
-        A suite is a kind of checks of the command `verify`, or a trial of the command `stress`.
-        """
+        """Return the suite of the check."""
         return self.name.suite
 
     @property
@@ -177,11 +152,7 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """The result of a check in a random scene, with its entry point, tolerance and amplification.
-
-    The entry point is the call that solved the scene, and the amplification is the error
-    amplification of the motion. The report groups these checks by the three quantities.
-    """
+    """The result of a check in a random scene; the report groups by these three quantities."""
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
     tolerance: float = math.nan  # requested tolerance
@@ -192,8 +163,7 @@ class Sample(Check):
 class Attempt:
     """A deferred computation of the checks whose ids begin with the id of `name`.
 
-    If one of these checks is requested, ``make(name)`` is called. It returns a check, or several
-    checks and further attempts.
+    ``make(name)`` is called only if one of them is requested.
     """
 
     name: Name
@@ -206,11 +176,9 @@ Attempts = Iterable[Check | Attempt]
 def made(
     attempts: Attempts, only: Sequence[str], raised: tuple[type[Exception], ...] = (NotBuiltError,)
 ) -> Iterator[Check]:
-    """Yield the requested checks of `attempts`, which has finished and deferred checks.
+    """Yield the finished checks of `attempts`, and of the deferred ones those that are requested.
 
-    `only` has the beginnings of the requested ids, as in ``cells/two-term``. A deferred check
-    (`Attempt`) is computed only if it is requested; an exception, except those in `raised`, becomes
-    a failed check. A finished check in `attempts` is always yielded.
+    An exception, except those in `raised`, becomes a failed check.
     """
     for each in attempts:
         if isinstance(each, Check):
@@ -234,13 +202,11 @@ def run_suites(
     command: str,
     of_the_user: Sequence[str] = (),
 ) -> Iterator[Check]:
-    """Yield the requested checks of all suites (groups of checks), computed one after another.
+    """Yield the requested checks of all suites, computed one after another.
 
-    `suites` maps the name of each suite to a function that returns its finished or deferred checks.
-    `only` has the beginnings of the requested ids. `command` is the command of pyharness that
-    makes the checks, such as ``verify``. An exception becomes a failed check, and the rest is
-    computed. NotBuiltError is raised again, and in the suites `of_the_user` also InputError, which
-    a mistake in the user's input causes.
+    `suites` maps names to functions that return finished or deferred checks. An exception becomes a
+    failed check, and the rest is computed; NotBuiltError is raised again, and in the suites
+    `of_the_user` also InputError, which a mistake in the user's input causes.
     """
     for suite, attempts in suites.items():
         if not may_hold(suite, only):
@@ -265,18 +231,14 @@ def _ended(name: Name, error: Exception) -> Check:
 
 
 def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
-    """Return the names of the suites that may contain a requested check, in the same order.
-
-    `suites` has names of groups of checks, such as ``cells``. `only` has the leading parts of the
-    ids of the requested checks, as in ``cells/two-term``.
-    """
+    """Return the names of the suites that may contain a requested check, in the same order."""
     return [suite for suite in suites if may_hold(suite, only)]
 
 
 def severity(check: Check) -> tuple[bool, float]:
     """Return a sort key for checks: failed ones last, then by the ratio of value to limit.
 
-    The ratio counts as 0 for a check without a value or a limit, and as infinite for NaN.
+    The ratio is 0 without a value or a limit, and infinite for NaN.
     """
     if check.value is None or check.limit is None or check.value == check.limit == 0.0:
         return not check.passed, 0.0
@@ -288,16 +250,12 @@ def severity(check: Check) -> tuple[bool, float]:
 def selected(id: str, only: Sequence[str]) -> bool:
     """Return whether `only` requests the check with this id; an empty `only` requests all checks.
 
-    `only` has ids or leading parts of ids, which match by whole parts. ``cells/two-term`` selects
+    The leading parts in `only` match by whole parts: ``cells/two-term`` selects
     ``cells/two-term/case-3``, but not ``cells/two-terms``.
     """
     return not only or any(id == each or id.startswith(each + "/") for each in only)
 
 
 def may_hold(id: str, only: Sequence[str]) -> bool:
-    """Return whether `only` may request a check whose id is `id` or begins with `id`.
-
-    `only` has the beginnings of the requested ids. If the result is false, no check whose id
-    begins with `id` needs to be computed.
-    """
+    """Return whether `only` may request a check whose id is `id` or begins with it."""
     return selected(id, only) or any(each.startswith(id + "/") for each in only)

@@ -1,9 +1,8 @@
 """Checks of the Fortran port against the decks, which are compiled from the author's own cards.
 
-A deck is the Fortran program that the punched cards of one listing form. Its results do not depend
-on the Fortran port or on the Python twins. In every case, the file of results TAPE5 is compared bit
-for bit, and the printed page as text. An overflow ends a run of the port. The deck continues after
-an overflow, but must not produce finite values of omega.
+A deck shares nothing with the port or the Python twins. TAPE5, the file of results, is compared bit
+for bit, the printed page as text. An overflow ends a run of the port; the deck continues, but must
+not produce finite omega.
 """
 
 from collections.abc import Iterator
@@ -31,9 +30,7 @@ _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/
 def listings(program: str) -> list[Listing]:
     """Return the versions of a program to check: original, corrected, and each with one change.
 
-    The change activates or corrects a single defect or conjecture, or activates a single reading. A
-    conjecture is an assumption about a missing card, and a reading is an interpretation of a
-    doubtful card.
+    The change activates or corrects a single defect, conjecture or reading.
     """
     names = frozenset(switches(program))
     found = [Listing.original(program), Listing.corrected(program)]
@@ -45,11 +42,9 @@ def listings(program: str) -> list[Listing]:
 
 
 def decks(chosen: Selection) -> Iterator[Check]:
-    """Yield checks that every deck gives the same results as the Fortran port, bit for bit.
+    """Yield checks that every deck gives the same results as the Fortran port.
 
-    A deck is the source text of a program on the author's own cards. Its results are the file TAPE5
-    and the printed page. `chosen` selects the checks. Yield nothing if there is no Fortran
-    compiler. The command `verify` then reports that the decks were not run.
+    There are none without a Fortran compiler; `verify` then reports that the decks were not run.
     """
     asked = [
         (of_cell("decks", listing, case), listing, case)
@@ -91,12 +86,10 @@ def _compared(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
 
 
 def _after(deck: Run, steps: int, overflowed: bool) -> list[str]:
-    """Return texts that describe faults in the deck's records after the last row of our port.
+    """Return texts that describe faults in the deck's records after the port's last row.
 
-    The deck is a run of the program on the author's own cards. Its records are the rows of its
-    output file TAPE5. Our Fortran port has `steps` rows. If the port overflowed, the deck must have
-    further records, none of which has three finite components of omega. Otherwise the deck must
-    have no further records.
+    If the port overflowed, the deck must have further records, none with three finite components of
+    omega; otherwise it must have none.
     """
     rest = deck.tape5[steps:]
     if not overflowed:

@@ -1,7 +1,8 @@
 """Propagation of small perturbations by a step of each program, measured by running it.
 
-The measurements are compared with `pyharness.theory.amplification`, which derives the same
-quantities from the schemes, without running the programs.
+The measurements are compared with `pyharness.theory.amplification`, which derives the same from the
+schemes alone. The theory is exact, so that limits allow only for rounding. J is the Jacobian of
+Euler's equations (13-15 of the thesis).
 """
 
 from collections.abc import Callable, Sequence
@@ -47,11 +48,7 @@ ROUNDED = Basis(
 
 @dataclass(frozen=True)
 class Probe:
-    """A vector or matrix that is measured by running a program and also derived by theory.
-
-    `limit` bounds the difference of the two. It allows for rounding errors alone, because the
-    theory is exact.
-    """
+    """A vector or matrix that is measured by running a program and also derived by theory."""
 
     found: Array  # as measured
     derived: Array  # of the same shape
@@ -59,19 +56,14 @@ class Probe:
 
     @property
     def difference(self) -> float:
-        """Return the largest absolute difference between a measured and a derived element.
-
-        The result is not finite if an element is not finite. The elements belong to a vector or
-        matrix, which is both measured by running a program and derived by theory.
-        """
+        """Return the largest absolute difference; not finite if an element is not."""
         return float(np.abs(self.found - self.derived).max())
 
 
 def steady_scene(coefficients: Triple, omega: Triple, step: float) -> Scene:
     """Return a scene of one `step` (s) in which a constant torque keeps `omega` (rad/s) constant.
 
-    `coefficients` are A, B and C of Euler's equations. If all numbers have few binary digits, the
-    torque balances the other terms exactly, and no rounding disturbs the steady rotation.
+    If all numbers have few binary digits, the torque balances the other terms without rounding.
     """
     a, b, c = coefficients
     x, y, z = omega
@@ -82,32 +74,23 @@ def steady_scene(coefficients: Triple, omega: Triple, step: float) -> Scene:
 
 
 def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
-    """Return the exact Jacobian of Euler's equations at `omega`, times the scene's step size.
-
-    Its elements are fractions. Euler's equations are equations 13-15 of the thesis.
-    """
+    """Return the exact Jacobian of Euler's equations at `omega`, times the scene's step size."""
     a, b, c = (Fraction(each) * Fraction(scene.step_size) for each in scene.euler_coefficients)
     x, y, z = map(Fraction, omega)
     return [[Fraction(0), a * z, a * y], [b * z, Fraction(0), b * x], [c * y, c * x, Fraction(0)]]
 
 
 def eigenvalues(scene: Scene) -> Array:
-    """Return the eigenvalues of the Jacobian of Euler's equations, times the step size.
-
-    The Jacobian is taken at the initial omega of the scene. Each of these products is a value of z,
-    on which the linear stability of a method depends.
-    """
+    """Return the eigenvalues of J at the initial omega times the step size: values of z."""
     return np.asarray(np.linalg.eigvals(np.array(jacobian(scene, scene.omega), dtype=float)))
 
 
 def first_step(scene: Scene, listing: Listing) -> Probe:
     """Return the derivative of a program's first step at a steady rotation, measured and derived.
 
-    `listing` is the program with a choice of its defects. The derivative is that of omega after the
-    step with respect to omega before the step, a 3 x 3 matrix. The measured matrix consists of
-    differences between steps from neighbouring omegas. The step is a polynomial of known degree, so
-    that differences with enough neighbours have no error except rounding. The derived matrix
-    follows from the amplification matrix, by which a step multiplies perturbations.
+    It is the 3 x 3 matrix of omega after the step with respect to omega before. A step is a
+    polynomial of known degree, so that differences over enough neighbours are exact but for
+    rounding.
     """
 
     def stepped(omega: Array) -> Array:
@@ -124,11 +107,8 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 def later_steps(scene: Scene, listing: Listing) -> Probe:
     """Return a spinning top's perturbation after all steps of a scene, measured and derived.
 
-    `listing` is the program that is run, with a choice of its defects. The coefficient C of Euler's
-    equations and the torque are zero. omega3 is the spin, and omega1 and omega2 are the
-    perturbation. The equations are then linear, so that the perturbation may be of any size. The
-    derived perturbation is the initial perturbation, multiplied by the program's amplification
-    matrix in every step.
+    C and the torque are zero, omega3 is the spin, omega1 and omega2 are the perturbation. The
+    equations are then linear, so that the perturbation may be of any size.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
@@ -151,9 +131,7 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
     """Return the growth factor of a collocation step on x' = z x, measured and derived.
 
-    `listing` is a collocation program with a choice of its defects. The measured factor is computed
-    by its Python version, in step number `step` of a run with steps of 1 s. The derived factor is
-    an element of the amplification matrix, by which the step multiplies perturbations.
+    The Python version computes it, in step number `step` of a run with steps of 1 s.
     """
     program = listing.program
     moved = _moved(listing, step)
@@ -174,12 +152,9 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
 def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
 
-    z is the step size times an eigenvalue of the equations of a spinning top. It is varied along
-    `direction`, which is -1 or 1j. The distance is measured by bisection over runs of the program
-    `listing`. With the defect `base-not-restored`, the program propagates a second vector besides
-    omega from step to step. Then omega may have a constant part, which would hide the growth of a
-    perturbation. In this case growth is measured by the change of omega from step to step, and
-    otherwise by omega itself.
+    z is varied along `direction`, -1 or 1j, and bisected over runs of a spinning top. With the
+    defect `base-not-restored`, a second vector is propagated and omega may have a constant part,
+    which would hide the growth; growth is then measured by the change of omega from step to step.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -210,23 +185,16 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
 
 
 def _moved(listing: Listing, step: int) -> float:
-    """Return the factor by which a defect has moved the collocation points in a step.
-
-    With the defect `dt-accumulates`, the distances of the collocation points from the start of the
-    step are multiplied by the number `step` of the step, counted from 1. This number is then the
-    factor. If the program version `listing` does not have this defect, the factor is 1.
-    """
+    """Return the factor by which `dt-accumulates` moves the points in a step (from 1), else 1."""
     return float(step) if listing.has("dt-accumulates") else 1.0
 
 
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
     """Return the derivative of a collocation step at an unsteady omega, measured and derived.
 
-    The derivative is that of omega after the step with respect to omega before it. It is measured
-    with the Python version of the program, in step number `step` of a run. It is taken at the
-    scene's omega, which is no steady rotation. With the step size h, omega after the step is omega
-    + h F + h**2/2 J F + w h**3 Q(F). F is the right-hand side, J is its Jacobian, and Q is its
-    quadratic part. Only the weight w depends on the positions of the collocation points.
+    It is measured with the Python version, in step number `step`. With step size h, omega becomes
+    omega + h F + h**2/2 J F + w h**3 Q(F), where F is the right-hand side and Q its quadratic part.
+    Only the weight w depends on the positions of the collocation points.
     """
     program, h = listing.program, scene.step_size
     moved = _moved(listing, step)
@@ -244,7 +212,7 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
     a, omega = np.array(coefficients), np.array(scene.omega)
 
     def along(direction: Array) -> Array:
-        """Return the Jacobian of Euler's equations (13-15 of the thesis) at omega = `direction`."""
+        """Return J at omega = `direction`."""
         x, y, z = direction
         return np.asarray(a[:, None] * np.array([[0.0, z, y], [z, 0.0, x], [y, x, 0.0]]))
 
@@ -257,12 +225,10 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
 def _differentiated(
     stepped: Callable[[Array], Array], omega: Sequence[float], count: int
 ) -> tuple[Array, float, float]:
-    """Return the derivative of a step by differences, the reach of the differences, and a factor.
+    """Return the derivative of a step by differences, their reach (rad/s), and a factor.
 
-    `stepped` maps omega before the step to omega after the step, and the derivative is taken at
-    `omega`. There are `count` pairs of neighbouring omegas along each axis. The reach is the
-    distance from `omega` to the farthest neighbour (rad/s). The factor is the ratio of the rounding
-    error of the derivative to the rounding error of a step.
+    There are `count` pairs of neighbouring omegas along each axis. The factor is the rounding error
+    of the derivative over that of a step.
     """
     base = np.array(omega)
     reach = _REACH * float(np.abs(base).max())
@@ -281,10 +247,8 @@ def _differentiated(
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
     """Return a bound on the rounding error of each omega in a step, in units of 2**-53 rad/s.
 
-    `sizes` are bounds of abs(omega) before the step. `moved` is the factor by which a defect has
-    multiplied the distances of the collocation points from the start of the step. The bound sums
-    the terms of the step with all signs positive, because rounding errors are proportional to these
-    terms.
+    `sizes` bounds abs(omega) before the step; `moved` is the factor of `_moved`. Rounding errors
+    are proportional to the terms of the step, which are summed with all signs positive.
     """
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":

@@ -28,11 +28,9 @@ DOUBLING = Basis(
 class Divergence:
     """The smallest step size (s) for which runs diverge, as found by running and as predicted.
 
-    `found` is the smallest step with which a component of omega overflows, or exceeds twice its
-    largest magnitude in the true solution. It is 0 if this already happens with the smallest step
-    that is tried. `predicted` is the smallest step with which, by linear stability, the wobble
-    about axis 3 doubles. `limit` is the largest allowed difference of `found` and `predicted`,
-    relative to `predicted`.
+    A run diverges if a component of omega overflows or exceeds twice its true maximum; `found` is 0
+    if the smallest step tried does. With `predicted`, the wobble about axis 3 doubles by linear
+    stability. `limit` bounds the relative difference.
     """
 
     found: float
@@ -45,9 +43,9 @@ def divergence(
 ) -> Divergence:
     """Return the step sizes at which runs of a spinning body diverge, as found and as predicted.
 
-    The body has no torque, and spins about a stable axis 3 for `time` (s). `runner` runs a scene by
-    a method. `matrix` is the amplification matrix of the method's step, from which the prediction
-    follows. `smallest` is the smallest step size that is tried (s).
+    The body has no torque, and spins about a stable axis 3 for `time` (s). `matrix` is the
+    amplification matrix of the method that `runner` runs; `smallest` is the smallest step tried
+    (s).
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -72,10 +70,8 @@ def divergence(
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
     """Return the smallest step (s) with which a run exceeds twice the largest true omega.
 
-    Each component of omega is compared with twice its own largest magnitude in the true solution.
-    `runner` runs the scene until `time` (s). The number of steps is found by bisection. Return 0 if
-    a component exceeds this bound even with the step `smallest` (s). Return infinity if no
-    component exceeds it with any step.
+    Each component has its own bound. The number of steps is found by bisection. Return 0 if even
+    the step `smallest` (s) exceeds it, infinity if none does.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 
@@ -99,9 +95,8 @@ def _doubling(
 ) -> float:
     """Return the smallest step (s) for which, by theory, a wobble grows 2 exp(`missed`)-fold.
 
-    `missed` allows for a peak of the wobble between two steps. `matrix` is the amplification matrix
-    of a step, `rate` is the angular frequency of the wobble (1/s), and `time` (s) is the duration
-    of the growth. The step is found by bisection between `smallest` (s) and `time`.
+    `missed` allows for a peak between two steps; `rate` is the wobble's angular frequency (1/s).
+    The step is bisected between `smallest` and `time` (s).
     """
     wanted = math.log(2.0) + missed
 

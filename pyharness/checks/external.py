@@ -1,8 +1,7 @@
 """Checks of every method against published results that were not computed here.
 
-A check passes if the difference from the published number is at most the sum of three terms. The
-terms are the accuracy of the published number, the error that the method may have, and the effect
-of rounding the input numbers of the problem to binary64.
+The limit is the sum of the accuracy of the published number, the error that the method may have,
+and the effect of rounding the problem's numbers to binary64.
 """
 
 import math
@@ -62,12 +61,10 @@ _Result = tuple[Array, float]
 
 
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
-    """Yield checks that compare every method with the published results of each problem.
+    """Yield checks of every method that takes a problem: ``external/<problem>/<time>/<method>``.
 
-    A method that can't solve a problem is left out. The ids of the checks are
-    ``external/<problem>/<time>/<method>``. The value of a check is the difference from the
-    published result, in the problem's unit. Value and limit are for the component of omega with the
-    largest ratio of value to limit. `only` has the beginnings of the requested ids.
+    Value and limit, in the problem's unit, are those of the component of omega with the largest
+    ratio.
     """
     for problem in problems:
         # Times of one sign are solved together, so that a replay of one check gives the same bits.
@@ -85,11 +82,9 @@ def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> It
 def _names(
     problem: Problem, values: Sequence[Value], method: str, only: Sequence[str], quantity: str = ""
 ) -> list[tuple[int, Name]]:
-    """Return pairs of an index in `values` and a name, one for each requested check of a method.
+    """Return index in `values` and name of each requested check of a method.
 
-    `values` are the published results by time, and `only` has the leading parts of the requested
-    ids. `quantity` is the last part of the ids, if it is not empty. Return an empty list if the
-    method can't take the problem.
+    There are none if the method can't take the problem.
     """
     given = "" if problem.path is None else f" --external {shlex.quote(problem.path)}"
     places = [f"{problem.name}/{value.time}" for value in values]
@@ -103,12 +98,10 @@ def _names(
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
-    """Return the check of a method that has no result at the time of the published `value`.
+    """Return the check of a method that has no result at the time of `value`.
 
-    `refusal` is the message with which the method refused the problem. It is empty if the run ended
-    before that time; the check then fails. If the method refused a problem from a user's file, the
-    check passes, because it may take the method too long. The methods `auto` and `closed-form` may
-    not refuse.
+    `refusal` is empty if the run ended before. A method may refuse a problem from a user's file,
+    which may take it too long, except `auto` and `closed-form`.
     """
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
@@ -117,13 +110,7 @@ def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
 
 
 def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
-    """Yield checks of every method that propagates attitudes against the published attitudes.
-
-    `values` are the published results, and `only` has the beginnings of the requested ids. The
-    value of a check is the angle between the two attitudes (rad). The limit is the sum of the
-    published accuracy, the tolerance of the method, and the effect of rounding the input numbers of
-    the problem.
-    """
+    """Yield checks of the published attitudes; value and limit are angles (rad)."""
     scene, times = problem.scene, [float(value.time) for value in values]
     for method in (name for name in _SOLVED if REGISTRY[name].attitude and values):
         asked = _names(problem, values, method, only, "attitude")
@@ -150,11 +137,10 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
-    """Return the change of attitude that rounding the numbers of a scene causes at each time (rad).
+    """Return the change of attitude that rounding the scene's numbers causes at each time (rad).
 
-    The changes caused by each number and by the time alone are computed to first order, and their
-    magnitudes are added. If the scene can't be solved, only the rounding of the quaternions is
-    counted.
+    First-order changes by each number and the time are added in magnitude. If the scene can't be
+    solved, only the rounding of the quaternions is counted.
     """
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows
@@ -194,11 +180,10 @@ def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Ite
 def _as_far_as_solved(
     solve: Callable[[Sequence[Value]], list[_Row]], values: Sequence[Value]
 ) -> tuple[list[_Row], str]:
-    """Return the results of `solve` for as many values as possible, and the message of any refusal.
+    """Return the results of `solve` for as many values as possible, and its refusal or "".
 
-    `solve` refuses values by an InputError. All published values are first solved together. If this
-    is refused, they are solved one by one up to the first refusal, because an earlier time may be
-    within the work limit. The message is empty if nothing was refused.
+    If all together are refused, they are solved one by one, because an earlier time may be within
+    the work limit.
     """
     try:
         return solve(values), ""
@@ -218,10 +203,9 @@ def _as_far_as_solved(
 
 
 def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
-    """Return omega and its error bound (rad/s) by a method at the time of each published value.
+    """Return omega and its error bound (rad/s) by a method or program at each published value.
 
-    `method` may also be a program of the thesis. An element is None if the program's linear solver
-    declares the equations singular even with the longest step that is tried.
+    An element is None if the program's linear solver finds the equations singular with every step.
     """
     if method in PROGRAMS:
         return [_program(problem, value, method) for value in values]
@@ -229,11 +213,7 @@ def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Re
 
 
 def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
-    """Return whether a method can solve a scene at these times (s), whatever the tolerance.
-
-    Programs of the thesis integrate only forward in time. The methods `closed-form` and `quick`
-    solve only some scenes.
-    """
+    """Return whether a method can solve a scene at these times (s), whatever the tolerance."""
     if method == "closed-form":
         return closed_form(scene) is not None
     if method == "quick":
@@ -260,11 +240,9 @@ def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Resu
 def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     """Return omega by a corrected program at the time of `value`, and a bound on its error.
 
-    `value` is a published result. The step is halved until the error is below a tenth of the
-    published accuracy, or is rounding error. The error is estimated from the last halving, and
-    doubled for safety. Rounding may add half a unit in the last place per step. Return None if the
-    program's linear solver declares the equations singular even with the longest step that is
-    tried.
+    The step is halved until the error is below a tenth of the published accuracy, or is rounding
+    error. The last halving estimates it, doubled for safety; rounding may add half a unit in the
+    last place per step. Return None if even the longest step gives singular equations.
     """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
@@ -316,18 +294,17 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
 
 
 def _scale(scene: Scene, omega: Array) -> float:
-    """Return the largest abs(omega) at the start and at the end of a motion (rad/s).
+    """Return the largest abs(omega) at the start and at the end (rad/s).
 
-    Larger values in between are not counted, so that the limits of checks become no wider.
+    Values in between are left out, so that limits become no wider.
     """
     return max(*map(abs, scene.omega), float(np.abs(omega).max()))
 
 
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
-    """Return the change of omega caused by rounding the numbers of a scene (rad/s), by time.
+    """Return the change of omega by rounding a scene's numbers (rad/s), by printed time.
 
-    The keys are the times of the published `values`, as printed. The change is set to zero at a
-    time that no solution reaches. The check of a method at this time reports the reason.
+    It is zero at a time that no solution reaches; the method's check there reports why.
     """
 
     def solve(values: Sequence[Value]) -> list[Array]:
@@ -344,11 +321,9 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
 
 
 def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
-    """Return the change of omega caused by rounding the numbers of a scene and its times (rad/s).
+    """Return a row for each time: the change of omega by rounding the scene's numbers (rad/s).
 
-    The changes caused by each number alone are computed to first order, from solutions by `method`,
-    and their magnitudes are added. The result has a row for each time, which is zero if the
-    solution does not reach this time.
+    First-order changes by each number are added in magnitude; a row that is not reached is zero.
     """
     moved = np.zeros((len(times), 3))
     run = method_candidate(method, METHODS[method].finest).rows

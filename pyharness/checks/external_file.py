@@ -1,7 +1,6 @@
 """Published results that were not computed here, and the files that describe them.
 
-A file contains a scene in the format of a scene file, the source of the published numbers, and the
-digits of these numbers as printed. The accuracy of a number is derived from its digits.
+A file has a scene, the source, and the digits as printed, from which the accuracy follows.
 """
 
 import math
@@ -76,9 +75,9 @@ class Problem:
 def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
     """Return the published number with the digits `text`, and its accuracy.
 
-    The accuracy is half a unit of the last digit, or `good_to` if that is larger. `good_to` is the
-    error that the source states. Raise InputError, with `where` in front of its message, if `text`
-    is not the text of a number, or is too large for binary64.
+    The accuracy is half a unit of the last digit, or the error `good_to` that the source states if
+    that is larger. Raise InputError, whose message `where` begins, if `text` is no number or is too
+    large for binary64.
     """
     if not isinstance(text, str):
         raise InputError(f"{where}: {kind_of(text)}; allowed: the digits as text, '0.606'")
@@ -95,10 +94,9 @@ def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
 
 
 def read_problem(path: str | Path) -> Problem:
-    """Return the published problem that a user's file describes.
+    """Return the problem in a user's file (docs/how-to/external.md).
 
-    The format is documented in docs/how-to/external.md. Raise InputError if the file can't be read,
-    or if a field of it is missing, unknown or no number.
+    Raise InputError if the file can't be read, or a field is missing, unknown or no number.
     """
     return _read(path, str(path))
 
@@ -197,10 +195,9 @@ def _value(entry: object, sequence: object) -> Value:
 def _pointing(
     where: str, entry: dict[str, Any], sequence: object, good_to: float
 ) -> Pointing | None:
-    """Return the attitude published in one `[[value]]` entry of a TOML file; None if there is none.
+    """Return the attitude in one `[[value]]` entry, a quaternion or Euler angles, if any.
 
-    The entry has a quaternion, or Euler angles. `sequence` names the axes of the three rotations.
-    `good_to` is the error that the source states. Messages of errors begin with `where`.
+    `sequence` names the axes of the three rotations.
     """
     given = [key for key in ("attitude", "angles_deg") if key in entry]
     if not given:

@@ -1,8 +1,7 @@
 """The golden record: the trajectories that this version computes, as exact text.
 
-There is one file for each program or method, with one entry for each trajectory. An entry has the
-command that computes the trajectory, how the run ended, a digest of all rows, and three rows. These
-are the first, the tenth and the last row, as hexadecimal floats.
+Each program or method has a file. The entry of a trajectory has its command, how the run ended, a
+digest of all rows, and the first, tenth and last row as hexadecimal floats.
 """
 
 import hashlib
@@ -54,10 +53,7 @@ _KEYS = ("command", "ended", "steps", "evaluations", "stop", "digest")
 
 @dataclass(frozen=True)
 class Recorded:
-    """A trajectory of the golden record, with the command and the scene that produce it.
-
-    The golden record is a folder of stored results, with which each new version is compared.
-    """
+    """A trajectory of the golden record, with the command and the scene that produce it."""
 
     source: str  # the program or method, which is the name of its file
     name: str  # the last parts of the id of its check, as in ``case-3/original``
@@ -76,11 +72,7 @@ class Recorded:
 
 
 def recorded() -> Iterator[Recorded]:
-    """Yield the trajectories that the golden record must contain: all cases, by several methods.
-
-    The golden record is a folder of stored results. Each program of the thesis is included in its
-    original and its corrected version.
-    """
+    """Yield the trajectories of the record: all cases by methods and both versions of programs."""
     for case in case_numbers():
         scene = case_scene(case)
         command = f"python -m pyharness run --case {case}"
@@ -97,14 +89,11 @@ def recorded() -> Iterator[Recorded]:
 
 
 def golden(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks that compare the trajectories computed now with the golden record.
+    """Yield deferred comparisons with the golden record, if its folder `chosen.record` exists.
 
-    The golden record is a folder of stored results, which `chosen` names. Programs and methods with
-    a fixed step must agree with the record to the last bit. Methods that state an error must agree
-    within twice this error, because processors and compilers may round their operations
-    differently. If sine and cosine come from another mathematical library than in the record,
-    results under a torque with waves may differ by rounding. Yield nothing if the folder does not
-    exist. A deferred check is computed only if it is requested.
+    Programs and methods with a fixed step must agree to the last bit, methods that state an error
+    within twice this error, because processors and compilers round differently. With another
+    mathematical library, results under a torque with waves may differ by rounding.
     """
     if not chosen.record.is_dir():
         return
@@ -155,11 +144,7 @@ def _compared(
 
 
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return the contents of each file of the golden record (stored results) in `folder`.
-
-    The result is a dictionary by the name of the program or method. Raise InputError if a file is
-    not a valid record.
-    """
+    """Return the files in `folder` by program or method; raise InputError for an invalid one."""
     found = {}
     for path in sorted(folder.glob("*.toml")):
         try:
@@ -182,11 +167,9 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
-    """Return the files of a new golden record, by name, and its differences from the old record.
+    """Return the files of a new golden record, by name, and its differences from the old, in words.
 
-    The golden record has stored results of programs and methods. The old record is in `folder`.
-    Each difference is a line of text. A file of the old record is omitted if none of its
-    trajectories is computed any more.
+    A file none of whose trajectories is computed any more is left out.
     """
     try:
         known = read_record(folder) if folder.is_dir() else {}
@@ -209,10 +192,7 @@ def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
 
 
 def mathematics() -> str:
-    """Return the name of this system's mathematical library, which computes sine and cosine.
-
-    The golden record (stored results) contains the name of the library with which it was made.
-    """
+    """Return the name of this system's mathematical library, which computes sine and cosine."""
     return " ".join([*platform.libc_ver(), platform.system(), platform.machine()]).strip()
 
 
@@ -234,11 +214,7 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
 
 
 def _digest(rows: Array, run: Trajectory) -> str:
-    """Return a SHA-256 digest of every bit of the rows of a run, and of its error codes, if any.
-
-    The error code IER of each step comes from the linear solver of the collocation programs. All
-    NaNs count as one bit pattern. The digest is shortened to 32 hexadecimal digits.
-    """
+    """Return 32 hexadecimal digits of SHA-256 of all rows and error codes; NaNs are alike."""
     digest = hashlib.sha256(np.where(np.isnan(rows), np.nan, rows).astype("<f8").tobytes())
     if run.ier is not None:
         digest.update(run.ier.astype("<i4").tobytes())
@@ -246,20 +222,12 @@ def _digest(rows: Array, run: Trajectory) -> str:
 
 
 def _rows(entry: dict[str, Any]) -> Array:
-    """Return the rows in an entry of the golden record (stored results) as an array.
-
-    The columns are step number, time, TIME, omega and, for programs, translational velocity. TIME
-    is the time that a program writes, which a defect may make wrong.
-    """
+    """Return an entry's rows: step, time, TIME as written, omega and, for programs, velocity."""
     return np.array([[float(row[0]), *map(float.fromhex, row[1:])] for row in entry["rows"]])
 
 
 def _moved(old: dict[str, Any], new: dict[str, Any]) -> str:
-    """Return a text that describes how two entries of the golden record differ.
-
-    `old` and `new` are stored results for one trajectory. Differences of numbers are in units in
-    the last place.
-    """
+    """Return a text on how two entries differ, with numbers in units in the last place."""
     parts = [
         f"{key} {old[key] or 'none'} -> {new[key] or 'none'}"
         for key in ("ended", "steps", "evaluations", "stop")

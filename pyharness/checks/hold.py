@@ -1,6 +1,7 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
-The errors of the programs of the thesis on the same scenes are reported without a bound.
+The errors of the programs of the thesis are reported without a bound. `flow` or `truth.flow` is the
+conditioning: error amplification and rounding errors of the motion.
 """
 
 import math
@@ -55,10 +56,8 @@ FORMS = ("closed-form", "auto")
 def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Truth:
     """Return the true omega of a scene at `time` (s), with its error bound and conditioning.
 
-    The conditioning, `flow`, has the error amplification and the rounding errors up to `time`; it
-    is computed if it is not given. For a body with known moments and no torque, the solution
-    consists of elliptic functions. For any other scene, `pyharness.truth.reference` computes the
-    solution.
+    Without torque the solution consists of elliptic functions; else `pyharness.truth.reference`
+    computes it.
     """
     flow = flow or conditioning(scene, time)
     if not _is_free(scene):
@@ -87,10 +86,8 @@ def check_all(
 ) -> Iterator[Attempt]:
     """Yield deferred checks of all methods in the extreme scenes of the trial named `suite`.
 
-    A trial is a group of checks under one kind of extreme conditions. ``checks(name, time)`` yields
-    the checks in the scene of `name` at `time` (s); by default it is the function `check_methods`.
-    In the scenes for which `has_programs` is true, the errors of the programs of the thesis are
-    also reported, without a limit. A deferred check is computed only if it is requested.
+    ``checks(name, time)``, by default `check_methods`, yields those of a scene; programs are
+    described where `has_programs` is true.
     """
     for each in EXTREMES[suite]():
         name = named(suite, "", each.name, scene=each.scene)
@@ -109,18 +106,14 @@ def check_methods(
 ) -> Iterator[Attempt]:
     """Yield deferred checks of the error of each method at `time` (s) in the scene of `name`.
 
-    `methods` has the names of the methods. `truth` computes the true solution. `tolerances` returns
-    the tolerances at which a method is tried, by default those of the function `affordable`.
-    `judged` makes the checks of one method at one tolerance. A deferred check is computed only if
-    it is requested.
+    `tolerances`, by default `affordable`, returns those at which a method is tried; `judged` makes
+    the check of a method at a tolerance.
 
-    By default, the limit of the error is the sum of three terms. The first term is the method's
-    tolerance or, for a fixed step without torque, a bound that follows from the method's order. The
-    second term is the rounding error. The error amplification of the motion multiplies both. The
-    third term is the error of the true solution. If there is no first term, or if the sum leaves
-    fewer than two digits of omega, no limit is set. Without torque, the errors of energy and
-    momentum always have a limit, because the flow does not amplify them. A method fails if it
-    refuses a scene that it must solve.
+    By default, the limit is the sum of three terms: the method's tolerance (for a fixed step
+    without torque, a bound that follows from the order) and the rounding error, both amplified, and
+    the error of the true solution. Without the first, or if the sum leaves fewer than two digits of
+    omega, no limit is set. Without torque, energy and momentum always have one, because the flow
+    does not amplify their errors. A method fails if it refuses a scene that it must solve.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -137,12 +130,11 @@ def check_methods(
 
 
 def run_method(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
-    """Return omega at `time` (s) by the method `name`, and how the run ended, as an `End`.
+    """Return omega at `time` (s) by the method `name`, and how the run ended.
 
-    If the tolerance is None, the method uses the scene's step size and runs as a prepared solver.
-    Such a solver is set up once by `prepare` for one scene, and then takes many initial conditions.
-    The methods `auto` and `quick` always run as prepared solvers. If a prepared solver refuses the
-    scene, the result may state the refusal. Any other refusal raises InputError.
+    Without a tolerance the method uses the scene's step size as a prepared solver; `auto` and
+    `quick` are always prepared. The result may state a refusal of these; any other raises
+    InputError.
     """
     if name in ("auto", "quick") or tolerance is None:
         return prepared_candidate(name, tolerance or 1.0).end(scene, time)
@@ -156,12 +148,8 @@ def _steps(scene: Scene, time: float) -> int:
 def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse a scene; every other refusal is a fault.
 
-    A method refuses a scene if it gives a message instead of a result. `tried` has the method and
-    the scene, and `truth` is the true solution. `why` is the message of the refusal and does not
-    matter here. The method `closed-form` may refuse a scene that has no closed form. The method
-    `quick` may refuse every scene, because it requires that the coefficients A, B and C of Euler's
-    equations are not 0 and that few steps suffice. Methods that use the Taylor series may refuse a
-    torque with a wave whose phase exceeds 1e8 radians, because they would take too long.
+    `closed-form` may if there is no closed form, `quick` always (it requires A, B, C other than 0
+    and few steps), and methods of Taylor series if the phase of a wave exceeds 1e8 radians.
     """
     method, scene = tried.method, tried.scene
     if method == "closed-form":
@@ -172,12 +160,10 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
 
 
 def _derived(truth: Truth, tried: MethodRun) -> float | None:
-    """Return the limit of a method's error: the errors of its steps and rounding, both amplified.
+    """Return the limit of a method's error relative to the largest omega: steps and rounding.
 
-    `tried` is the run of the method, and `truth` is the true solution. The limit is relative to the
-    largest omega. It is None if no bound on the errors of the steps is known, and infinite if it
-    would leave fewer than two digits of omega. The amplification is the error amplification of the
-    motion. The limit of a closed form is not amplified.
+    Both are amplified by the motion, except for a closed form. It is None if no bound on the steps
+    is known, infinite if it leaves fewer than two digits of omega.
     """
     made = promised_sum(tried, truth)
     if truth.exact and tried.method in FORMS:
@@ -197,10 +183,7 @@ DERIVED = Policy(_derived, promises.STEPS, refusable)
 
 
 def _roundings(tried: MethodRun, truth: Truth) -> float:
-    """Return the number of steps in which a run rounds omega without compensated summation.
-
-    `tried` is the run, and `truth` is the true solution of the same scene.
-    """
+    """Return the number of steps in which a run rounds omega without compensated summation."""
     method, answer = tried.method, tried.answer
     if tried.tolerance is None:
         return 0.0 if method in GAUSS else float(_steps(tried.scene, truth.end))
@@ -230,7 +213,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
 
 
 def scene_of(name: Name) -> Scene:
-    """Return the scene that belongs to the name of a check; the name must have a scene."""
+    """Return the scene that the name of a check must have."""
     assert name.scene is not None
     return name.scene
 
@@ -238,10 +221,8 @@ def scene_of(name: Name) -> Scene:
 def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
     """Return the bound that checks set on the sum of the errors of a method's steps.
 
-    `tried` is the run of the method, and `truth` is the true solution. The bound is relative to the
-    largest omega. For a method with a fixed step in a scene without torque, it follows from the
-    order of the method. In all other cases it is the tolerance of the run, or None if the run has
-    no tolerance.
+    It is relative to the largest omega: from the order for a fixed step without torque, else the
+    tolerance, if any.
     """
     if tried.method in FIXED_STEP and truth.exact:
         radians = speed(tried.scene, truth.flow.largest) * abs(truth.end)
@@ -253,10 +234,10 @@ def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
 def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
     """Return the smallest error of `omega` that explains its drift of energy and momentum.
 
-    The error is relative to `largest`, the largest abs(omega) of the motion (rad/s). Energy and
-    squared momentum are sums of q w**2, where w are the components of omega, and q are the moments
-    or their squares. An error e of every component changes such a sum by at most 2 e times the sum
-    of q abs(w). The change of the sum that was found therefore requires an error of at least e.
+    It is relative to `largest`, the largest abs(omega) (rad/s). Both quantities are sums of q w**2
+    over the components w, with q the moments or their squares. An error e of every component
+    changes the sum by at most 2 e times the sum of q abs(w), so that the change found requires at
+    least e.
     """
     assert scene.moments is not None
     if not np.isfinite(omega).all():
@@ -276,11 +257,9 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 
 
 def describe_programs(name: Name) -> Iterator[Attempt]:
-    """Yield deferred checks that report, without a limit, the largest error of each program.
+    """Yield deferred reports of the largest error of each program, original and corrected.
 
-    The programs of the thesis, original and corrected, run over the steps of the scene that belongs
-    to `name`. The error of omega is relative to the largest omega, and is taken at about ten of the
-    steps. A deferred check is computed only if it is requested.
+    The error is relative to the largest omega, at about ten of the scene's steps.
     """
     scene = scene_of(name)
     every = max(1, scene.steps // _ROWS)
@@ -306,9 +285,6 @@ def describe_programs(name: Name) -> Iterator[Attempt]:
 
 
 def apart(found: Array, wanted: Array) -> float:
-    """Return the largest absolute difference between elements of two arrays.
-
-    Only the rows that both arrays have are compared.
-    """
+    """Return the largest absolute difference in the rows that both arrays have."""
     n = min(len(found), len(wanted))
     return float(np.abs(found[:n] - wanted[:n]).max(initial=0.0))

@@ -31,8 +31,8 @@ MOST = 2.0
 class Answer:
     """A method's answer to a check: its results, or the reason why it refused the scene.
 
-    The results are those at all requested times, or only at the last one. The answer has no rows if
-    the method refused, or if its rows are not those that were requested.
+    The results are at all requested times, or at the last. There are no rows after a refusal, or if
+    they are not those requested.
     """
 
     omega: Array = field(default_factory=lambda: np.empty((0, 3)))  # shape (n, 3), rad/s
@@ -45,11 +45,7 @@ class Answer:
 
 
 def of_end(method: str, end: End) -> Answer:
-    """Return the answer of `method` for one time, made from the `End` of its call.
-
-    An `End` has omega at this time and how the run ended. If a solver that `prepare` set up for the
-    scene has refused it, the answer contains the reason instead of omega.
-    """
+    """Return the answer of `method` from the `End` of its call."""
     if end.is_refused:
         return Answer(refusal=f"{method}: {end.ended}")
     attitude = None if end.attitude is None else end.attitude[None, :]
@@ -58,11 +54,7 @@ def of_end(method: str, end: End) -> Answer:
 
 
 def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answer:
-    """Run a candidate, a method with its tolerance, at all `times` (s) and return its answer.
-
-    The answer has attitudes if the scene has one. If the run does not give all requested rows, the
-    answer has none, and its field `is_whole` is false.
-    """
+    """Return the answer of a candidate at all `times` (s), with attitudes if the scene has one."""
     run = candidate.rows(scene, list(times))
     has_rows = run.has_all_rows and run.time.tolist() == list(times)
     if has_rows and (run.attitude is None) == (scene.attitude is None):
@@ -72,11 +64,7 @@ def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answe
 
 @dataclass(frozen=True, eq=False)
 class MethodRun:
-    """A deferred run of a method on a scene.
-
-    The function `ask` makes the run when its results are first needed. `tolerance` is None if the
-    method uses the scene's step size.
-    """
+    """A deferred run of a method on a scene; without `tolerance`, with the scene's step size."""
 
     method: str
     tolerance: float | None
@@ -85,11 +73,7 @@ class MethodRun:
 
     @cached_property
     def answer(self) -> Answer:
-        """Return the answer of the run, which is computed only once.
-
-        An InputError becomes an answer without rows, which has the message of the error as its
-        reason.
-        """
+        """Return the answer of the run, made once; an InputError becomes the refusal in it."""
         try:
             return self.ask()
         except InputError as refusal:
@@ -97,10 +81,7 @@ class MethodRun:
 
 
 def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
-    """Return a deferred run of a method by the function `solve`, with results at all `times` (s).
-
-    The run is made when its results are first needed.
-    """
+    """Return a deferred run of a method by `solve`, with results at all `times` (s)."""
     ask = method_candidate(method, tolerance)
     return MethodRun(method, tolerance, scene, lambda: of_rows(ask, scene, times))
 
@@ -108,11 +89,9 @@ def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float])
 def by_end(
     method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float
 ) -> MethodRun:
-    """Return a deferred run of a candidate, a method or a prepared solver, until one `time` (s).
+    """Return a deferred run of a candidate until one `time` (s).
 
-    A prepared solver is one that `prepare` has set up for one scene. The run is made when its
-    results are first needed. `method` is the name of the method, on which the error limit and the
-    messages of the check depend.
+    `method` decides on the error limit and the messages of the check.
     """
     return MethodRun(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
@@ -128,20 +107,18 @@ class Truth:
     error : float
         Bound on the error of any component of `omega` (rad/s).
     flow : Conditioning
-        Error amplification of the motion and rounding errors, up to the last time.
+        Error amplification and rounding errors of the motion.
     attitude, angle_error : ndarray of shape (n, 4) or None, float
-        The true quaternions, if attitudes are compared instead of omega, and a bound on their error
-        (rad).
+        True quaternions, compared instead of omega if given, and a bound on their error (rad).
     is_signed : bool
-        Whether the sign of a quaternion counts, although both signs give the same rotation.
+        Whether the sign of a quaternion counts.
     data : float
-        Change of omega caused by the rounding of A, B and C, divided by the largest abs(omega).
+        Change of omega by the rounding of A, B and C, divided by the largest abs(omega).
     exact : bool
-        Whether the solution is a closed form without torque. Then `data` is known, and energy and
-        momentum are conserved.
+        Whether it is a closed form without torque: `data` is known, energy and momentum are
+        conserved.
     scene, reference, effort : Scene, Reference and float, or None
-        The scene, its reference solution and the factor on the work limit, if the solution is by
-        the reference.
+        The scene, its reference solution and the factor on the work limit, if that was used.
     """
 
     time: Array
@@ -161,8 +138,7 @@ class Truth:
     def bound(self) -> ErrorBound | None:
         """Return the proved or estimated bound of the error of the reference, else None.
 
-        It is relative to the largest omega, or an angle (rad) if attitudes are compared. The limits
-        of checks do not depend on it.
+        It is relative to the largest omega, or an angle (rad). Limits do not depend on it.
         """
         if self.scene is None or self.reference is None:
             return None
@@ -184,11 +160,9 @@ class Truth:
         return self.error / (self.flow.largest or 1.0)
 
     def error_of(self, answer: Answer) -> float:
-        """Return the largest error of a method's answer, either of its attitudes or of its omegas.
+        """Return the largest error of an answer: an angle (rad), or relative to the largest omega.
 
-        If the true solution has attitudes, these are compared, and the error is an angle (rad). The
-        error of omega is relative to the largest omega. Return NaN if a row of the answer contains
-        NaN.
+        It is NaN if a row contains NaN.
         """
         if self.attitude is None:
             difference = float(np.abs(answer.omega - self.omega[-len(answer.omega) :]).max())
@@ -203,11 +177,7 @@ class Truth:
 
 
 def unknown_flow(largest: float) -> Conditioning:
-    """Return a `Conditioning` with infinite error amplification, for scenes solved in closed form.
-
-    The error limits of closed forms do not depend on the error amplification, so that it is not
-    computed. `largest` is the largest abs(omega) (rad/s).
-    """
+    """Return infinite error amplification, on which limits of closed forms do not depend."""
     return Conditioning(math.inf, MOST, MOST, MOST, largest)
 
 
@@ -219,9 +189,8 @@ def reference_truth(
 ) -> Truth:
     """Return the true solution of a scene at all `times` (s) by the high-precision reference.
 
-    `effort` is a factor on the work limit of the reference. `flow` has the error amplification up
-    to the last time, which is computed if it is not given. Raise InputError if the solution does
-    not reach all times.
+    `effort` is a factor on its work limit. Raise InputError if the solution does not reach all
+    times.
     """
     flow = flow or conditioning_at(scene, times)
     # The reference's steps are accurate to 1e-22. The precise series is requested where the flow
@@ -237,13 +206,7 @@ def reference_truth(
 
 @dataclass(frozen=True)
 class Policy:
-    """A rule for judging methods: the limit of the error, and the scenes that a method may refuse.
-
-    The function `limit` takes the true solution and the run of the method, and `basis` is the
-    reason for its limits. The function
-    `may_refuse` takes the run, the true solution and the message with which the method refused. A
-    method refuses a scene if it gives a message instead of a result.
-    """
+    """A rule for judging methods: the limit of the error, and the scenes that they may refuse."""
 
     limit: Callable[[Truth, MethodRun], float | None]
     basis: Basis
@@ -251,12 +214,10 @@ class Policy:
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
-    """Return the limit of a method's error: errors of its steps, rounding, and the truth's error.
+    """Return the limit of a method's error: its steps' and roundings', and the truth's own.
 
-    The limit is relative to the largest omega, or an angle (rad) if attitudes are compared. `truth`
-    is the true solution with its error bound. `made` is the sum of the errors that the method makes
-    in its steps, in the same unit. `growth` is the error amplification by which `made` is
-    multiplied. `steps` is the number of times that the method rounds omega.
+    It is relative to the largest omega, or an angle (rad), as is `made`, the sum of the errors of
+    the steps, which `growth` multiplies. `steps` is the number of roundings of omega.
     """
     if truth.attitude is not None:
         return truth.flow.angle_limit(made * growth, truth.end) + truth.angle_error
@@ -264,35 +225,29 @@ def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> flo
 
 
 def lively(growth: float) -> float:
-    """Return the factor by which a tolerance is multiplied in an error limit.
-
-    `growth` is the error amplification of the motion. The factor is `growth` if it exceeds the
-    threshold `LIVELY`, and otherwise 1.
-    """
+    """Return the factor on a tolerance in a limit: `growth` above `LIVELY`, else 1."""
     return growth if growth > LIVELY else 1.0
 
 
 def linear(limit: float) -> float:
-    """Return an error limit unchanged, or infinity if it exceeds the relative error `LINEAR`.
+    """Return an error limit, or infinity above `LINEAR`.
 
-    If errors exceed `LINEAR`, the linearised equations do not predict them, and omega has fewer
-    than two correct digits.
+    Larger errors are not predicted by the linearised equations, and leave fewer than two digits of
+    omega.
     """
     return limit if limit <= LINEAR else math.inf
 
 
 def tolerance_of(tried: MethodRun) -> float:
-    """Return the tolerance of a run; the run must have a tolerance and not a fixed step size."""
+    """Return the tolerance of a run, which must have one."""
     assert tried.tolerance is not None
     return tried.tolerance
 
 
 def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether a method may refuse the scene of the run `tried` with the message `why`.
+    """Return whether the refusal `why` is of a scene without closed form, or of `quick`.
 
-    A method refuses a scene if it gives a message instead of a result. The method `closed-form` may
-    refuse a scene that has no closed form. The method `quick` may refuse a scene if one of the
-    coefficients A, B and C of Euler's equations is 0. The true solution `truth` does not matter.
+    `quick` may refuse if A, B or C is 0.
     """
     if tried.method == "quick":
         # `quick` requires that A, B and C are not 0.
@@ -301,10 +256,9 @@ def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
 
 
 def _granting(factor: Callable[[float], float]) -> Callable[[Truth, MethodRun], float]:
-    """Return a function that computes an error limit: tolerance times ``factor(K)``, plus rounding.
+    """Return a function for limits: tolerance times ``factor(K)``, rounding and the truth's error.
 
-    K is the error amplification of the motion. The limit also contains the error of the true
-    solution.
+    K is the error amplification of the motion.
     """
     return lambda truth, tried: allowed(
         truth, tolerance_of(tried), factor(truth.flow.amplification)
@@ -325,9 +279,7 @@ AMPLIFIED = Policy(_granting(lambda growth: growth), FLOW)
 def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
     """Return the check that the error of a method's answer is within the limit of the policy.
 
-    `tried` is the run of the method, and `truth` is the true solution. `policy` sets the limit, and
-    the scenes that the method may refuse. If the method refused a scene, the check passes if the
-    policy permits it. If the policy sets no limit, a finite error is only reported. The method
+    A refusal passes if the policy permits it. Without a limit, a finite error is only reported.
     `closed-form` fails if it solves a scene that has no closed form.
     """
     answer = tried.answer

@@ -1,8 +1,4 @@
-"""The kinds of checks of `verify`; the first part of a check's id is its kind.
-
-Some kinds compare the results of Fortran and Python bit for bit. Other kinds compare results with
-the true solution, or with recorded results.
-"""
+"""The kinds of checks of `verify`; the first part of a check's id is its kind."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -75,9 +71,6 @@ _OF_THE_USER = ("external", "golden")
 
 
 def verify(chosen: Selection) -> Iterator[Check]:
-    """Yield the results of the checks that the selection `chosen` requests.
-
-    The checks are computed one after another, as they are requested from the iterator.
-    """
+    """Yield the results of the checks that `chosen` requests, computed as they are requested."""
     suites = {kind: partial(attempts, chosen) for kind, attempts in KINDS.items()}
     return run_suites(suites, chosen.only, "verify", _OF_THE_USER)

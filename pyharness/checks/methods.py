@@ -1,8 +1,7 @@
 """Checks of methods against the high-precision reference in the cases of Table 1.
 
-Omega and attitude are compared. Methods are run by `solve` and as prepared solvers. A tolerance
-applies to the error of omega relative to the largest omega, or to the angle of the attitude error
-in radians.
+A tolerance applies to the error of omega relative to the largest omega, or to the angle of the
+attitude error (rad). A prepared solver is set up once by `prepare` for a scene and many calls.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -50,12 +49,7 @@ _PREPARED_TURNED = ("auto", "taylor")
 
 
 def methods(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of omega by every method with a tolerance.
-
-    In each case of Table 1 of the thesis, omega is compared with the high-precision reference
-    solution, at all times of the case and at one later time. `chosen` selects the checks. A
-    deferred check is computed only if it is requested.
-    """
+    """Yield deferred checks of omega by every method, at all times of a case and one later."""
     for case in cases(chosen):
         scene = case_scene(case)
         yield from _solved("methods", case, scene, (*scene.times(), _LATER), _SOLVED, chosen.thin)
@@ -64,10 +58,8 @@ def methods(chosen: Selection) -> Iterator[Attempt]:
 def prepared(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of prepared solvers against the reference, forward and back in time.
 
-    A prepared solver is set up once by `prepare` for a scene, and then called for any initial
-    omega. Methods with a fixed step and Gauss collocation use the scene's step size. Their prepared
-    solvers are compared bit for bit with a run of the method that is not prepared. A deferred check
-    is computed only if it is requested.
+    With a fixed step, and by Gauss collocation with the scene's step size, they must agree bit for
+    bit with the unprepared method.
     """
     for case in cases(chosen):
         scene = case_scene(case)
@@ -79,12 +71,7 @@ def prepared(chosen: Selection) -> Iterator[Attempt]:
 
 
 def attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of attitudes against a reference in the cases of Table 1 of the thesis.
-
-    Every method that propagates the attitude is tried, by the function `solve` and as a prepared
-    solver, which `prepare` sets up once for a scene and many calls. A deferred check is computed
-    only if it is requested.
-    """
+    """Yield deferred checks of attitudes, by `solve` and prepared."""
     for case in cases(chosen):
         scene = replace(case_scene(case), attitude=START)
         times = (*scene.times()[9::10], _LATER)
@@ -94,10 +81,7 @@ def attitudes(chosen: Selection) -> Iterator[Attempt]:
 
 
 def cases(chosen: Selection, thin: Sequence[int] = (4, 5)) -> Sequence[int]:
-    """Return the numbers of the cases of Table 1 of the thesis in which checks are made.
-
-    They are all cases, or only the cases `thin` if `chosen` is the selection of the self-test.
-    """
+    """Return the numbers of the cases that are checked: all, or `thin` in the self-test."""
     return thin if chosen.thin else list(case_numbers())
 
 
@@ -128,10 +112,10 @@ def _prepared(
 
 
 def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
-    """Return a deferred run of a method by the function `solve`, with results at all `times` (s).
+    """Return a deferred run by `solve`, with results at all `times` (s).
 
-    `tolerance` may be too fine for a method of SciPy in a scene with attitude. The finest tolerance
-    that the method can meet is then used instead.
+    For a method of SciPy in a scene with attitude, the tolerance is at least the finest that it
+    meets.
     """
     if method in SCIPY_METHODS and scene.attitude:
         # SciPy's methods can't be requested to have so small an error over a long time.
@@ -142,8 +126,7 @@ def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[fl
 def run_of_call(method: str, tolerance: float, scene: Scene, time: float) -> MethodRun:
     """Return a deferred call of a prepared solver with a result at one `time` (s).
 
-    A prepared solver is set up once for a method and a scene. Before this call, the solver is
-    called with another initial omega, which must not affect the result.
+    The solver is first called with another initial omega, which must not affect the result.
     """
     prepare = attitude_candidate if scene.attitude else prepared_candidate
     return by_end(method, prepare(method, tolerance, primed=True), tolerance, scene, time)
@@ -156,9 +139,7 @@ def _judged(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Na
 def _same_steps(scene: Scene, name: Name) -> Check:
     """Return the check that a prepared solver gives the required bits after 100 steps of a scene.
 
-    A prepared solver is one that `prepare` has set up for one scene. For a method with a fixed
-    step, the required bits are the result of the function `solve`. For Gauss collocation, they are
-    the result of a direct call of the compiled kernel.
+    They are those of `solve` for a fixed step, and of the compiled kernel for Gauss collocation.
     """
     method, time = name.subject, 100.0 * scene.step_size
     found = prepared_candidate(method, 1.0).end(scene, time).omega

@@ -1,8 +1,7 @@
 """Checks of the order of methods: the power with which errors decrease as the step is halved.
 
-The errors of corrected programs are measured against `solve_ivp`, and the errors of methods with a
-fixed step against the reference. The translational velocity of the programs is also compared with
-the reference, because no other method computes it.
+Corrected programs are measured against `solve_ivp`, methods with a fixed step against the
+reference; so is the programs' translational velocity, which no other method computes.
 """
 
 from collections.abc import Callable, Iterator
@@ -45,8 +44,7 @@ _FEWEST, _MOST = 16, 4096
 def orders(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of the order of each corrected program and each fixed-step method.
 
-    The value of a check is the theoretical order minus the measured one. `chosen` selects the
-    checks. A deferred check is computed only if it is requested.
+    The value is the theoretical order minus the measured one.
     """
     for case in cases(chosen, (5,)):
         scene = case_scene(case)
@@ -92,12 +90,11 @@ def in_few_steps(scene: Scene, time: float) -> Scene:
 
 
 def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
-    """Return the check of the order of a fixed-step method, in any scene of a user or of a draw.
+    """Return the check of the order of a fixed-step method, the setting or subject of `name`.
 
-    `scene` has the few steps of `in_few_steps`, and ``truth()`` returns its reference solution.
-    `name` has the method as its subject or as its setting. The order is only described if the scene
-    is too fast or too sensitive for so few steps. The same applies if the torque has a table,
-    because steps of a fixed size do not end where it changes, so that the order is lower.
+    `scene` has the steps of `in_few_steps`. The order is only described if it is too fast or
+    sensitive for so few steps, or if the torque has a table: steps do not end where it changes,
+    which lowers the order.
     """
     method = name.setting or name.subject
     run, due = method_candidate(method, 1.0), METHODS[method].order
@@ -113,10 +110,10 @@ def _has_tables(scene: Scene) -> bool:
 
 
 def judged_order(name: Name, found: Order) -> Check:
-    """Return the check that a measured order is at most a small slack below the theoretical one.
+    """Return the check that a measured order is at most `_ORDER_SLACK` below the theoretical one.
 
-    The slack is `_ORDER_SLACK`. The check also passes if the error is as small as rounding before
-    an order can be observed. It fails if the order can't be determined for another reason.
+    It also passes if the error is rounding before an order is seen, and fails if the order can't be
+    determined for another reason.
     """
     missing = None if found.value is None else found.due - found.value
     passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK
@@ -124,10 +121,7 @@ def judged_order(name: Name, found: Order) -> Check:
 
 
 def _by_ivp(scene: Scene) -> Reference:
-    """Return the solution of a scene by `solve_ivp`, as the true solution of the order checks.
-
-    Its error is estimated as the finest tolerance that `solve_ivp` meets, times the largest omega.
-    """
+    """Return the solution by `solve_ivp`; its error is its finest tolerance times largest omega."""
     tolerance = 1.01 * finest(_IVP, scene, scene.times()[-1])
     run = method_candidate(_IVP, tolerance).rows(scene)
     largest = float(np.abs(run.omega).max())

@@ -30,13 +30,11 @@ _COARSE = 1e-6
 
 
 class _Mark(NamedTuple):
-    """A check as a mark (plotted point) in a picture, with the properties that place and style it.
+    """A check as a plotted point, with the properties that place and style it.
 
-    `method` and `circumstance` are the method and the problem of the check. `kind` is the part of
-    the circumstance's name before its first number. Marks with the same `rank` and `what` form a
-    series. `rank` is ``coarse`` or ``fine`` if the setting is a tolerance, and otherwise the
-    setting itself. `what` is ``error`` or ``drift`` if the check compares one of these, and
-    otherwise empty.
+    `kind` is the circumstance's name before its first number. Marks with the same `rank`
+    (``coarse`` or ``fine`` for a tolerance, else the setting) and `what` (``error``, ``drift`` or
+    empty) form a series.
     """
 
     method: str
@@ -48,7 +46,7 @@ class _Mark(NamedTuple):
 
     @property
     def style(self) -> dict[str, Any]:
-        """Return the marker and the colour of this plotted point, as options of Matplotlib."""
+        """Return the marker and the colour of this point, as options of Matplotlib."""
         marker = _MARKERS.get(self.what, "s" if self.rank else "D")
         return {"marker": marker, "color": _COLORS.get(self.rank, "black"), "linestyle": "none"}
 
@@ -67,9 +65,8 @@ def _mark(check: Check) -> _Mark:
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
     """Return a picture of the checks of a trial: values and limits, in a panel for each method.
 
-    A trial is a group of checks under one kind of extreme conditions. The problems of the trial are
-    on the horizontal axis, in the order in which they were tried, but those whose names begin alike
-    are adjacent. Raise InputError if no check has a value.
+    Problems are on the horizontal axis in the order of trial, but those whose names begin alike are
+    adjacent. Raise InputError if no check has a value.
     """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -123,10 +120,9 @@ def _label(rank: str, what: str) -> str:
 
 
 def _places(marks: Sequence[_Mark]) -> dict[tuple[str, str], float]:
-    """Return the position of each problem on the horizontal axis, by its kind and its name.
+    """Return the horizontal position of each problem, by its kind and name.
 
-    A problem is the circumstance of a check. Problems of one kind are side by side, with space for
-    the name of the kind above them.
+    Problems of one kind are side by side, with space for the name of the kind above them.
     """
     names = dict.fromkeys((mark.kind, mark.circumstance) for mark in marks)
     places = {}
@@ -192,8 +188,7 @@ _OF_METHODS: dict[str, dict[str, Any]] = {
 def length_picture(found: Sequence["Drift"]) -> Picture:
     """Return a picture of the errors in a motion's energy and phase against the number of steps.
 
-    `found` has the errors for each motion, method and quantity. There is a column of panels for
-    each motion. The phase is the position along the closed curve of omega in a torque-free motion.
+    Each motion has a column. The phase is the position along the closed curve of torque-free omega.
     """
     from matplotlib.figure import Figure
 
@@ -249,11 +244,9 @@ _LEAST = 1e-13
 
 
 def regions_picture(found: Regions) -> Picture:
-    """Return a picture of the regions of stability in the plane of z.
+    """Return a picture of the regions of stability in the plane of z, step size times eigenvalue.
 
-    z is the step size times an eigenvalue of the linearised equations. `found` has the region of
-    each program. A second panel shows the growth of a perturbation in a step, for z on the
-    imaginary axis.
+    A second panel shows the growth of a perturbation in a step on the imaginary axis.
     """
     from matplotlib.figure import Figure
 

@@ -1,7 +1,7 @@
 """Checks of a port, an implementation of the programs in any language, against the twins.
 
-The results must agree with those of the Python twins bit for bit, in all combinations of program,
-case and listing, and in random scenes. `docs/how-to/ports.md` describes the protocol.
+The results must agree bit for bit in all cells and in random scenes. `docs/how-to/ports.md`
+describes the protocol.
 """
 
 import math
@@ -37,22 +37,9 @@ _LIBRARY = "the torque has sines or cosines, whose last bits differ between libr
 class Cell:
     """A run that is requested from a port: a program with its listing, and a scene.
 
-    Attributes
-    ----------
-    name : str
-        The name of the run, as in ``two-term/case-3/original`` or ``random/7/two-term``.
-    of : Name
-        The name of the check that compares the run.
-    options : str
-        The options of ``verify --port`` that request this run alone.
-    listing : Listing
-        The program with its active defects, readings and conjectures.
-    scene : Scene
-        A case of Table 1, or a random scene.
-    lipschitz : float
-        The constant of the Runge-Kutta program's stop test (1/s).
-    may_stop : bool
-        Whether the stop test may end the run.
+    `name` is that of the run, as in ``random/7/two-term``, `of` that of its check; `options` of
+    ``verify --port`` request it alone. `lipschitz` is the constant of the Runge-Kutta program's
+    stop test (1/s), which ends the run only if it `may_stop`.
     """
 
     name: str
@@ -65,7 +52,7 @@ class Cell:
 
     @property
     def request(self) -> bytes:
-        """Return the line of JSON that requests the run from a port."""
+        """Return the line of JSON that requests the run."""
         return request(self.scene, self.listing, self.lipschitz, self.may_stop)
 
     def twin(self) -> Trajectory:
@@ -78,9 +65,8 @@ class Cell:
 class PortCheck(Check):
     """The result of a comparison of a port with our Python program in one run.
 
-    `seconds` is the time from the request to the port's answer, None if there was no valid answer.
-    `difference` describes the first step that differs, None if no step differs. It is a dictionary
-    with the number of the step and the value of each variable.
+    `seconds` is the time to the port's answer, if valid; `difference` has the first step that
+    differs and the value of each variable.
     """
 
     seconds: float | None = None
@@ -88,12 +74,7 @@ class PortCheck(Check):
 
 
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
-    """Return the requested combinations of program, case and listing.
-
-    A case is one of Table 1 of the thesis. A listing is a program with a choice of its defects, and
-    of its readings of doubtful cards. `cells` has the leading parts of names of combinations, as in
-    ``two-term/case-3``. If it is empty, all combinations of the programs and cases are requested.
-    """
+    """Return the requested cells, whose names begin as one of `cells`; all if it is empty."""
     return [
         Cell(
             cell_name(listing, case), of_cell("port", listing, case),
@@ -109,27 +90,11 @@ def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[st
 def random_cells(
     seed: str, draws: int, cells: Sequence[str] = (), programs: Sequence[str] = PROGRAMS
 ) -> list[Cell]:
-    """Return runs in random scenes, which have names like ``random/7/two-term``.
+    """Return runs in random scenes, named as ``random/7/two-term``, in the order of their numbers.
 
-    For each draw, a body, an initial angular velocity, a torque law, a step size, a program and its
-    listing are drawn. `seed` determines them together with the number of the draw.
-
-    Parameters
-    ----------
-    seed : str
-        The text that seeds the random generator.
-    draws : int
-        The number of draws.
-    cells : sequence of str
-        Leading parts of the names of requested runs; empty for all. The draws that `cells` names by
-        their number are returned even if `draws` is smaller.
-    programs : sequence of str
-        Draws of other programs are left out.
-
-    Returns
-    -------
-    list of Cell
-        The requested runs, in the order of their numbers.
+    `seed` and the number determine scene, program and listing. `cells` has leading parts of
+    requested names, empty for all; a draw that it names by number is returned even if `draws` is
+    smaller.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []
@@ -145,11 +110,10 @@ def random_cells(
 
 
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[PortCheck]:
-    """Yield checks that a port gives the same bits as our Python programs in the given runs.
+    """Yield checks that a port, started by `command`, gives the same bits in the given runs.
 
-    A port is an implementation of the programs of the thesis in any language, started by `command`.
-    An invalid answer is a failed check and ends the comparison. `patience` is the longest time to
-    wait for an answer (s). Raise InputError if `command` is empty.
+    An invalid answer is a failed check and ends the comparison. `patience` is the longest wait for
+    an answer (s). Raise InputError if `command` is empty.
     """
     name, again = Name("port", "start"), replay_command(command)
     try:
@@ -177,10 +141,7 @@ def replay_command(command: str, cell: Cell | None = None) -> str:
 
 
 def asked(process: PortProcess, command: str, cell: Cell) -> PortCheck:
-    """Request a run from the process of a port, and return the check of its answer.
-
-    `command` is the command that started the process. Raise PortError if the answer is not valid.
-    """
+    """Return the check of the answer to a run; raise PortError if it is not valid."""
     begin = time.perf_counter()
     line = process.ask(cell.request)
     seconds = time.perf_counter() - begin
@@ -190,11 +151,9 @@ def asked(process: PortProcess, command: str, cell: Cell) -> PortCheck:
 def compared(
     cell: Cell, twin: Trajectory, line: bytes, again: str = "", seconds: float | None = None
 ) -> PortCheck:
-    """Return the check that a port's answer agrees with our program's trajectory `twin`.
+    """Return the check that a port's answer `line` agrees with the trajectory `twin`.
 
-    `cell` is the run that was requested, and `line` the answer. `again` is the command that repeats
-    the check, and `seconds` the time that the port took. Raise PortError if `line` is no valid
-    answer.
+    `seconds` is the time that the port took. Raise PortError if `line` is no valid answer.
     """
     answer = read_answer(line, cell.scene.steps)
     found = differences(twin, answer)
@@ -216,13 +175,7 @@ def _port_check(
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
-    """Return texts that describe how a port's answer differs from the run of our Python program.
-
-    A port is an implementation of a program in any language, and `twin` is the run of our Python
-    version. The texts report the first row that differs, the number of rows, and how the run ended.
-    They also report where the Runge-Kutta program's stop test ended it, and the first error code
-    IER that differs. The list is empty if nothing differs.
-    """
+    """Return texts that describe how a port's answer differs from our Python program's run."""
     wanted, given = _rows(twin), answer.rows
     found = []
     step = _first_step(wanted, given)
@@ -249,7 +202,7 @@ _Rows = np.ndarray[tuple[int, int], np.dtype[np.float64]]
 
 
 def _first_step(wanted: _Rows, given: _Rows) -> int | None:
-    """Return the index of the first row that differs in both arrays, or None if no row differs."""
+    """Return the index of the first row that differs in both arrays, or None."""
     pairs = enumerate(zip(wanted, given, strict=False))
     return next((step for step, (due, row) in pairs if ulps(due, row)), None)
 
@@ -261,7 +214,7 @@ def _apart(due: Any, row: Any) -> list[float]:
 def _difference(wanted: _Rows, given: _Rows) -> dict[str, Any] | None:
     """Return the values of all variables in the first step that differs, as data for JSON.
 
-    The numbers are hexadecimal texts, because JSON has no infinity and no NaN.
+    Numbers are hexadecimal texts, because JSON has no infinity and no NaN.
     """
     step = _first_step(wanted, given)
     if step is None:

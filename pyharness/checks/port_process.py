@@ -1,7 +1,6 @@
-"""The process of a port, an implementation of the programs that answers requests line by line.
+"""The process of a port or an integrator, which answers requests line by line.
 
-An integrator that `verify --integrator` judges is such a process too. The port must answer within a
-time limit. In any case the port is ended, together with all processes that it started.
+It must answer within a time limit, and is ended together with all processes that it started.
 """
 
 import contextlib
@@ -32,16 +31,13 @@ _MARK = "PYHARNESS_PORT"  # environment variable that marks each process of a po
 
 
 class PortError(Exception):
-    """An error raised if a port gives no valid answer; its message is one line.
-
-    A port is an implementation of the programs of the thesis, which runs as another process.
-    """
+    """An error raised if a port gives no valid answer; its message is one line."""
 
 
 def split_command(command: str, option: str = "--port") -> list[str]:
-    """Return the program and the arguments of a command line, split as by a shell.
+    """Return the program and arguments of a command line, split as by a shell.
 
-    Raise InputError, which names the option `option`, if the command is empty or can't be split.
+    Raise InputError, which names `option`, if the command is empty or can't be split.
     """
     try:
         words = shlex.split(command)
@@ -56,9 +52,9 @@ def split_command(command: str, option: str = "--port") -> list[str]:
 def refuse_other(
     command: str, option: str, instead: str, line: bytes, read: Callable[[bytes], object]
 ) -> None:
-    """Raise InputError if a process that does not answer the requests of `option` is of another.
+    """Raise InputError if `command` belongs to the option `instead`.
 
-    It is of the option `instead` if `read` accepts its answer to `line`, a request of that option.
+    It does if `read` accepts its answer to `line`, a request of that option.
     """
     with contextlib.suppress(PortError), PortProcess(command, _PROBE, option) as process:
         read(process.ask(line))
@@ -66,9 +62,9 @@ def refuse_other(
 
 
 def _processes_with(mark: str) -> list[int]:
-    """Return the ids of the live processes that have `mark` in their environment.
+    """Return the ids of live processes with `mark` (``NAME=value``) in their environment.
 
-    `mark` has the form ``NAME=value``. Without /proc no process is found.
+    Without /proc none is found.
     """
     found = []
     for folder in Path("/proc").glob("[1-9]*"):
@@ -81,26 +77,15 @@ def _processes_with(mark: str) -> list[int]:
 
 
 class PortProcess:
-    """The running process of a port, as a context manager that starts and ends it.
-
-    A port is an implementation of the programs of the thesis in any language. Entering the context
-    raises PortError if the port can't start.
-    """
+    """The running process of a port, as a context manager; raises PortError if it can't start."""
 
     def __init__(self, command: str, patience: float = PATIENCE, option: str = "--port") -> None:
-        """Store the command to start the port, and the longest time to wait for an answer (s).
-
-        A port is an implementation of the programs of the thesis, which runs as another process.
-        `option` is the option that gave the command.
-        """
+        """Store command, longest wait for an answer (s), and the option that gave the command."""
         self._words = split_command(command, option)
         self._patience = patience
 
     def __enter__(self) -> Self:
-        """Start the port, a program in another process, in its own process group.
-
-        If the port is started by a shell, its process and the shell can then be ended together.
-        """
+        """Start the port in a process group of its own, which can be ended with a shell between."""
         self._mark = f"{_MARK}={os.urandom(16).hex()}"
         self._told = b""  # the last part of what the port wrote to stderr
         try:
@@ -131,10 +116,7 @@ class PortProcess:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End the port's process and all processes that it started, whatever they are doing.
-
-        A port is an implementation of the programs of the thesis, which runs as another process.
-        """
+        """End the port's process and all processes that it started, whatever they are doing."""
         # If all processes of the group have ended, the group is not found. macOS reports this as
         # PermissionError.
         with contextlib.suppress(ProcessLookupError, PermissionError):
@@ -153,11 +135,10 @@ class PortProcess:
             file.close()
 
     def ask(self, line: bytes) -> bytes:
-        """Send the request `line` to the port and return its answer, each without a line feed.
+        """Send the request `line` and return the answer, each one line without a line feed.
 
-        The port is an implementation of the programs in another process. An answer is one line.
-        Raise PortError if the port does not answer in time, if it ends, or if it writes too much or
-        a second line.
+        Raise PortError if there is no answer in time, or if the port ends or writes too much or a
+        second line.
         """
         end = time.monotonic() + self._patience
         rest = line + b"\n"
@@ -191,11 +172,7 @@ class PortProcess:
         return answer
 
     def _hear(self) -> bool:
-        """Read what the port's process wrote to stderr, and return whether there was any output.
-
-        The last part of the output is kept for error messages. A port is an implementation of the
-        programs of the thesis, which runs as another process.
-        """
+        """Read from stderr, keep the last part for messages, and return whether there was any."""
         try:
             piece = os.read(self._errors.fileno(), _PIECE)
         except BlockingIOError:

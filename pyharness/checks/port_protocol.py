@@ -24,18 +24,11 @@ ENDINGS = ("complete", "stopped", "overflow")
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The result of one run of a program by a port, its implementation in any language.
+    """The result of one run of a program by a port.
 
-    Attributes
-    ----------
-    rows : ndarray, shape (n, 7)
-        The values of `VARIABLES` after each step.
-    ended : str
-        How the run ended, one of `ENDINGS`.
-    stop : Stop or None
-        The step, variable and quotient at which the Lipschitz test stopped the run, if it did.
-    ier : list of int, or None
-        The error code IER of the linear solver in each step; None for a program that prints none.
+    `rows` has `VARIABLES` after each step, shape (n, 7); `ended` is one of `ENDINGS`; `stop` is
+    where the Lipschitz test stopped the run; `ier` has the linear solver's error code in each step,
+    None for a program that prints none.
     """
 
     rows: Array
@@ -49,10 +42,8 @@ def request(
 ) -> bytes:
     """Return the line of JSON that requests a run of a program from a port.
 
-    A port is an implementation of the programs in any language. `listing` is the program with a
-    choice of its defects. The decimal numbers in the line reproduce floats exactly. `lipschitz` is
-    the constant of the Runge-Kutta program's stop test (1/s), by default the constant in the
-    author's decks. If `may_stop` is false, the test does not end the run.
+    Its decimals reproduce floats exactly. `lipschitz` is the constant of the stop test (1/s), by
+    default that of the author's decks, which ends the run only if it `may_stop`.
     """
     asked = {
         "schema": SCHEMAS["port request"],
@@ -66,11 +57,7 @@ def request(
 
 
 def requested_scene(scene: Scene) -> dict[str, Any]:
-    """Return a scene as the dictionary for the field `scene` of a request to a port.
-
-    A port is an implementation of the programs of the thesis in any language. A scene is a body
-    with its initial state, torque and steps.
-    """
+    """Return a scene as the dictionary for the field `scene` of a request."""
     return {
         **scene_record(scene),
         "masses": scene.masses,
@@ -80,11 +67,7 @@ def requested_scene(scene: Scene) -> dict[str, Any]:
 
 
 def read_answer(line: bytes, steps: int) -> Answer:
-    """Return a port's answer to a scene with `steps` steps; raise PortError if it is invalid.
-
-    A port is an implementation of the programs in any language. `line` is the answer as JSON,
-    without a line feed.
-    """
+    """Return a port's answer to a scene with `steps` steps; raise PortError if it is invalid."""
     given = read_object(line)
     for name in ("rows", "ended", "stop", "ier"):
         if name not in given:
@@ -152,10 +135,9 @@ def read_whole(where: str, value: object) -> int:
 
 
 def read_number(where: str, value: object) -> float:
-    """Return the value of a JSON number, or of a number written as JSON text.
+    """Return the value of a JSON number, or of a hexadecimal, decimal, inf or nan as text.
 
-    The text may be hexadecimal, decimal, inf or nan. Raise PortError, with `where` in front of its
-    message, if `value` is no such number or text.
+    Raise PortError, with `where` in front, for any other value.
     """
     if type(value) is float:
         return value

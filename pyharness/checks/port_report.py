@@ -17,23 +17,9 @@ _TIMES = (
 
 
 def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str) -> Report:
-    """Return the report of a port's checks: failures with their steps, counts and times.
+    """Return the report of a port's checks, at least one: failures with their steps, and times.
 
-    Parameters
-    ----------
-    command : str
-        The command that started the port.
-    checks : sequence of PortCheck
-        The checks that were made, at least one.
-    asked : int
-        The number of checks that were requested.
-    seed : str
-        The seed of the random scenes, or an empty text if none were drawn.
-
-    Returns
-    -------
-    Report
-        The report, for the screen and for files.
+    `asked` checks were requested; `seed` is empty if no scenes were drawn.
     """
     title = [f"{command}: against the twins, bit for bit"]
     if seed:
@@ -50,10 +36,9 @@ def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str
 
 
 def step_section(check: PortCheck) -> Section:
-    """Return a line and a table with all variables in the first step in which a port differs.
+    """Return a line and a table of all variables in the first step that differs.
 
-    `check` is a check with a difference. The numbers in the table are decimal, with so many digits
-    that they determine each float.
+    Decimals have enough digits to determine each float.
     """
     assert check.difference is not None
     rows = [

@@ -1,10 +1,10 @@
 """Checks of methods in scenes drawn from a seed, against an independent true solution.
 
-The true omega comes from `integer_series`, and the true attitude from `reference`. Methods are run
-through every entry point, by `solve` and as prepared solvers. A tolerance applies to the error of
-omega at the requested times, or to the angle of the attitude error (rad). The error of omega is
-relative to the largest omega from 0 to the last requested time. If the motion amplifies
-perturbations K times, rounding alone causes errors of 2e-15 K.
+The true omega comes from `integer_series`, the true attitude from `reference`. An entry point is
+`solve` or a prepared solver with one method, as in ``solve-taylor``. A tolerance applies to the
+error of omega at the requested times relative to the largest omega until the last, or to the angle
+of the attitude error (rad). If the motion amplifies perturbations K times, rounding alone causes
+errors of 2e-15 K.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -64,11 +64,9 @@ Entrances = Mapping[str, Callable[[], MethodRun]]
 
 
 def truth_of(drawn: Draw) -> Truth:
-    """Return the true omega of a random draw at a fraction .4 of its end time, and at its end time.
+    """Return the true omega of a draw at 0.4 of its end time and at its end time.
 
-    A draw is a random scene, with random parameters for its solution. Raise InputError if the
-    solution grows without bound or is too fast, or if amplified rounding errors leave no digit of
-    omega.
+    Raise InputError if it grows without bound or is too fast, or if rounding leaves no digit of it.
     """
     times = [_EARLIER * drawn.time, drawn.time]
     path = integer_series(drawn.scene, times)
@@ -82,12 +80,9 @@ def truth_of(drawn: Draw) -> Truth:
 def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse the scene of its run `tried` with the message `why`.
 
-    The automatic choice of a method may not refuse. A closed form may refuse only scenes near the
-    limits of the range of binary64. Any other method may refuse a scene of the kinds `_MAY_REFUSE`,
-    whose motion may diverge or be too fast. It may also refuse a scene whose error amplification,
-    which `truth` has, exceeds `_CALM`. The method `quick` may refuse every scene. A method of SciPy
-    may refuse a tolerance that is too fine for it. A method refuses a scene if it gives a message
-    instead of a result.
+    `auto` may not, closed forms only near the limits of binary64, `quick` always. Any other may if
+    the scene is of `_MAY_REFUSE` (it may diverge or be too fast) or amplifies errors more than
+    `_CALM`; a method of SciPy also if the tolerance is too fine for it.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -119,13 +114,9 @@ The tolerance is multiplied by the error amplification only if this exceeds `LIV
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield deferred checks that compare omega from every entry point with the true omega.
+    """Yield deferred checks of omega from every entry point in random scenes.
 
-    An entry point is the function `solve`, or a solver that `prepare` sets up for one scene, each
-    with one method. The random scenes are drawn from the seed of `chosen`, the selection of checks.
-    If a scene has no true solution, a single check reports this. This check passes if the scene is
-    of the kinds `_MAY_REFUSE`, whose motion may diverge or be too fast. A deferred check is
-    computed only if it is requested.
+    A scene without a true solution gets one check, which passes if it is of `_MAY_REFUSE`.
     """
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
@@ -147,13 +138,9 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
 
 
 def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks that compare attitudes with the true attitude in random scenes.
+    """Yield deferred checks of attitudes by `auto`, Taylor series and a prepared solver.
 
-    The attitudes are computed by the automatic choice of a method, by the Taylor series and by a
-    solver that `prepare` sets up for the scene. The scenes are drawn from the seed of `chosen`, the
-    selection of checks. A scene is left out if its true attitude can't be computed, or if rounding
-    errors leave no correct digit of the attitude. A deferred check is computed only if it is
-    requested.
+    A scene whose true attitude can't be computed, or has no digit left by rounding, is left out.
     """
     tolerance_at = METHODS["taylor"].finest
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
@@ -185,10 +172,7 @@ def _requested(chosen: Selection, number: int, entrances: Entrances) -> Entrance
 def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
     """Return a deferred run for each entry point, by its name, in the random scene `drawn`.
 
-    An entry point is the function `solve`, or a solver that `prepare` sets up for one scene, each
-    with one method, as in ``solve-taylor``. `number` is the number of the random draw. Methods of
-    SciPy and the reference solver are slow. They are tried in few draws, and in no draw if `thin`
-    is set, as in the self-test of the checks.
+    Methods of SciPy and the reference are slow: they are tried in few draws, and never if `thin`.
     """
     forms = ["closed-form"] if closed_form(drawn.scene) else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
@@ -223,12 +207,7 @@ def _sampled(
 
 
 def sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: Name) -> Sample:
-    """Run a solver and return the check of its error, within the limit of the policy.
-
-    `tried` makes the run, and `truth` is the true solution. `policy` sets the limit of the error,
-    and says which scenes the solver may refuse. `name` is the name of the check. The check also has
-    the tolerance and the error amplification of the run, for the report.
-    """
+    """Run a solver and return the check of its error, with tolerance and amplification."""
     one = tried()
     found, tolerance = judge(name, one, truth, policy), tolerance_of(one)
     growth = truth.flow.amplification

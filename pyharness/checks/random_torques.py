@@ -2,7 +2,6 @@
 
 The torque is the sum of recorded functions, or of ready terms. The true solution is the reference,
 whose series of the recorded torque (`pyharness.truth.tape_series`) shares no code with the methods.
-Omega and attitude are compared, from every entry point that takes such a scene.
 """
 
 from collections.abc import Callable, Iterator
@@ -43,11 +42,9 @@ _SLOW = ("reference", *SCIPY_METHODS)
 
 
 def random_torques(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of omega and attitude under random torques that depend on the state.
+    """Yield deferred checks of omega and attitude from every entry point in random scenes.
 
-    The scenes are drawn from the seed of `chosen`, the selection of checks. A scene is left out if
-    its true solution grows without bound or takes too long to compute, or if rounding errors leave
-    no correct digit of it. A deferred check is computed only if it is requested.
+    A scene whose true solution is unbounded, too long to compute or lost to rounding is left out.
     """
     for number in range(0, chosen.draws, _EVERY):
         if not chosen.may_ask(f"random/{number}"):
@@ -107,11 +104,7 @@ def _by_many(tolerance: float, scene: Scene, time: float) -> MethodRun:
 
 
 def _may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether a method may refuse the scene of its run `tried` with the message `why`.
-
-    Methods in Python may refuse a scene that takes too much work, and SciPy's methods a tolerance
-    that they can't meet.
-    """
+    """Return whether the refusal is SciPy's, of too much work or a tolerance it can't meet."""
     if tried.method in SCIPY_METHODS and "can't meet it" in why:
         return True
     return tried.method in SCIPY_METHODS and "allow more work" in why

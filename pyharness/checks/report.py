@@ -29,9 +29,8 @@ def checks_report(
 ) -> Report:
     """Return the report of the checks that a command made, for the screen and for files.
 
-    `verb` is the name of the command, and `text` has the sections for the screen. For files there
-    are a JSON record, which also has the fields `extra`, JUnit test cases, and a page for Markdown,
-    by default that of `summary_page`.
+    `text` is for the screen, `page` (by default `summary_page`) for Markdown; the JSON record also
+    has the fields `extra`.
     """
     return Report(
         verb,
@@ -54,28 +53,9 @@ def summary_page(
     depth: int = 1,
     more: Sequence[Section] = (),
 ) -> list[Section]:
-    """Return a short page for the summary of a job of continuous integration.
+    """Return a page for the summary of a job: verdict, table of groups, and failures.
 
-    The page has the verdict as its head, a table of groups of checks, and the failed checks, each
-    with the command that repeats it.
-
-    Parameters
-    ----------
-    verb : str
-        The name of the command that made the checks.
-    checks : sequence of Check
-        The checks.
-    title : sequence of str
-        Lines under the head, which are shown as code.
-    depth : int
-        A group consists of the checks whose ids have so many parts in common.
-    more : sequence of Section
-        Sections at the end of the page.
-
-    Returns
-    -------
-    list of Section
-        The sections of the page.
+    Lines of `title` are shown as code. A group has `depth` parts of the ids in common.
     """
     failed = [check for check in checks if not check.passed]
     lines: list[str] = []
@@ -104,19 +84,13 @@ def _failure(check: Check) -> str:
 
 
 def marks(checks: Sequence[Check]) -> str:
-    """Return the marks that the limits of the checks have, as in ``proved, derived``.
-
-    The result is a dash if no check has a limit.
-    """
+    """Return the marks of the checks' limits, as in ``proved, derived``; a dash without limits."""
     found = {check.mark for check in checks}
     return ", ".join(mark for mark in MARKS if mark in found) or "-"
 
 
 def basis_note(checks: Sequence[Check]) -> list[str]:
-    """Return a legend for the marks of limits, with the number of limits of each mark.
-
-    The list is empty if no check has a limit.
-    """
+    """Return a legend for the marks of limits with their numbers; empty without limits."""
     counts = Counter(check.mark for check in checks if check.mark)
     told = ", ".join(f"{counts[mark]} {mark}" for mark in MARKS)
     legend = (
@@ -129,11 +103,9 @@ def basis_note(checks: Sequence[Check]) -> list[str]:
 def summary(
     title: Sequence[str], checks: Sequence[Check], depth: int = 1, more: Section = ()
 ) -> list[Section]:
-    """Return the printed sections: title, failures, a table of groups of checks, and verdict.
+    """Return the printed sections: title, failures, table of groups, `more` and verdict.
 
-    A group consists of the checks whose ids have the first `depth` parts in common. The section
-    `more` is printed between the table and the verdict. The verdict is a line with the numbers of
-    all checks and of the failed ones.
+    A group has the first `depth` parts of the ids in common.
     """
     table: Section = [*basis_note(checks), _groups(checks, depth)]
     return [title, listed_singly(checks), table, more, [verdict(checks)]]
@@ -152,10 +124,9 @@ def _groups(checks: Sequence[Check], depth: int) -> Table:
 
 
 def listed_singly(checks: Sequence[Check]) -> list[str]:
-    """Return lines that show each failed check, with the command that repeats it.
+    """Return lines on at most `_MOST_FAILURES` failed checks, with the commands that repeat them.
 
-    At most `_MOST_FAILURES` failed checks are shown. If `checks` has at most `_FEW` elements, the
-    lines also show the checks that passed.
+    Of at most `_FEW` checks, those that passed are shown too.
     """
     failed = [check for check in checks if not check.passed]
     lines = []
@@ -187,11 +158,8 @@ _SAMPLES = (
 def samples(checks: Sequence[Check], rounding: float) -> Section:
     """Return a table of the worst ratio of error to tolerance, by entry point and tolerance.
 
-    Only checks in random scenes (class `Sample`) are counted. An entry point is a call with a
-    method, as in ``solve-taylor``. Before an error is divided by the tolerance, the rounding error
-    is subtracted from it. This rounding error is `rounding`, a relative error, times the error
-    amplification. For each of three ranges of the error amplification, the table shows the number
-    of checks with a result and the worst ratio.
+    Only `Sample` checks count, in three ranges of the error amplification. The relative error
+    `rounding` times the amplification is first subtracted from the error.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:
@@ -214,8 +182,7 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
 def references(checks: Sequence[Check]) -> Section:
     """Return lines that state the errors of the references to which values of checks refer.
 
-    A line states the largest bound of those errors that are proved, another one the largest of
-    those that are only estimated. A wrong estimate has a line of its own.
+    One has the largest proved bound, another the largest estimate; a wrong estimate has its own.
     """
     bounds = [each.reference_bound() for each in checks if each.reference_bound is not None]
     known = [each for each in bounds if each is not None]

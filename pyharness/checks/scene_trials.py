@@ -1,7 +1,7 @@
 """Stress trials of one scene that the user specifies, with any torque that can be recorded.
 
-The other trials have scenes of their own. The trials here make checks that apply to every scene:
-its error against the reference, and transformations that must not change the motion.
+They apply to every scene: the error against the reference, and transformations that must not change
+the motion.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -56,11 +56,10 @@ State = tuple[Array, Array | None]
 
 
 def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
-    """Return the trials of a scene, by name.
+    """Return the trials of a scene by name, until the scene's last step.
 
-    The last time is that of the scene's last step. `options` is the option of `stress` with the
-    scene file, for the commands that repeat a check. Raise InputError if the torque is opaque, or
-    if it needs an attitude that the scene does not have.
+    `options` of `stress` has the scene file, for the commands that repeat a check. Raise InputError
+    if the torque is opaque, or needs an attitude that the scene does not have.
     """
     if isinstance(scene.torque, StateTorque):
         system(scene)  # raises InputError for an opaque torque
@@ -112,7 +111,7 @@ def _made(
     name: Name,
     only: Sequence[str],
 ) -> Iterator[Attempt]:
-    """Yield the deferred checks of a trial; those that are not requested are not computed."""
+    """Yield the deferred checks of a trial."""
     return attempts(scene, name)
 
 

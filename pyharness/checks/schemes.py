@@ -1,8 +1,8 @@
 """Checks of the corrected programs against their schemes, by recomputing every step.
 
-Fortran and the Python twin could have the same fault, too small to change the order. To detect it,
-each step is recomputed by the scheme, from the program's own state before the step. The two results
-may therefore differ only by the rounding of one step.
+Fortran and the Python twin could share a fault too small to change the order. Each step is
+therefore recomputed from the program's own state before it; the results may differ only by the
+rounding of one step.
 """
 
 from collections.abc import Iterator, Sequence
@@ -36,9 +36,7 @@ _ONE_STEP = Basis(
 class Stage:
     """A stage, or a collocation point, of every step of a run, with its states and rates.
 
-    Each array has a row for every step. The columns are U1, U2, U3 (omega) and V1, V2, V3
-    (translational velocity). The array `rounding` bounds the difference of two computations of the
-    rates.
+    Arrays have a row for every step; columns are omega (rad/s) and translational velocity (m/s).
     """
 
     # shape (n, 6); the arguments of the right-hand sides (rad/s, m/s), and the right-hand sides
@@ -49,12 +47,9 @@ class Stage:
 
 
 def schemes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks that recompute every step of the corrected programs by its scheme.
+    """Yield deferred checks of each program's steps.
 
-    Each step is recomputed from the program's own state before the step. The value of a check is
-    the largest ratio of a difference to its rounding bound, for omega and translational velocity.
-    The limit is 1. `chosen` is the selection of checks. A deferred check is computed only if it is
-    requested.
+    The value is the largest ratio of a difference to its rounding bound, with the limit 1.
     """
     for case in cases(chosen, (7,)):
         for program in PROGRAMS:
@@ -88,10 +83,7 @@ def rows(run: Trajectory) -> Array:
 
 
 def stages(scene: Scene, run: Trajectory) -> tuple[Stage, Stage, Stage, Stage]:
-    """Return the four stages of the Runge-Kutta scheme of W. Kutta (1901) in every step of a run.
-
-    The run is complete, and each step starts from the state of `run` before the step.
-    """
+    """Return the four stages of W. Kutta's scheme (1901) in every step of a complete run."""
     h = scene.step_size
     first = _beginning(scene, run)
     second = _stage(scene, 0.5, first.state + 0.5 * h * first.rate)
@@ -101,11 +93,9 @@ def stages(scene: Scene, run: Trajectory) -> tuple[Stage, Stage, Stage, Stage]:
 
 
 def _scheme(name: str, scene: Scene, run: Trajectory) -> tuple[Array, Array]:
-    """Return the state after every step by a program's scheme, and a bound on its rounding error.
+    """Return the states after every step by a program's scheme, and rounding bounds, (n, 6) each.
 
-    `name` is the name of the program. Each step starts from the state before the step in `run`, a
-    run of the program. Both arrays have the shape (n, 6), with omega (rad/s) and translational
-    velocity (m/s).
+    Each step starts from the state before it in `run`.
     """
     if name not in PARTS:
         kutta = stages(scene, run)
@@ -144,11 +134,10 @@ def _beginning(scene: Scene, run: Trajectory) -> Stage:
 
 
 def _stage(scene: Scene, part: float, state: Array) -> Stage:
-    """Return the rates for given states in every step, with a bound on their rounding errors.
+    """Return the rates for given states (n, 6) in every step, with bounds on their rounding errors.
 
-    `state` has the shape (n, 6), with omega and the translational velocity V in one row for each
-    step. The rates are the right-hand sides of equations 16-18 of the thesis and of dV/dt = F/m -
-    omega x V. The torque is that at the fraction `part` of the step.
+    They are the right-hand sides of equations 16-18 and of dV/dt = F/m - omega x V, with the torque
+    at the fraction `part` of the step.
     """
     omega, velocity = state[:, :3], state[:, 3:]
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)

@@ -18,11 +18,7 @@ RECORD = Path(__file__).parent.parent.parent / "tests" / "golden"
 
 @dataclass(frozen=True)
 class Selection:
-    """The checks that one run of `pyharness verify` makes, with the seed and files that they use.
-
-    `only` has the leading parts of the ids of the requested checks. If it is empty, all are
-    requested.
-    """
+    """The checks that one run of `verify` makes, with the seed and files that they use."""
 
     only: Sequence[str] = ()  # leading parts of names, as in ``cells/two-term``; empty: all
     seed: str = field(default_factory=weekly_seed)  # of random draws; by default the week
@@ -37,17 +33,13 @@ class Selection:
         return selected(id, self.only)
 
     def may_ask(self, id: str) -> bool:
-        """Return whether a check whose id begins with `id`, or is `id`, may be requested.
-
-        If none may be requested, the caller need not compute these checks.
-        """
+        """Return whether a check whose id begins with `id`, or is `id`, may be requested."""
         return may_hold(id, self.only)
 
     def drawn(self, number: int, subject: str = "") -> Name:
-        """Return the name of the check of `subject`, a program or method, in random draw `number`.
+        """Return the name of the check of `subject` in random draw `number`.
 
-        A draw is a random scene. The name includes the command-line option with the seed, so that
-        the command which repeats the check draws the same scene.
+        It includes the seed, so that the command which repeats the check draws the same scene.
         """
         draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
         options = f"{draws} --seed {shlex.quote(self.seed)}"

@@ -1,9 +1,9 @@
 """Checks of the Runge-Kutta program's stop test against eq. 19, recomputed along its own run.
 
-The test stops a run if a quotient exceeds the stop constant. Fortran and the Python twin could both
-test the same wrong quotient. Here the quotients of all steps are therefore computed from the
-scheme. The program is then run with stop constants just below and just above each quotient that
-exceeds all earlier ones.
+A run stops if a quotient, the change of K (right-hand side) over that of U (state) within a step,
+exceeds the stop constant. Fortran and the twin could both test a wrong quotient. The quotients are
+therefore computed from the scheme, and the program is run with constants just below and above each
+that exceeds all earlier ones.
 """
 
 from collections.abc import Callable, Iterator
@@ -37,11 +37,7 @@ Stages = tuple[Stage, Stage, Stage, Stage]
 
 @dataclass(frozen=True, eq=False)
 class Quotients:
-    """The quotients that the Runge-Kutta program compares with its stop constant, in its order.
-
-    The program stops if a quotient exceeds the stop constant. A quotient is the change of K over
-    the change of U within a step, where K is the right-hand side and U is the state.
-    """
+    """The quotients that the program compares with its stop constant, in its order."""
 
     values: Array  # shape (n, m) for n steps, 1/s
     rounding: Array  # shape (n, m); bound on the difference of two computations, 1/s
@@ -49,13 +45,10 @@ class Quotients:
 
 
 def stops(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks that the Runge-Kutta program stops where its stop test requires it.
+    """Yield deferred checks of the stops with every combination of the defects of the test.
 
-    The test (equation 19 of the thesis) compares quotients with a stop constant. Some defects of
-    the program change the test, which is checked with every combination of these defects. For each
-    stop of the program, its step, variable and quotient are compared with those that we compute
-    independently. The value of a check is the largest difference of two such quotients, divided by
-    its rounding bound. The limit is 1. A deferred check is computed only if it is requested.
+    Step and variable must agree; the value is the largest difference of quotients over its rounding
+    bound, with the limit 1.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):
@@ -67,11 +60,7 @@ def stops(chosen: Selection) -> Iterator[Attempt]:
 
 
 def _run(scene: Scene) -> tuple[Trajectory, Stages | None]:
-    """Return a run of the corrected Runge-Kutta program without stop test, and its steps' stages.
-
-    The four stages of the scheme are recomputed for every step. They are None if the run has no row
-    for every step.
-    """
+    """Return a corrected run without stop test, and its stages if it has a row for every step."""
     run = PROGRAM_REGISTRY[_PROGRAM].run(scene, Listing.corrected(_PROGRAM), may_stop=False)
     return run, stages(scene, run) if is_whole(scene, run) else None
 
@@ -127,8 +116,7 @@ def _quotients(scene: Scene, run: Trajectory, kutta: Stages, listing: Listing) -
 def _constants(quotients: Quotients) -> list[float]:
     """Return stop constants (1/s) on both sides of each quotient that exceeds all earlier ones.
 
-    The Runge-Kutta program stops at the first of the `quotients` above its stop constant. Each
-    returned constant differs by more than rounding from all quotients of its step.
+    Each differs by more than rounding from all quotients of its step.
     """
     constants = []
     below = 0.0
@@ -141,11 +129,7 @@ def _constants(quotients: Quotients) -> list[float]:
 
 
 def _due(quotients: Quotients, constant: float) -> Stop | None:
-    """Return the step, variable and quotient at which a run with a stop constant (1/s) must stop.
-
-    The run must stop at the first of the `quotients` above `constant`. Return None if there is
-    none.
-    """
+    """Return the stop at the first quotient above `constant` (1/s), if any."""
     above = np.argwhere(quotients.values > constant)
     if not len(above):
         return None

@@ -26,11 +26,10 @@ The arguments are those of `Name`.
 
 @dataclass(frozen=True)
 class Trial:
-    """A group of checks of `pyharness stress` under one kind of extreme conditions.
+    """A group of checks of `stress` under one kind of extreme conditions.
 
-    `title` describes the conditions, and `bound` explains how the limits of the checks are derived.
-    `attempts` takes the beginnings of the requested ids. It returns the deferred computations of
-    the checks that may have these ids.
+    `title` describes the conditions, `bound` explains how the limits are derived, and `attempts`
+    takes leading parts of requested ids.
     """
 
     name: str
@@ -40,21 +39,15 @@ class Trial:
 
 
 def trial(name: str) -> Trial:
-    """Return the trial with the given name, one of `TRIALS`.
-
-    A trial is a group of checks under extreme conditions. Its module is imported when the trial is
-    first requested.
-    """
+    """Return the trial with the given name, one of `TRIALS`, from its module."""
     found: Trial = import_module(f"pyharness.checks.trials.{name.replace('-', '_')}").TRIAL
     return found
 
 
 def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) -> Iterator[Check]:
-    """Yield the checks of `pyharness stress` whose ids begin with an element of `only`.
+    """Yield the checks of `stress` whose ids begin with an element of `only`, all if it is empty.
 
-    `trials` are the trials to make, by name; by default they are all trials of `TRIALS`.
-    An element is the leading part of an id, as in ``separatrix/taylor``. The first part of an id is
-    a trial, which is a group of checks. If `only` is empty, yield all checks of all trials.
+    `trials` are by default those of `TRIALS`.
     """
     suites = {
         name: lambda name=name: (trials[name] if trials else trial(name)).attempts(only)
@@ -64,11 +57,9 @@ def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) 
 
 
 def worst(checks: Iterable[Check]) -> dict[str, Check]:
-    """Return the check with the largest ratio of value to limit, for each trial and method.
+    """Return the check with the largest ratio of value to limit, by ``trial/method``.
 
-    A trial is a group of checks under extreme conditions. The keys have the form ``trial/method``,
-    as in ``shapes/auto``. A failed check counts as worse than one that passed. Checks without a
-    limit or without a scene are ignored.
+    A failed check is worse than any that passed; those without a limit or a scene are ignored.
     """
     found: dict[str, Check] = {}
     for check in checks:

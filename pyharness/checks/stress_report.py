@@ -20,10 +20,7 @@ _NOTE = (
 
 
 def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
-    """Return the report of `pyharness stress`: failures, then a table and picture for each trial.
-
-    A trial is a group of checks under one kind of extreme conditions.
-    """
+    """Return the report of `stress`: failures, then a table and picture for each trial."""
     text: list[Section] = [listed_singly(checks), [_NOTE, *basis_note(checks)]]
     for each in trials:
         own = [check for check in checks if check.suite == each.name]

@@ -34,11 +34,7 @@ _STAGES = {"dop853": 12, "lsoda": 2, "radau": 20, "rk45": 6}
 
 
 def of_case(name: str, thin: bool) -> list[float]:
-    """Return the tolerances at which a method is checked in a case of Table 1 of the thesis.
-
-    `name` is the name of the method. With `thin`, which `pyharness verify --self-test` sets, there
-    is only one tolerance.
-    """
+    """Return the tolerances of a method in a case of Table 1; only one if `thin`."""
     finest = METHODS[name].finest
     if name in SCIPY_METHODS:
         return [_SCIPY_OF_CASES[0]] if thin else list(_SCIPY_OF_CASES)
@@ -50,9 +46,8 @@ def of_case(name: str, thin: bool) -> list[float]:
 def finest(name: str, scene: Scene, time: float) -> float:
     """Return the finest tolerance at which a method is checked until `time` (s) in a scene.
 
-    The result is the smallest tolerance that the function `solve` accepts for the method `name`. A
-    method of `solve_ivp` may not meet this tolerance in the scene. The result is then the finest
-    tolerance of the list `_LADDER` that the method can meet, or 1 if there is none.
+    It is the smallest that `solve` accepts or, if `solve_ivp` does not meet it, the finest of
+    `_LADDER` that is met, or 1.
     """
     met = finest_of(name, scene, time)
     claimed = REGISTRY[name].finest
@@ -60,11 +55,7 @@ def finest(name: str, scene: Scene, time: float) -> float:
 
 
 def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
-    """Return the tolerances at which the method `name` is checked until `time` (s) in a scene.
-
-    The tolerances are the finest one of the method and, if 1e-6 is coarser, also 1e-6. A method
-    that is slow at its finest tolerance is checked only at 1e-6.
-    """
+    """Return the finest tolerance of a method and 1e-6 if coarser; of slow methods only 1e-6."""
     if name in _ONLY_MIDDLING:
         return [MIDDLING]
     least = finest(name, scene, time)
@@ -72,12 +63,11 @@ def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
-    """Return the tolerances at which the method `name` is checked until `time` (s) in a scene.
+    """Return the tolerances at which a method is checked until `time` (s) in a scene.
 
-    They are the finest tolerance at which the method stays within its work limit, and 1e-6 if the
-    method stays within the limit there too. None in place of a tolerance means that the method uses
-    the scene's step size. Methods with a fixed step always use it, and Gauss collocation is checked
-    both ways. `flow` has the error amplification of the scene, on which the work depends.
+    They are the finest within its work limit, and 1e-6 if that is affordable too; the work depends
+    on `flow`. None means the scene's step size, which fixed-step methods always use and Gauss
+    collocation also.
     """
     if name in FIXED_STEP:
         return [None]
@@ -108,11 +98,9 @@ def _within_budget(name: str, least: float, radians: float, amplification: float
 
 
 def _cost(name: str, tolerance: float, radians: float, amplification: float) -> float:
-    """Return an estimate of the number of right-hand sides that the method `name` evaluates.
+    """Return an estimate of the right-hand sides that a method evaluates; 0 without a work limit.
 
-    The work depends on the relative tolerance `tolerance` and on `radians`, the time multiplied by
-    the largest rate of change of the motion. It also depends on `amplification`, the error
-    amplification. The estimate is 0 for a method without a work limit.
+    `radians` is the time multiplied by the largest rate of change of the motion.
     """
     if name in GAUSS:
         stages = int(name[-1])

@@ -1,6 +1,6 @@
 """Checks of our arithmetic of machine words, by test vectors and by runs of the programs.
 
-The arithmetic reproduces the mantissa length and the rounding of a machine, as 48 bits for the CDC.
+It reproduces the mantissa length and the rounding of a machine, as 48 bits for the CDC.
 """
 
 from collections.abc import Iterator
@@ -32,17 +32,10 @@ _VECTORS = Basis(
 def words(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks that our arithmetic of machine words is correct bit for bit.
 
-    A machine word is a number format, such as that of CDC computers with a mantissa of 48 bits. Our
-    arithmetic reproduces its mantissa length and rounding. It is checked first by test vectors,
-    which are CDC instructions with expected results. Runs are then compared in cells. A cell is a
-    program of the thesis with a case and a listing, a choice of its defects. In the first
-    comparison, the Python version in our arithmetic of 53 bits must agree with the Python version
-    in floats. In the second, the program compiled for each machine word must agree with the Python
-    version in our arithmetic of that word. A deferred check is computed only if it is requested.
-
-    If `chosen.only` requests some checks, both comparisons cover every cell. Otherwise the first
-    covers the original listing and listings with at most one defect or reading, an interpretation
-    of a doubtful card. The second covers the original and the corrected listings.
+    CDC instructions with expected results are test vectors. In cells, our arithmetic of 53 bits
+    must agree with floats, and the program compiled for each word with the twin in that word. Both
+    cover every cell if `chosen.only` requests some checks; else the first covers listings with at
+    most one change, the second the original and the corrected ones.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -79,19 +72,11 @@ def _same(name: Name, one: Trajectory, other: Trajectory) -> Check:
 
 
 def _has_all_or_none(listing: Listing) -> bool:
-    """Return whether a listing is the original or the corrected program, without readings.
-
-    A listing is a version of a program. A reading is an interpretation of a doubtful card that we
-    do not adopt.
-    """
+    """Return whether a listing is the original or the corrected program, without readings."""
     return listing.label != "custom" and not listing.readings
 
 
 def _is_few(listing: Listing) -> bool:
-    """Return whether a listing is the original program, or has at most one defect or reading.
-
-    A listing is a version of a program. A reading is an interpretation of a doubtful card that we
-    do not adopt.
-    """
+    """Return whether a listing is such, or has at most one defect or reading."""
     few = len(listing.defects) + len(listing.readings) <= 1
     return few or _has_all_or_none(listing)

@@ -1,14 +1,13 @@
 """Attitude by the joint series, and from rows of omega, compared with independent integrators."""
 
 import pickle
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import quad
 
 import pyharness
 from pyharness import (
@@ -23,10 +22,8 @@ from pyharness import (
 )
 from pyharness.methods.from_rows import attitude_from_rows
 from pyharness.methods.plan import plan
-from pyharness.methods.registry import SCIPY_METHODS
-from pyharness.model.attitude import IDENTITY, angle_between
-from pyharness.model.trajectory import Array, turned_to_space
-from pyharness.scenes.random_scenes import draw
+from pyharness.model.attitude import angle_between
+from pyharness.model.trajectory import turned_to_space
 
 TURNED = (0.5, -0.1, 0.7, 0.5)
 # A spin hardly changes omega, but the body rotates all the same.
@@ -39,90 +36,6 @@ SCENES = {
     "rest": Scene("", (0.0, 0.0, 0.0), moments=(4.0, 3.0, 2.0), torque=TorqueLaw((1.0, 0.0, 2.0))),
 }
 
-TOO_LONG = (29,)  # draws that take too long for the finest tolerance
-
-
-def by_scipy(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
-    """Return omega and attitude by DOP853 for all seven unknowns."""
-    slope = scene.right_hand_side()
-
-    def rates(t: float, y: Array) -> list[float]:
-        x, y_, z, a, b, c, d = y
-        return [
-            *slope(t, [x, y_, z]),
-            -0.5 * (b * x + c * y_ + d * z),
-            0.5 * (a * x + c * z - d * y_),
-            0.5 * (a * y_ + d * x - b * z),
-            0.5 * (a * z + b * y_ - c * x),
-        ]
-
-    start = [*scene.omega, *(scene.attitude or IDENTITY)]
-    way = (0.0, times[-1])
-    found = solve_ivp(rates, way, start, "DOP853", times, rtol=3e-14, atol=1e-14).y.T
-    return found[:, :3], found[:, 3:]
-
-
-@pytest.mark.parametrize("time", [2.0, -2.0])
-@pytest.mark.parametrize("name", SCENES)
-def test_series_agrees_with_seven_unknowns(name: str, time: float, level: int) -> None:
-    scene = SCENES[name]
-    times = [0.1 * time, 0.5 * time, time]
-    found = solve(scene, times, "taylor", 1e-12, attitude=True)
-    assert found.attitude is not None
-    omega, attitude = by_scipy(scene, times)
-    assert np.abs(found.omega - omega).max() < 1e-11 * max(1.0, np.abs(omega).max())
-    # The signs are compared too, because they are continuous.
-    assert np.abs(found.attitude - attitude).max() < 2e-11
-    assert np.abs(np.linalg.norm(found.attitude, axis=1) - 1.0).max() < 4e-16
-
-
-@pytest.mark.property
-@pytest.mark.parametrize("number", [n for n in range(41) if n not in TOO_LONG])
-def test_tolerance_holds_for_the_angle(number: int) -> None:
-    drawn = draw("attitude", number)
-    scene = replace(drawn.scene, attitude=TURNED)
-    fine = solve(scene, [0.4 * drawn.time, drawn.time], "taylor", 1e-14, attitude=True)
-    assert fine.ended in ("complete", "sensitive")
-    for tolerance in (1e-3, 1e-6, 1e-9):
-        found = solve(scene, fine.time.tolist(), "taylor", tolerance, attitude=True)
-        assert found.attitude is not None
-        assert fine.attitude is not None
-        limit = tolerance + 1e-15 * (fine.growth or 1.0)
-        assert angle_between(found.attitude, fine.attitude).max() <= limit
-        largest = max(np.abs(fine.omega).max(), max(map(abs, scene.omega)))
-        assert np.abs(found.omega - fine.omega).max() <= limit * largest
-
-
-@pytest.mark.parametrize("method", SCIPY_METHODS)
-def test_methods_of_scipy_carry_it(method: str) -> None:
-    for number in range(0, 12):
-        drawn = draw("scipy", number)
-        scene = replace(drawn.scene, attitude=TURNED)
-        times = [0.4 * drawn.time, drawn.time]
-        fine = solve(scene, times, "taylor", 1e-14, attitude=True)
-        if not fine.growth < 1e3:  # type: ignore[operator]
-            continue
-        found = solve(scene, times, method, 1e-5, attitude=True)
-        assert found.attitude is not None
-        assert fine.attitude is not None
-        assert 0.0 < angle_between(found.attitude, fine.attitude).max() <= 1e-5
-        assert np.abs(np.linalg.norm(found.attitude, axis=1) - 1.0).max() < 4e-16
-        bare = solve(scene, times, method, 1e-5)
-        assert bare.attitude is None
-
-
-@pytest.mark.parametrize("method", SCIPY_METHODS)
-def test_methods_of_scipy_keep_it_where_errors_turn_the_body_all_the_way(method: str) -> None:
-    spin = Scene("", (0.0, 0.0, 100.0), moments=(3.0, 3.0, 3.0), attitude=TURNED)
-    driven = draw("s2", 23)
-    for scene, time in ((spin, 2.0), (replace(driven.scene, attitude=TURNED), driven.time)):
-        fine = solve(scene, [time], "taylor", 1e-14, attitude=True).attitude
-        assert fine is not None
-        for tolerance in (1e-4, 1e-6):
-            found = solve(scene, [time], method, tolerance, attitude=True).attitude
-            assert found is not None
-            assert angle_between(found, fine)[0] <= 0.7 * tolerance
-
 
 def test_at_rest_scipy_leaves_it_as_it_is() -> None:
     scene = Scene("", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0), attitude=TURNED)
@@ -130,16 +43,6 @@ def test_at_rest_scipy_leaves_it_as_it_is() -> None:
         found = solve(scene, times, "dop853", 1e-9, attitude=True).attitude
         assert found is not None
         assert found == pytest.approx(np.tile(scene.attitude or (), (len(times), 1)), abs=1e-16)
-
-
-def test_series_agrees_on_random_scenes_too() -> None:
-    for number in range(0, 24, 2):
-        drawn = draw("attitude", number)
-        time = min(drawn.time, 30.0 / max(map(abs, drawn.scene.omega)))
-        found = solve(drawn.scene, [time], "taylor", 1e-11, attitude=True)
-        _, attitude = by_scipy(drawn.scene, [time])
-        assert found.attitude is not None
-        assert angle_between(found.attitude, attitude).max() < 1e-9
 
 
 def test_momentum_in_space_is_what_torque_made_of_it() -> None:

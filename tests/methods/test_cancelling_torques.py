@@ -17,8 +17,6 @@ from pyharness.model.torque_law import Wave
 from pyharness.scenes.cancelling import LEFT, MERGED, cancelling
 from pyharness.truth.reference import reference
 
-_ROUNDING = 2.0**-53
-
 
 def _triple(source: random.Random, size: float) -> Triple:
     return source.gauss(0.0, size), source.gauss(0.0, size), source.gauss(0.0, size)

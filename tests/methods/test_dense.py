@@ -3,25 +3,21 @@
 import math
 import pickle
 from dataclasses import replace
-from random import Random
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, case_scene, solve, torques
+from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, solve, torques
 from pyharness.events import crosses
 from pyharness.methods import dense
 from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.trajectory import Trajectory
-from pyharness.scenes.random_scenes import draw as draw_law
-from pyharness.scenes.state_scenes import SUDDEN, draw, draw_ready
 from tests.campaigns import dense_campaign
 
 MOMENTS = (1.0, 2.0, 3.0)
 OMEGA = (0.1, 2.0, 0.1)
-TIMES = [-4.0, 0.0, 1.5, 12.0]
 BRICK = Scene("brick", OMEGA, moments=MOMENTS, step_size=0.01)
 LAW = TorqueLaw((0.1, 0.2, 0.0), sines=[((0.1, 0.0, 0.3), 2.0)])
 TABLE = torques.table(
@@ -54,55 +50,6 @@ def largest_error(sol: DenseOutput, truth: Trajectory) -> float:
     if len(state) > 3 and truth.attitude is not None:
         error = max(error, 2.0 * float(np.abs(state[3:].T - truth.attitude).max()))
     return error
-
-
-@pytest.mark.parametrize(
-    ("name", "method", "tolerance"),
-    [
-        *[(name, "auto", tol) for name in SCENES for tol in (1e-3, 1e-7, 1e-12)],
-        *[(name, "taylor", 1e-10) for name in SCENES],
-        *[(name, "dop853", 1e-7) for name in SCENES if name != "space"],
-        ("free", "closed-form", 1e-12),
-        *[("law", f"gauss-{n}", 1e-7) for n in (2, 3, 4, 8)],
-        *[(name, method, 1e-5) for name in ("law", "damping") for method in ("rk45", "lsoda")],
-        ("damping", "radau", 1e-4),
-        ("damping", "reference", 1e-12),
-    ],
-)
-def test_the_tolerance_holds_at_all_times(name: str, method: str, tolerance: float) -> None:
-    scene = SCENES[name]
-    turning = not method.startswith("gauss") and name != "changing"
-    found = solve(scene, TIMES, method, tolerance, attitude=turning, dense_output=True)
-    source = Random(f"{name} {method} {tolerance}")
-    times = sorted(source.uniform(TIMES[0], TIMES[-1]) for _ in range(400))
-    truth = solve(scene, times, tolerance=1e-14, attitude=turning)
-    assert truth.growth is None or truth.growth < 1e4
-    limit = tolerance + 4e-15 * (found.growth or truth.growth or 1e3)
-    assert largest_error(sol_of(found), truth) <= limit
-    assert largest_error(sol_of(found), found) <= 2.0 * limit
-
-
-@pytest.mark.parametrize("number", range(12))
-def test_the_tolerance_holds_in_random_scenes(number: int) -> None:
-    source = Random(f"dense {number}")
-    if number % 4 == 0:
-        scene, time = draw_ready(source)
-    elif number % 4 == 1:
-        scene, time = draw(source, (source.choice(SUDDEN),))
-    elif number % 4 == 2:
-        scene, time = draw(source)
-    else:
-        scene, time = draw_law("dense", number).scene, source.uniform(-20.0, 20.0)
-    turning = scene.torque.needs_attitude
-    times = sorted((source.uniform(0.0, time) for _ in range(200)), key=abs)
-    truth = solve(scene, [*times, time], tolerance=1e-14, attitude=turning)
-    for tolerance in (1e-4, 1e-9):
-        found = solve(scene, time, tolerance=tolerance, attitude=turning, dense_output=True)
-        if found.ended == "overflow":
-            assert truth.ended == "overflow"
-            continue
-        assert found.growth is not None
-        assert largest_error(sol_of(found), truth) <= tolerance + 1e-14 * max(1.0, found.growth)
 
 
 def test_the_polynomials_join() -> None:
@@ -214,13 +161,6 @@ def test_too_many_polynomials_are_refused(monkeypatch: pytest.MonkeyPatch) -> No
     for method in ("taylor", "rk4"):
         with pytest.raises(InputError, match="dense output"):
             solve(SCENES["law"], 20.0, method, dense_output=True)
-
-
-def test_a_case_of_the_thesis() -> None:
-    scene = case_scene(3)
-    sol = sol_of(solve(scene, 5.0, dense_output=True))
-    truth = solve(scene, [0.01, 2.5, 4.99])
-    assert largest_error(sol, truth) <= 1e-12
 
 
 def test_a_short_campaign() -> None:

@@ -203,9 +203,7 @@ def test_time_and_right_hand_sides_of_a_refusal(
     with pytest.raises(InputError) as refusal:
         solve(case_scene(3), [10.0, 20.0], "gauss-2", 1e-11)
     spent = sum(evaluations for _, evaluations in calls)
-    assert f"gauss-2 exceeded its work limit at t = 20 s after {spent} right-hand sides;" in str(
-        refusal.value
-    )
+    assert f"t = 20 s after {spent} " in str(refusal.value)
     assert spent > 25_000
 
 

@@ -369,16 +369,14 @@ def test_results_of_a_solver_may_overlap_its_starts(law: TorqueLaw) -> None:
         assert found[0] is out
         assert out.tobytes() == omega.tobytes()
         assert found[1].tobytes() == status.tobytes()
-    for wrong in (np.empty((19, 3)), np.empty((20, 4)), np.empty((20, 3), "f4"), place[0]):
-        before = wrong.copy()
-        with pytest.raises(InputError, match="out: allowed: a writable array of float64"):
-            solver.many(starts, times, out=wrong)
-        assert np.array_equal(wrong, before, equal_nan=True)
     read_only = np.zeros((20, 3))
     read_only.flags.writeable = False
-    with pytest.raises(InputError, match="out: allowed: a writable array"):
-        solver.many(starts, times, out=read_only)
-    assert not read_only.any()
+    wrongs = np.empty((19, 3)), np.empty((20, 4)), np.empty((20, 3), "f4"), place[0], read_only
+    for wrong in wrongs:
+        before = wrong.copy()
+        with pytest.raises(InputError, match="out"):
+            solver.many(starts, times, out=wrong)
+        assert np.array_equal(wrong, before, equal_nan=True)
     with pytest.raises(TypeError):
         solver.many(starts, times, place=omega)  # type: ignore[call-arg]
 

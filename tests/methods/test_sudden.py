@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 from fractions import Fraction
 from functools import partial
-from random import Random
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from pyharness import Scene, Stepper, Taylor, solve
-from pyharness.scenes.state_scenes import SUDDEN, draw
 from pyharness.truth.reference import reference
 
 SPHERE = (2.0, 2.0, 2.0)
@@ -71,19 +69,6 @@ def test_a_pulse_of_time_is_not_missed(name: str, width: float) -> None:
 def test_the_reference_misses_no_pulse_of_time(name: str, width: float) -> None:
     scene, times, wanted = pulse(name, width)
     assert reference(scene, times).omega[:, 0] == pytest.approx(wanted, rel=0.0, abs=2e-14)
-
-
-@pytest.mark.parametrize("number", range(4))
-@pytest.mark.parametrize("name", SUDDEN)
-def test_a_sudden_change_with_omega_is_not_missed(name: str, number: int) -> None:
-    scene, time = draw(Random(f"{name} {number}"), (name,))
-    truth = reference(scene, [time])
-    scale = max(np.abs(scene.omega).max(), np.abs(truth.omega).max())
-    for tolerance in (1e-3, 1e-5, 1e-7, 1e-10):
-        found = solve(scene, [time], "taylor", tolerance)
-        assert found.growth is not None
-        limit = tolerance + 4e-15 * found.growth
-        assert np.abs(found.omega - truth.omega).max() <= limit * scale
 
 
 def _of_sine(power: int) -> float:

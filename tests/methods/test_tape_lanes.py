@@ -1,6 +1,5 @@
 """Many bodies under one torque that depends on the state, which a kernel solves side by side."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 from typing import Any
@@ -13,9 +12,8 @@ from pyharness.methods.ensemble import Ensemble
 from pyharness.methods.many_recorded import solve_side_by_side
 from pyharness.model.arrays import unit_quaternions
 from pyharness.model.attitude import angle_between
-from pyharness.model.codes import Statuses
 from pyharness.model.extension import extension
-from pyharness.scenes.state_scenes import STEADY, SUDDEN, TURNING, draw, draw_ready
+from pyharness.scenes.state_scenes import draw
 
 MOMENTS = (1.0, 2.0, 2.5)
 
@@ -40,42 +38,6 @@ def lanes(
         np.zeros(1, np.int32),
     )  # fmt: skip
     return found, left
-
-
-def cases() -> Iterator[Any]:
-    """Yield random scenes of each kind of term: the name, the scene and a time (s)."""
-    for name in STEADY + TURNING + SUDDEN:
-        yield pytest.param(*draw(Random(f"lanes {name}"), (name,)), id=name)
-    for number in range(12):
-        scene, time = draw_ready(Random(f"lanes {number}"))
-        yield pytest.param(scene, time, id=scene.name)
-
-
-@pytest.mark.parametrize(("scene", "time"), list(cases()))
-def test_errors_are_below_the_tolerance(scene: Scene, time: float) -> None:
-    source = np.random.default_rng(5)
-    n, tolerance = 24, 1e-9
-    starts = np.array(scene.omega) * (1.0 + 0.3 * source.normal(size=(n, 3)))
-    times = time * source.uniform(0.3, 1.0, n) * source.choice([-1.0, 1.0], n)
-    turns = unit_quaternions(source.normal(size=(n, 4)))
-    has_attitude = scene.torque.needs_attitude or scene.attitude is not None
-    given = turns if has_attitude else None
-    usual = (1.0, 0.0, 0.0, 0.0) if has_attitude else None
-    found, left = lanes(replace(scene, attitude=usual), starts, times, given, tolerance)
-    # A product of 24 factors may not show in the first terms.
-    assert (len(left) == n) == (scene.name == "swings")
-    assert (found.status[left] == 99).all()
-    for i in sorted(set(range(n)) - set(left))[:5]:
-        own = replace(scene, omega=tuple(starts[i]), attitude=tuple(turns[i]))
-        true = solve(own, times[i], "taylor", 1e-14, attitude=has_attitude)
-        growth = true.growth or 1.0
-        allowed = tolerance + 4e-15 * growth
-        scale = max(np.abs(starts[i]).max(), np.abs(true.omega[-1]).max())
-        assert found.status[i] == Statuses.COMPLETE
-        assert np.abs(found.omega[i] - true.omega[-1]).max() <= allowed * scale
-        if found.attitude is not None:
-            assert true.attitude is not None
-            assert 2.0 * np.abs(found.attitude[i] - true.attitude[-1]).max() <= allowed
 
 
 def test_most_bodies_of_a_batch_are_solved_side_by_side() -> None:
@@ -213,18 +175,6 @@ def test_bodies_that_can_not_be_solved_are_left() -> None:
     assert 0 in lanes(rising, starts[[9, 9]], 3.0)[1]
     turns = np.array([[1.0, 0.0, 0.0, 0.0], [np.nan, 0.0, 0.0, 0.0], [0.5, 0.5, 0.5, 0.5]])
     assert lanes(spin, starts[[0, 9, 0]], 1.0, turns)[1] == [1]
-
-
-def test_breakpoints_of_tables_end_steps() -> None:
-    torque = torques.pulses([0.5, 1.5], [0.25, 0.5], [(3.0, 0.0, 1.0), (0.0, -4.0, 0.0)])
-    scene = Scene("", (1.0, 0.5, 0.2), moments=MOMENTS, torque=torque)
-    starts = np.random.default_rng(4).normal(size=(40, 3))
-    times = np.random.default_rng(5).uniform(-1.0, 3.0, 40)
-    found, left = lanes(scene, starts, times)
-    assert len(left) <= 4
-    for i in sorted(set(range(40)) - set(left)):
-        true = solve(replace(scene, omega=tuple(starts[i])), times[i], "taylor", 1e-13).omega[-1]
-        assert found.omega[i] == pytest.approx(true, abs=1e-9)
 
 
 def test_unstable_motions_are_left() -> None:

@@ -21,9 +21,8 @@ _NOTEBOOKS = ("gallery", "tutorials")
 _LINKED = (
     "index.md",
     "article/article.md",
-    "explanation/findings.md",
+    "explanation/about-the-text.md",
     "explanation/methods.md",
-    "explanation/origins.md",
 )
 
 

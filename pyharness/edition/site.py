@@ -33,6 +33,7 @@ from pyharness.history.claims.ledger import judgements
 from pyharness.history.claims.report import written
 from pyharness.history.claims.stories import prose
 from pyharness.history.identifiers import DATA, data_identifier
+from pyharness.history.origins import disagreements
 from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import text_digest
 from pyharness.history.timeline import timeline
@@ -72,7 +73,7 @@ MENU = {
         ("About", "about.html"),
         ("Documents", "docs/index.html"),
         ("Article", "docs/article/article.html"),
-        ("Findings", "docs/explanation/findings.html"),
+        ("About the text", "docs/explanation/about-the-text.html"),
         ("Methods", "docs/explanation/methods.html"),
         ("API", "api.html"),
         ("Search", "search.html"),
@@ -220,7 +221,8 @@ def _listing() -> Iterator[Page]:
         )
     yield Page("listing/collation.html", "The three decks compared", "collation.html",
                {"programs": decks.TITLES, "operations": parallel_decks.operations(),
-                "origins_of": origins.origins_of_step})  # fmt: skip
+                "origins_of": origins.origins_of_step, "disagreements": disagreements(),
+                "anchor_of": origins.anchor_of, "thesis_on": origins.thesis_on})  # fmt: skip
     counts = {
         program: (title, len(deck(program).cards), len(decks.sheets(program)))
         for program, title in decks.TITLES.items()

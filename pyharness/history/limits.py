@@ -1,7 +1,7 @@
 """The limits of the original programs as the step size goes to zero.
 
 With ever smaller steps an original program may converge to the solution of Euler's equations, to
-another function of time, or to no function. docs/explanation/findings.md derives these limits. This
+another function of time, or to no function. docs/article/article.md derives these limits. This
 module computes each limit independently of the programs, and compares the programs with their
 limits while the step is halved.
 """

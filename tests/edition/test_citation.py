@@ -79,7 +79,7 @@ def test_the_page_has_the_citation_and_the_linked_data(built_site: dict[str, byt
     "path",
     [
         "docs/article/bibliography.bib", "docs/article/metadata.yaml.in",
-        "docs/explanation/reconstruction.md", "pyharness/data/edition.toml", "CITATION.cff",
+        "docs/explanation/about-the-text.md", "pyharness/data/edition.toml", "CITATION.cff",
         "codemeta.json",
     ],
 )  # fmt: skip

@@ -279,7 +279,8 @@ def test_terms_that_documents_link_are_in_the_glossary() -> None:
 
 
 def test_lesson_is_linked_from_the_site(built_site: dict[str, bytes]) -> None:
-    for name in ("tutorials/lesson.md", "tutorials/lesson-notes.md", "explanation/timeline.md"):
+    names = ("tutorials/lesson.md", "tutorials/lesson-notes.md", "explanation/about-the-text.md")
+    for name in names:
         page = page_of(name)
         assert page in built_site
         assert f'href="{page}"' in html.unescape(built_site["about.html"].decode())

@@ -34,7 +34,7 @@ def test_no_link_is_dead(built_site: dict[str, bytes]) -> None:
     [
         ("index.html", b'href="thesis.html"', b'href="these.html"'),
         ("claims.html", b'href="#vi-superior"', b'href="#vi-inferior"'),
-        ("docs/explanation/findings.html", b'src="../figures/', b'src="../figure/'),
+        ("docs/article/article.html", b'src="../figures/', b'src="../figure/'),
         ("listing/two-term.html", b"../apparatus.html#", b"../apparatus.html#no-"),
     ],
 )
@@ -287,7 +287,7 @@ def test_dates_that_the_report_names_are_on_the_page_about(built_site: dict[str,
     shown = re.findall(r"<dt>([^<]*\d)</dt>", page)
     assert shown == [each.date for each in timeline() if each.certainty == "certain"]
     for each in timeline():
-        assert each.date in built_site["docs/explanation/timeline.html"].decode()
+        assert each.date in built_site["docs/explanation/about-the-text.html"].decode()
 
 
 def test_disagreements_are_linked_from_operations_and_entries(
@@ -299,7 +299,7 @@ def test_disagreements_are_linked_from_operations_and_entries(
     }
     shown = {each.row.what for each in parallel_decks.operations()}
     for each in disagreements():
-        anchor = f"docs/explanation/origins.html#{slug(each.title)}"
+        anchor = f"listing/collation.html#{slug(each.title)}"
         assert links["apparatus.html"].count(anchor) == len(each.entries), each.id
         assert links["listing/collation.html"].count(anchor) == len(shown & {*each.steps}), each.id
 
@@ -323,7 +323,7 @@ def test_pictures_and_licences_are_beside_the_pages(built_site: dict[str, bytes]
     assert "docs/atlas/history.png" in built_site
     assert "docs/atlas/README.html" in built_site
     # What is not on the site is named, and no link.
-    assert b'href="../../tests' not in built_site["docs/atlas/history.html"]
+    assert b'href="../../tests' not in built_site["docs/atlas/README.html"]
 
 
 @pytest.mark.parametrize(
@@ -331,8 +331,8 @@ def test_pictures_and_licences_are_beside_the_pages(built_site: dict[str, bytes]
     [
         (
             "atlas/README.md",
-            "../explanation/findings.md#what-is-true",
-            "../explanation/findings.html#what-is-true",
+            "../article/article.md#results",
+            "../article/article.html#results",
         ),
         ("explanation/methods.md", "../figures/growth.svg", "../figures/growth.svg"),
         ("explanation/methods.md", "../../README.md", None),

@@ -24,6 +24,8 @@ from pyharness.original.programs import PROGRAM_REGISTRY, run_program
 from pyharness.truth.reference import reference
 
 ROOT = Path(__file__).parents[2]
+ARTICLE = "docs/article/article.md"
+ABOUT = "docs/explanation/about-the-text.md"
 ACCOUNT = facts("account")
 STATEMENTS = {each["id"]: each for each in ACCOUNT["statement"]}
 PARTS = {each["id"]: each["part"] for each in entries() if "part" in each}
@@ -166,35 +168,14 @@ def test_the_conclusion_rests_on_the_faults_under_every_reading_and_conjecture()
     assert "in each of Cases 2 to 6" in STATEMENTS["conclusion"]["text"]
 
 
-def test_findings_have_the_ratios_of_the_article() -> None:
-    """The article is computed, and a test compares it."""
-    found = re.search(
-        r"their errors are (\S+) to (\S+) times that of Runge-Kutta\. "
-        r"In Case 7 the factor is (\S+) for two terms and (\S+) for four,",
-        _document("docs/article/article.md"),
-    )
-    assert found is not None
-    low, high, two, four = found.groups()
-    findings = _document("docs/explanation/findings.md")
-    assert f"is {low} to {high} times more accurate than either collocation program" in findings
-    assert (
-        f"it is {float(two):.0f} times more accurate than two-term collocation, and "
-        f"{float(four):.1f} times than four-term collocation"
-    ) in findings
-
-
-def test_findings_have_the_error_of_case_6_over_300_steps() -> None:
+def test_article_has_the_error_of_case_6_over_300_steps() -> None:
     """So far two terms are no worse than four, but neither follows the motion."""
     lab = Laboratory(False, Assumptions(steps=300))
     two, four, third = (lab.error(program, 6) for program in PROGRAMS)
     assert two < 1.01 * four
     assert two > 100.0 * third
-    findings = _document("docs/explanation/findings.md")
     assert f"{two:.1f} rad/s" == f"{four:.1f} rad/s"
-    assert (
-        f"no faster for two terms than for four: over 300 steps both corrected programs have an "
-        f"error of {two:.1f} rad/s"
-    ) in findings
+    assert f"Over 300 steps both have an error of {two:.1f} rad/s." in _document(ARTICLE)
 
 
 # What no text may say, by what it would claim.
@@ -246,15 +227,15 @@ def test_a_told_motive_is_found() -> None:
         assert re.search(_NOT_SAID["the author's thoughts"], text)
 
 
-def test_findings_have_the_distance_from_the_limit() -> None:
+def test_article_has_the_distance_from_the_limit() -> None:
     run = run_program(case_scene(2), Listing.original("runge-kutta"))
     away = np.abs(run.omega[:, 0] - 2.0 * np.sin(2.5 * run.time)).max()
-    assert f"its omega1 is within {away:.4f} rad/s" in _document("docs/explanation/findings.md")
+    assert f"its omega1 is within {away:.4f} rad/s" in _document(ARTICLE)
 
 
-def test_reconstruction_names_the_entries_of_each_certainty() -> None:
-    text = (ROOT / "docs/explanation/reconstruction.md").read_text()
-    listed = text.partition("## What is certain")[2].partition("## Known issues")[0]
+def test_page_about_the_text_names_the_entries_of_each_certainty() -> None:
+    text = (ROOT / ABOUT).read_text()
+    listed = text.partition("## What is certain")[2].partition("What would settle")[0]
     known = {each["id"]: each["certainty"] for each in entries()}
     for certainty in ("probable", "conjecture", "undecidable"):
         (bullet,) = re.findall(rf"^- \*{certainty}\*(.*?)(?=^- |\Z)", listed, re.M | re.S)
@@ -272,12 +253,12 @@ def test_of_the_lost_programs_nothing_is_said_to_be_known() -> None:
 
 
 def test_emulated_words_are_told_of_where_they_are_had() -> None:
-    assert "--word cdc48" in _document("docs/explanation/reconstruction.md")
+    assert "--word cdc48" in _document(ABOUT)
     assert entry("dialect-cdc")["certainty"] == "probable"
     assert (shipped("docs") / "explanation/words.md").exists()
 
 
-def test_numbers_of_readme_and_reconstruction_are_those_of_runs_and_cards() -> None:
+def test_numbers_of_readme_and_page_about_the_text_are_those_of_runs_and_cards() -> None:
     scene = case_scene(3)
     printed, mended = (
         run_program(scene, each("runge-kutta")) for each in (Listing.original, Listing.corrected)
@@ -293,4 +274,4 @@ def test_numbers_of_readme_and_reconstruction_are_those_of_runs_and_cards() -> N
     # Those of the home page are held by tests/edition/test_story.py.
     assert f"after {MECHANISM['stopped']['step']} steps" in told
     cards = sum(len(deck(each).cards) for each in PROGRAMS)
-    assert f"one row for each of {cards} cards" in _document("docs/explanation/reconstruction.md")
+    assert f"one row for each of {cards} cards" in _document(ABOUT)

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -69,11 +68,11 @@ def _stored() -> dict[str, dict[float, float]]:
     return found
 
 
-def test_numbers_of_the_page_are_those_beside_its_picture() -> None:
-    page = (ATLAS / "history.md").read_text()
+def test_numbers_beside_the_page_are_those_beside_its_picture() -> None:
+    text = (ATLAS / "history-claims.csv").read_text()
+    shares_of = {row["claim"]: row for row in csv.DictReader(text.splitlines())}
     for name, means in _stored().items():
-        (line,) = [each for each in page.splitlines() if re.match(rf"{name} +\d", each)]
-        whole, part, _, _ = map(float, line.split()[1:])
+        whole, part = (float(shares_of[name][key]) for key in ("whole (%)", "in part (%)"))
         assert len(means) == 25
         assert np.mean(list(means.values())) == pytest.approx(
             (whole + part / 2.0) / 100.0, abs=1e-4

@@ -66,7 +66,7 @@ def test_evidence_is_told(printed: Printed) -> None:
 
 
 def test_what_the_report_says_of_each_choice() -> None:
-    """Compare docs/explanation/findings.md: each choice changes the score, with all others kept."""
+    """Compare docs/article/article.md: each choice changes the score, with all others kept."""
     found = list(evidence())
     steps, held, last, c1 = (
         _effects(found, axis)

@@ -1,6 +1,6 @@
 // The limit of a program: the omega to which it converges as its step size goes to zero.
 //
-// docs/explanation/findings.md derives the limits of the original programs, and
+// docs/article/article.md derives the limits of the original programs, and
 // pyharness/history/limits.py computes them independently.
 import { eulerCoefficients, normalizedTorque } from "../programs/equations.js";
 import { reference } from "./reference.js";

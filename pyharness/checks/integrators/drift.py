@@ -1,4 +1,7 @@
-"""The drift of conserved quantities in a long motion without torque, and its limit."""
+"""The drift of conserved quantities in a long motion without torque, and its limit.
+
+Energy and |L| are relative; the direction of the angular momentum L in space is an angle (rad).
+"""
 
 import math
 from dataclasses import dataclass
@@ -31,21 +34,7 @@ CHANGE = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The drift of conserved quantities in a long motion without torque.
-
-    Attributes
-    ----------
-    times : ndarray, shape (n,)
-        Times, s.
-    energy, momentum : ndarray, shape (n,)
-        Differences of energy and of the magnitude of the angular momentum from those at time 0,
-        relative to these.
-    direction : ndarray of shape (n,), or None
-        Angle between the angular momentum in space and that at time 0 (rad); None without attitude.
-    change : float
-        Largest change of one of them from a row to the next, in the same units; the energy and the
-        magnitude relative to the earlier row.
-    """
+    """The drift of conserved quantities from time 0; `change` is the largest between rows."""
 
     times: Array
     energy: Array
@@ -54,7 +43,7 @@ class Drift:
     change: float
 
     def named(self) -> dict[str, Array]:
-        """Return the quantities by name; the direction is left out if it is not known."""
+        """Return the quantities by name, the direction if it is known."""
         found = {"energy": self.energy, "momentum": self.momentum}
         return found if self.direction is None else {**found, "direction": self.direction}
 
@@ -62,9 +51,8 @@ class Drift:
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
     """Return level and times (s) of the long motion, and the limit of the change in a row.
 
-    The level is that of the largest step size or tolerance whose limits allow enough rows in the
-    problem of `free`, a result without torque; otherwise the last, with as many rows as they allow.
-    The limit is None if the errors are too large for one.
+    It is the level of the largest setting whose limits allow enough rows, else the last. The limit
+    is None if the errors are too large for one.
     """
     control = free.finest.control
     levels = range(_FIRST[control], LEVELS)
@@ -81,10 +69,7 @@ def long_motion(free: Judged) -> tuple[int, Array, float | None]:
 
 
 def drift_of(scene: Scene, times: Array, motion: Motion) -> Drift:
-    """Return the drift of the conserved quantities of a motion without torque.
-
-    `times` (s) are those of the rows of `motion`.
-    """
+    """Return the drift in `motion`, whose rows are at `times` (s)."""
     omega = np.vstack([scene.omega, motion.omega])
     with np.errstate(all="ignore"):
         vectors = np.array(scene.moments) * omega
@@ -116,7 +101,7 @@ def _angle(first: Array, second: Array) -> Array:
 def growth_power(times: Array, drift: Array) -> float | None:
     """Return p if the largest drift up to a time grows with its power p; None if it is rounding.
 
-    The power is that from a quarter of the last time to the last.
+    It is the power from a quarter of the last time to the last.
     """
     quarter = times <= times[-1] / 4.0
     early, late = float(np.abs(drift[quarter]).max()), float(np.abs(drift).max())

@@ -1,7 +1,7 @@
 """Known faults of integrators: the motions that a faulty integrator computes.
 
-If the answer of an integrator converges to one of these motions, the fault is named. Each motion is
-a solution of our own, of another scene or in other conventions.
+If an integrator converges to one of them, the fault is named. Each is our solution of another scene
+or in other conventions.
 """
 
 import math
@@ -34,9 +34,8 @@ class State(NamedTuple):
 class Fault:
     """A fault of an integrator: its name, a sentence that says what is wrong, and its motion.
 
-    The function `motion` takes the scene, the requested times (s) and the step size (s), and
-    returns the states of a faulty integrator, or None if the fault has no effect in the scene.
-    With `of_step`, they depend on the step size, and approach the true states as it falls.
+    `motion` takes scene, times (s) and step size (s), and returns None if the fault has no effect.
+    With `of_step`, the states approach the true ones as the step falls.
     """
 
     name: str
@@ -167,7 +166,7 @@ def _of_output(name: str) -> Callable[[Scene, Array, float], State]:
 
 
 def as_output(name: str, attitude: Array, scene: Scene) -> Array:
-    """Return attitudes as an integrator with a fault gives them; `name` is in `OUTPUTS`."""
+    """Return attitudes with the fault `name` of `OUTPUTS`."""
     if name == "attitude-from-identity":
         assert scene.attitude is not None
         return np.array(product(_conjugate(scene.attitude), attitude.T)).T
@@ -177,8 +176,8 @@ def as_output(name: str, attitude: Array, scene: Scene) -> Array:
 def _space_rates(scene: Scene, times: Array, step: float) -> State:
     """Return the motion with q' = (0, omega) q/2 in place of q' = q (0, omega)/2.
 
-    The conjugate p of q then satisfies p' = p (0, -omega)/2, and -omega the equations with the
-    opposite gyroscopic term and torque.
+    The conjugate p of q satisfies p' = p (0, -omega)/2, and -omega the equations with the opposite
+    gyroscopic term and torque.
     """
     moments = scene.moments
     assert moments is not None
@@ -216,10 +215,7 @@ def _doubled_rates(scene: Scene, times: Array, step: float) -> State:
 
 
 def _thesis_program(scene: Scene, times: Array, step: float) -> State:
-    """Return the curve 2 y(t/2) - y(0), with quaternions of norm 1.
-
-    The states y are the true ones under a torque that passes at double speed.
-    """
+    """Return 2 y(t/2) - y(0), quaternions normed; y is true under a torque of double speed."""
     law = scene.law
     x, y, z = law.rate
     fast = replace(
@@ -309,10 +305,9 @@ OUTPUTS = ("quaternion-transposed", "scalar-last", "attitude-from-identity")
 
 
 def motions(scene: Scene, times: Array, step: float) -> Iterator[tuple[Fault, State]]:
-    """Yield each known fault that has an effect in the scene, with the states of its motion.
+    """Yield each fault that has an effect in the scene, with its states at `times` (s).
 
-    `times` (s) are ascending and above 0, and `step` is the step size of the integrator (s). The
-    states of a motion that does not reach the last time are NaN.
+    They are NaN if the motion does not reach the last time.
     """
     for fault in FAULTS:
         with np.errstate(all="ignore"):

@@ -1,8 +1,8 @@
 """Checks of an integrator of rigid bodies in any language, against the true solution.
 
-The integrator is another program, which answers requests. Its errors are measured with smaller and
-smaller steps (or tolerances) in random scenes. If it converges to another motion than the true one,
-the fault is named. docs/how-to/integrators.md describes requests, answers and checks.
+Its errors are measured with smaller and smaller steps (or tolerances) in random scenes. If it
+converges to another motion, the fault is named. docs/how-to/integrators.md describes requests,
+answers and checks.
 """
 
 import math
@@ -62,7 +62,7 @@ _FINITE = Basis(
 
 @dataclass(eq=False)
 class Verdict:
-    """All results of the checks of an integrator, in the order in which they were made."""
+    """All results of the checks of an integrator, in the order of the checks."""
 
     command: str
     checks: list[Check] = field(default_factory=list)
@@ -80,32 +80,12 @@ def judge_integrator(
     told: Callable[[int, str], None] = lambda done, what: None,
     patience: float = PATIENCE,
 ) -> Verdict:
-    """Return the results of all checks of an integrator.
+    """Return the results of all checks of an integrator, started by `command`.
 
-    Parameters
-    ----------
-    command : str
-        The command that starts the integrator.
-    chosen : sequence of Problem
-        The scenes in which it is judged.
-    again : callable
-        Returns the command that repeats the checks in the scene of a name.
-    due : float
-        The order of convergence that the integrator should have at least.
-    told : callable
-        Is called with the number of finished problems, and the name of the next.
-    patience : float
-        The longest time to wait for an answer (s).
-
-    Returns
-    -------
-    Verdict
-        The checks and what was measured. An invalid answer is a failed check and ends the checks.
-
-    Raises
-    ------
-    InputError
-        If the command is empty.
+    ``again(name)`` returns the command that repeats the checks in a scene, ``told`` gets the number
+    of finished problems and the name of the next. `due` is the least order, `patience` the longest
+    wait (s). An invalid answer is a failed check and ends the checks. Raise InputError if the
+    command is empty.
     """
     found = Verdict(command)
     where = "start"
@@ -144,8 +124,8 @@ def judge_integrator(
 def _unexplained(found: Verdict) -> tuple[str, ...]:
     """Return the problems with failed checks that no fault explains.
 
-    A recognised fault also explains failures where its motion, or a long one, may overflow. A low
-    order explains that a higher one is missing.
+    A fault also explains failures where its motion, or a long one, may overflow; a low order, that
+    a higher one is missing.
     """
     faults = [each for each in found.findings if each.name not in FIRST_ORDER]
     named = {each.name for each in faults}
@@ -176,11 +156,7 @@ Ask = Callable[[bytes, int], Motion]
 def judge_problem(
     ask: Ask, problem: Problem, due: float, found: Verdict, again: Callable[[str], str]
 ) -> None:
-    """Add to `found` the checks of an integrator in one problem.
-
-    `ask` sends a request of some rows, and returns the answer. The other arguments are those of
-    `judge_integrator`. Raise PortError if an answer is not valid.
-    """
+    """Add to `found` the checks in one problem; raise PortError if an answer is not valid."""
     rows = len(problem.times)
     answers = []
     for level in range(LEVELS):
@@ -241,10 +217,7 @@ def _order_check(each: Convergence, problem: Problem, due: float, floor: float) 
 
 
 def _repeated(ask: Ask, judged: Judged) -> Check:
-    """Return the check that the same request has the same answer, to the last bit.
-
-    A quaternion and its negative are the same attitude.
-    """
+    """Return the check that the same request has the same answer, up to a quaternion's sign."""
     problem, level = judged.problem, LEVELS // 2
     motion, before = ask(problem.request(level), len(problem.times)), judged.answers[level]
     if motion.refusal or (motion.attitude is None) != (before.attitude is None):

@@ -29,9 +29,8 @@ _STEP_AXIS = np.array([0.6, 0.0, 0.8])  # of the rotation that a first-order fau
 class IntegratorPlant:
     """A fault that is planted in an integrator; its name is that by which it must be recognised.
 
-    `request` changes the parsed request. `motion` changes the answer; it takes the scene and the
-    answer. `advance` computes the attitude anew from the omega of all steps; it takes the
-    quaternion, the omega at both ends of the step, and the step size (s).
+    `advance` computes the attitude anew from the quaternion, the omega at both ends of a step, and
+    the step size (s).
     """
 
     name: str
@@ -42,7 +41,6 @@ class IntegratorPlant:
 
 
 def _scaled(asked: dict[str, Any], factors: Sequence[float]) -> None:
-    """Multiply the components of the torque by three factors."""
     law = asked["torque"]
     for field in ("constant", "rate"):
         law[field] = [x * factor for x, factor in zip(law[field], factors, strict=True)]
@@ -131,7 +129,6 @@ def _turn(omega: Array, h: float) -> Any:
 
 
 def _part(field: str, value: Any) -> Callable[[dict[str, Any]], None]:
-    """Return a fault that replaces a part of the torque."""
     return _set("torque", lambda law: {**law, field: value})
 
 
@@ -174,10 +171,7 @@ PLANTS = (
 
 
 def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
-    """Return a function that asks an integrator with a planted fault, in one scene.
-
-    `ask` asks the integrator itself.
-    """
+    """Return a function that asks an integrator with a planted fault, in one scene."""
 
     def asked_with_fault(line: bytes, rows: int) -> Motion:
         asked = json.loads(line)
@@ -212,21 +206,7 @@ def _advanced(
 
 @dataclass(frozen=True)
 class Recognised:
-    """A planted fault, and the names of the faults that were recognised.
-
-    Attributes
-    ----------
-    plant : IntegratorPlant or None
-        The planted fault; None for the control without a fault.
-    names : tuple of str
-        The recognised faults.
-    failed : int
-        The number of failed checks.
-    has_effect : bool
-        Whether the integrator can have the fault.
-    note : str
-        What prevented the test, or an empty text.
-    """
+    """A planted fault (None: the control), and the names of the faults that were recognised."""
 
     plant: IntegratorPlant | None
     names: tuple[str, ...]
@@ -247,8 +227,8 @@ def self_test(
 ) -> Iterator[Recognised]:
     """Yield the faults that are recognised, first without a planted fault, then with each of them.
 
-    `command` starts the integrator, `chosen` are the scenes, and `due` is the order that the
-    integrator should have. If it gives no valid answer, only a failed control is yielded.
+    `due` is the order that the integrator should have. Without valid answers, only a failed control
+    is yielded.
     """
     try:
         with PortProcess(command, patience, "--integrator") as process:
@@ -297,7 +277,7 @@ _OF_ATTITUDE = (
 
 
 def as_check(found: Recognised) -> Check:
-    """Return the result for a planted fault as a check, which passes if the fault was named."""
+    """Return the result for a planted fault as a check, which passes if it was named."""
     name = Name("self-test", found.plant.name if found.plant else "control")
     if found.note:
         return name.judged(False, found.note)
@@ -308,10 +288,7 @@ def as_check(found: Recognised) -> Check:
 
 
 def self_test_report(command: str, found: Sequence[Recognised], again: str) -> Report:
-    """Return the report of the self-test of the checks of an integrator.
-
-    `again` is the command that repeats it.
-    """
+    """Return the report of the self-test, which the command `again` repeats."""
     checks = [replace(as_check(each), again=again) for each in found]
     planted = [each for each in found if each.plant and each.has_effect]
     named = sum(each.passed for each in planted)

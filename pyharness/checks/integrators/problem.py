@@ -1,4 +1,7 @@
-"""The random scenes in which an integrator is judged, and its errors in them."""
+"""The random scenes in which an integrator is judged, and its errors in them.
+
+A level, from 0 to `LEVELS` - 1, is a step size (s) and a tolerance.
+"""
 
 import math
 from collections.abc import Sequence
@@ -47,7 +50,7 @@ class Problem:
 
     @property
     def kind(self) -> str:
-        """Return the kind of the torque, a member of the kinds of `scenes.moderate`."""
+        """Return the kind of the torque, one of `scenes.moderate`."""
         return self.scene.name.partition("-")[0]
 
     @cached_property
@@ -63,7 +66,7 @@ class Problem:
 
     @cached_property
     def bound(self) -> ErrorBound:
-        """Return the proved or estimated bound of the error of the true states."""
+        """Return the bound of the error of the true states."""
         bound = bound_of(self.scene, self.truth, any_torque=True)
         return bound.over(float(np.abs(self.truth.omega).max()))
 
@@ -73,7 +76,7 @@ class Problem:
         return list(motions(self.scene, self.times, self.step_size(LEVELS - 1)))
 
     def faulty_states(self, fault: Fault, level: int) -> State:
-        """Return the states of a fault, a member of `faulty`, at the step size of a level."""
+        """Return the states of a member of `faulty` at the step size of a level."""
         if fault.of_step:
             found = fault.motion(self.scene, self.times, self.step_size(level))
             assert found is not None
@@ -81,11 +84,11 @@ class Problem:
         return next(state for each, state in self.faulty if each is fault)
 
     def step_size(self, level: int) -> float:
-        """Return the step size of a level, from 0 to `LEVELS` - 1 (s)."""
+        """Return the step size of a level (s)."""
         return self.scene.step_size / 2.0**level
 
     def tolerance(self, level: int) -> float:
-        """Return the tolerance of a level, from 0 to `LEVELS` - 1."""
+        """Return the tolerance of a level."""
         return _COARSEST * _PER_LEVEL**level
 
     @property
@@ -94,29 +97,25 @@ class Problem:
         return float(self.times[-1] / self.step_size(LEVELS - 1))
 
     def floor(self, rounding: float) -> float:
-        """Return the largest error that may be that of the roundings, of this relative size."""
+        """Return the largest error that roundings of this relative size may cause."""
         return _ROUNDINGS * rounding * math.sqrt(self.most_steps)
 
     def request(self, level: int) -> bytes:
-        """Return the line of JSON that requests the states at a level of accuracy."""
+        """Return the line of JSON that requests the states at a level."""
         times, tolerance = self.times.tolist(), self.tolerance(level)
         return request(self.scene, times, self.step_size(level), tolerance)
 
     def errors(self, motion: Motion) -> tuple[float, float | None]:
-        """Return the errors of omega, relative to the largest, and of the attitude (rad).
+        """Return the errors of omega, relative to the largest, and of the attitude (rad), if any.
 
-        An error is infinite if a number is not finite. That of an attitude that was not computed is
-        None.
+        An error is infinite if a number is not finite.
         """
         assert self.truth.attitude is not None
         return errors_between(State(self.truth.omega, self.truth.attitude), motion)
 
 
 def errors_between(state: State, motion: Motion) -> tuple[float, float | None]:
-    """Return the errors of an answer against the states: of omega, relative, and attitude (rad).
-
-    The result is as that of `Problem.errors`.
-    """
+    """Return the errors of an answer against the states, as `Problem.errors` does."""
     with np.errstate(all="ignore"):
         omega = float(np.abs(motion.omega - state.omega).max() / np.abs(state.omega).max())
         angle = None
@@ -132,19 +131,10 @@ def finite_or_infinite(x: float) -> float:
 
 @dataclass(frozen=True)
 class Convergence:
-    """The errors of an integrator in one problem, of omega or of the attitude, and their order.
+    """The errors of omega or attitude (`part`) in one problem, from the largest setting down.
 
-    Attributes
-    ----------
-    part : str
-        A member of `PARTS`.
-    settings : tuple of float
-        The step sizes (s) or the tolerances, from the largest to the smallest.
-    errors : tuple of float
-        The error for each of them.
-    order : float or None
-        The power of the step size, or of the tolerance, with which the error falls; None if the
-        errors are rounding errors from the start.
+    `settings` are step sizes (s) or tolerances; the error falls with their power `order`, None if
+    the errors are rounding from the start.
     """
 
     part: str
@@ -156,8 +146,7 @@ class Convergence:
     def is_first(self) -> bool:
         """Return whether the order is 1, up to the accuracy of the measurement.
 
-        Several steps must show it, because rounding errors may do so in one pair of steps by
-        chance.
+        Several steps must show it, because rounding may do so in one pair by chance.
         """
         if self.order is None:
             return False
@@ -186,25 +175,9 @@ def convergence(
 ) -> Convergence:
     """Return the measured order of convergence of some errors.
 
-    Parameters
-    ----------
-    part : str
-        A member of `PARTS`.
-    settings : sequence of float
-        The step sizes (s) or the tolerances, in descending order.
-    errors : sequence of float
-        The error for each of them.
-    floor : float
-        An error that may be rounding error. Errors below it are not used.
-    overall : bool
-        Whether the order is that from the first to the last error above the floor, or over the last
-        four if it is smaller there, as for tolerances, with which errors fall irregularly.
-        Otherwise it is that of the last pair whose second error is above the floor.
-
-    Returns
-    -------
-    Convergence
-        The order, together with the arguments.
+    Errors below `floor` may be rounding and are not used. With `overall` it is the order from the
+    first to the last error, or over the last four if that is smaller, as for tolerances, with which
+    errors fall irregularly; else that of the last pair.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None
@@ -222,7 +195,7 @@ def convergence(
 
 
 def _power(errors: float, settings: float) -> float:
-    """Return p if a ratio of errors is the power p of a ratio of step sizes or tolerances."""
+    """Return p if a ratio of errors is the power p of a ratio of settings."""
     if math.isnan(errors) or errors <= 0.0:  # the error of the smaller step is infinite
         return 0.0
     return math.log(errors) / math.log(settings)
@@ -245,8 +218,8 @@ class Judged:
     def lost(self) -> int:
         """Return the number of rows that are not finite and should be.
 
-        With large steps an integrator may overflow, if the next smaller step is finite and its
-        error predicts an error of 1 by the measured order.
+        An integrator may overflow with a large step if the next smaller is finite and predicts an
+        error of 1.
         """
         rows = self.finest.lost
         for level in range(LEVELS - 2, -1, -1):
@@ -258,25 +231,19 @@ class Judged:
         return rows
 
     def error(self, level: int) -> float:
-        """Return the larger of the errors of omega (relative) and of the attitude (rad).
-
-        It is not below the tolerance, and not below rounding errors.
-        """
+        """Return the larger error of omega (relative) and attitude (rad), with a floor."""
         problem, finest = self.problem, self.finest
         by_tolerance = finest.control == "tolerance"
         least = problem.tolerance(level) if by_tolerance else problem.floor(finest.rounding)
         return max(least, *(each.errors[level] for each in self.convergences))
 
     def of(self, part: str) -> Convergence | None:
-        """Return the measured order of omega or of the attitude, or None if it was not computed."""
+        """Return the measured order of omega or of the attitude, if it was computed."""
         return next((each for each in self.convergences if each.part == part), None)
 
 
 def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
-    """Return the random scenes in which an integrator is judged, `draws` of each kind.
-
-    `names` selects scenes by their names, as in ``wave-1``, or by the kind; empty selects all.
-    """
+    """Return `draws` random scenes of each kind, or those of `names` (``wave-1`` or a kind)."""
     drawn = [draw_moderate(seed, kind, number) for number in range(draws) for kind in KINDS]
     return [
         Problem(scene)

@@ -26,21 +26,10 @@ ROUNDINGS = {"binary64": 2.0**-53, "binary32": 2.0**-24}
 class Motion:
     """The answer of an integrator to a request: the states at the requested times.
 
-    Attributes
-    ----------
-    omega : ndarray, shape (n, 3)
-        Angular velocity about the body axes, rad/s.
-    attitude : ndarray, shape (n, 4), or None
-        Quaternions from body to space, scalar first, divided by their norms; None if the integrator
-        computes no attitude.
-    norm : float
-        Largest difference of the norm of a quaternion from 1.
-    control : str
-        The field of the request that determines the accuracy, a member of `CONTROLS`.
-    rounding : float
-        Relative rounding error of the integrator's arithmetic.
-    refusal : str
-        The reason for which the integrator refuses the request; empty if it does not.
+    `omega` is about the body axes (rad/s), shape (n, 3); `attitude` from body to space, scalar
+    first, normed, (n, 4), if it is computed; `norm` the largest difference of a quaternion's norm
+    from 1. The field `control` of the request, one of `CONTROLS`, sets the accuracy; `rounding` is
+    the arithmetic's relative error, `refusal` the reason of a refusal, if any.
     """
 
     omega: Array
@@ -60,8 +49,8 @@ class Motion:
 def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: float) -> bytes:
     """Return the line of JSON that requests the states of a scene at `times` (s).
 
-    An integrator with a fixed step uses `step_size` (s), of which all times are multiples. Any
-    other integrator uses `tolerance`, an error relative to the largest omega.
+    An integrator with a fixed step uses `step_size` (s), of which all times are multiples, any
+    other `tolerance`, relative to the largest omega.
     """
     record = scene_record(scene)
     asked = {
@@ -84,10 +73,7 @@ def refuse_integrator(command: str) -> None:
 
 
 def read_motion(line: bytes, rows: int) -> Motion:
-    """Return an integrator's answer to a request of `rows` times; raise PortError if it is invalid.
-
-    `line` is the answer as JSON, without a line feed.
-    """
+    """Return an integrator's answer for `rows` times; raise PortError if it is invalid."""
     given = read_object(line)
     if "refused" in given:
         if not isinstance(given["refused"], str) or not given["refused"].strip():

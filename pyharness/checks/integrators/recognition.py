@@ -44,11 +44,9 @@ class Finding:
 
 
 def recognised(results: Sequence[Judged]) -> list[Finding]:
-    """Return the known faults that explain the errors of an integrator.
+    """Return the known faults that explain the errors, those of most problems first.
 
-    The faults of most problems are first.
-
-    In the problems that no motion of a fault explains, the orders of convergence are interpreted.
+    Where no motion of a fault does, the orders of convergence are interpreted.
     """
     names: dict[str, tuple[str, list[str]]] = {}
 
@@ -102,11 +100,7 @@ def _explained(judged: Judged) -> list[tuple[str, str]]:
 def _best(
     judged: Judged, known: Sequence[tuple[Fault, State]], parts: Sequence[int]
 ) -> Fault | None:
-    """Return the fault whose motion the integrator approaches; None if there is no such fault.
-
-    `known` has faults with their states at the smallest step, and `parts` the indices of the
-    compared members of `PARTS`.
-    """
+    """Return the fault, if any, whose motion the integrator approaches in `parts`."""
     most = _UNEXPLAINED * max(judged.convergences[k].errors[-1] for k in parts)
     scored = []
     for number, (fault, state) in enumerate(known):
@@ -125,7 +119,7 @@ def _approaches(
 ) -> bool:
     """Return whether the answers approach the states of a fault as the steps become smaller.
 
-    What falls so fast is also near the discretisation error, the change from one step to the next.
+    A difference that falls so fast is also near the discretisation error.
     """
     pairs = enumerate(judged.answers)
     errors = [errors_between(states(level), motion) for level, motion in pairs]

@@ -47,10 +47,7 @@ _FLOOR = 1e-17  # smaller errors, and 0, are drawn here
 
 
 def integrator_report(found: Verdict, seed: str) -> Report:
-    """Return the report of the checks of an integrator, with a picture.
-
-    `seed` is the seed of the random scenes.
-    """
+    """Return the report of the checks of an integrator, with a picture."""
     title: list[str] = [
         f"{found.command}: against the true solution of random scenes (seed: {seed})",
         *map(str, references(found.checks)),
@@ -132,12 +129,7 @@ def _findings(found: Verdict) -> Section:
 
 
 def integrator_picture(found: Verdict) -> Picture:
-    """Return the picture of an integrator's errors and drifts, with the numbers that it shows.
-
-    Two panels show the errors of omega and of the attitude as functions of the step size (s) or of
-    the tolerance. A third panel shows the drifts of the conserved quantities (relative, or rad) as
-    functions of time (s).
-    """
+    """Return the picture of errors over step size (s) or tolerance, and drifts over time (s)."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 4.2), dpi=110, layout="constrained")

@@ -1,7 +1,6 @@
 """Faults of a chosen size, which show that a check can fail: in which function, and what changes.
 
-A fault is planted in the running process and removed when its context ends. The self-test of
-`verify` and the tests of the limits plant faults by these functions.
+A fault is planted in the running process and removed when its context ends.
 """
 
 import itertools
@@ -62,11 +61,7 @@ def changing(change: Change) -> Faulty:
 
 
 def on(target: str, change: Change, call: int | None = None) -> Fault:
-    """Return a fault that changes the results of the function with the dotted name `target`.
-
-    Only the call with the number `call`, counted from 1, has a wrong result. If `call` is None, all
-    calls have.
-    """
+    """Return a fault that changes the result of `target`, in its call number `call` or in all."""
 
     def planted(size: float) -> AbstractContextManager[Any]:
         calls = itertools.count(1)
@@ -91,7 +86,7 @@ def beside(around: Callable[[], AbstractContextManager[Any]], planted: Fault) ->
 
 
 def of(name: str, change: Change) -> Change:
-    """Return a change of the attribute `name` of a result, if the result has this attribute."""
+    """Return a change of the attribute `name` of a result, if it is there."""
 
     def changed(found: Any, size: float) -> Any:
         value = getattr(found, name)
@@ -106,20 +101,14 @@ def plus(found: Any, size: float) -> Any:
 
 
 def off(found: Any, size: float) -> Any:
-    """Return omega with each component increased by `size` times the largest component.
-
-    `found` is omega, or a result with the attribute `omega`.
-    """
+    """Return omega, or a result with it, increased by `size` times the largest component."""
     if not isinstance(found, np.ndarray):
         return replace(found, omega=off(found.omega, size))
     return found + size * np.abs(found).max(initial=0.0) * np.sign(found)
 
 
 def bit_off(found: Any, size: float) -> Any:
-    """Return omega with its largest component multiplied by 1 + `size`, and all others unchanged.
-
-    `found` is omega or another array, or a result with the attribute `omega`.
-    """
+    """Return an array, or a result with omega, with the largest element times 1 + `size`."""
     if not isinstance(found, np.ndarray):
         return replace(found, omega=bit_off(found.omega, size))
     wrong = found.copy()

@@ -23,10 +23,7 @@ from pyharness.original.programs import PROGRAM_REGISTRY, Program
 
 
 class TwinFault(NamedTuple):
-    """A fault in the Python version (the twin) of programs: a piece of its source, and another.
-
-    The fields are the columns of the table `data/plants.toml`.
-    """
+    """A fault in the Python version (the twin) of programs: a row of `data/plants.toml`."""
 
     file: str
     right: str
@@ -44,11 +41,7 @@ _COUNT = itertools.count()
 
 @dataclass(frozen=True)
 class PlantedTwin(Program):
-    """A program of the thesis whose Python version (its twin) has a planted fault.
-
-    The faulty twin is `module`, a changed copy of the twin. If `both`, it also runs in place of the
-    compiled Fortran program.
-    """
+    """A program whose twin is a faulty copy; if `both`, in place of the Fortran program too."""
 
     module: ModuleType
     both: bool = True
@@ -56,11 +49,7 @@ class PlantedTwin(Program):
     def _computed(
         self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
-        """Run the faulty Python version of the program on a scene, and return the trajectory.
-
-        If `both` is not set and the Fortran version is requested, the compiled program runs
-        unchanged.
-        """
+        """Run the faulty twin, or the compiled program unchanged if it is not `both`."""
         if self.both or implementation == "python":
             lipschitz, may_stop, _ = options
             found: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)
@@ -69,11 +58,9 @@ class PlantedTwin(Program):
 
 
 def twin(program: str, name: str, both: bool = True) -> Fault:
-    """Return the fault named `name` in the Python version (its twin) of the program `program`.
+    """Return the fault named `name` in the Python version of a program.
 
-    Within the context, the program in the registry is a `PlantedTwin`, which the context yields.
-    The fault has the key `name` in `TWIN_FAULTS`. If `both`, the faulty twin also runs in place of
-    the compiled program.
+    Its context yields the `PlantedTwin` that is in the registry meanwhile.
     """
     fault = TWIN_FAULTS[name]
 
@@ -91,11 +78,7 @@ def twin(program: str, name: str, both: bool = True) -> Fault:
 
 
 def _altered(program: str, file: str, right: str, wrong: str, folder: Path) -> ModuleType:
-    """Return the twin of a program from a copy of the source of the twins.
-
-    The source is copied into `folder`, and the text `right` in the copy of `file` is replaced by
-    `wrong`.
-    """
+    """Return a program's twin from a copy of the sources with `right` in `file` replaced."""
     package = f"planted_{next(_COUNT)}"
     target = folder / package
     ignore = shutil.ignore_patterns("__pycache__")

@@ -46,10 +46,8 @@ from pyharness.original.programs import Program
 class Plant:
     """A fault that is planted to test the checks: its name, its description, and how to plant it.
 
-    `planted` takes the size of the fault, and returns a context manager within which the fault is
-    present. A fault of size 0 changes nothing. `size` is the size in the self-test. `kinds` are the
-    kinds of checks that can detect the fault, besides the comparison with stored results. The
-    self-test runs these kinds.
+    `size` is that of the self-test; a fault of size 0 changes nothing. `kinds` of checks, besides
+    the golden record, can detect it and are run.
     """
 
     name: str
@@ -60,11 +58,7 @@ class Plant:
 
 
 def _stale() -> Change:
-    """Return a change that replaces a run's trajectory by that of an earlier run.
-
-    This is a planted fault. The result is the trajectory of the last run before with as many rows.
-    The first trajectory of each number of rows is returned unchanged.
-    """
+    """Return a change that replaces a trajectory by the last one with as many rows, if any."""
     before: dict[int, Trajectory] = {}
 
     def change(run: Trajectory, size: float) -> Trajectory:
@@ -81,10 +75,9 @@ _Answer = tuple[Array, int, int, Array]
 
 
 def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
-    """Return a fault that changes the results of the compiled kernel of prepared solvers.
+    """Return a fault of prepared solvers: results become ``change(packed, result, size)``.
 
-    Each result becomes ``change(packed, result, size)``, where `packed` is the input of the kernel.
-    A prepared solver is one that `prepare` has set up for one scene.
+    `packed` is the input of the compiled kernel.
     """
 
     def planted(size: float) -> AbstractContextManager[Any]:
@@ -98,11 +91,7 @@ def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
 
 
 def _stale_solver(size: float) -> AbstractContextManager[Any]:
-    """Return a context manager by which prepared solvers give a stale result in every second call.
-
-    The stale result is the result of the call before. This is a planted fault, which checks must
-    detect. A prepared solver is one that `prepare` has set up for one scene.
-    """
+    """Return a context in which every second call of prepared solvers has the result before."""
     calls = itertools.count()
     before: list[_Answer] = []
 
@@ -124,12 +113,7 @@ _FIXED = [code for name, code in _CODES.items() if name.startswith(("gauss", "rk
 
 
 def _too_large(packed: Array, answer: _Answer, size: float) -> _Answer:
-    """Return the results of a prepared solver's kernel, with too large an omega for some methods.
-
-    These are the methods with a fixed step and Gauss collocation. `packed` is the input of the
-    kernel, which contains the method, and `size` the relative error. A prepared solver is one that
-    `prepare` has set up for one scene. This is a planted fault, which checks must detect.
-    """
+    """Return results with too large an omega for fixed-step methods and Gauss collocation."""
     omega, status, steps, found = answer
     wrong = omega * (1.0 + size)
     return (wrong if packed[Places.METHOD] in _FIXED else omega, status, steps, found)
@@ -142,11 +126,7 @@ def _shorter(scene: Scene, size: float) -> Scene:
 def _shorter_compiled(
     size: float, run: Callable[..., Trajectory], scene: Scene, *rest: Any
 ) -> Trajectory:
-    """Call `run`, a compiled program, with a smaller step size, but return the times of its own.
-
-    This is a planted fault. The rows of the result have the omegas after the smaller steps and the
-    times of whole steps.
-    """
+    """Call a compiled program with a smaller step size, but return the times of its own."""
     found, labels = run(_shorter(scene, size), *rest), run(scene, *rest)
     if found.steps != labels.steps:
         return found
@@ -178,10 +158,9 @@ def _shifted(
     size: float, solve: Callable[..., Trajectory], scene: Scene, times: Sequence[float],
     *rest: float,
 ) -> Trajectory:  # fmt: skip
-    """Call `solve` for times that are too late, and label the results with `times` (s).
+    """Call `solve` for times that are `size` steps too late, and label the results with `times`.
 
-    The delay is `size` steps. This is a planted fault. The results still conserve energy and
-    momentum, so that only a comparison with the true solution detects it.
+    Energy and momentum are conserved, so that only the true solution shows the fault.
     """
     late = size * scene.step_size if times[-1] >= 0.0 else -size * scene.step_size
     found = solve(scene, [t + late for t in times], *rest)
@@ -190,11 +169,9 @@ def _shifted(
 
 
 def _wrong_card(size: float) -> AbstractContextManager[Any]:
-    """Return a context manager that exchanges the flags of two defects in the compiled programs.
+    """Return a context that exchanges the flags of two defects in the compiled programs.
 
-    This is a planted fault, which checks must detect. A flag tells a compiled program whether to
-    correct a defect. If only one of the two defects is to be corrected, the programs then correct
-    the card (source line) with the other defect.
+    If only one of the two is to be corrected, the card of the other is.
     """
     known = [entry["flag"] for entry in flagged() if entry["kind"] != "reading"]
     flags = Listing.flags.fget  # type: ignore[attr-defined]
@@ -209,11 +186,7 @@ def _wrong_card(size: float) -> AbstractContextManager[Any]:
 
 
 def _digit_altered(known: Problem, size: float) -> Problem:
-    """Return a published problem whose first omega is wrong by `size` times its accuracy.
-
-    This is a planted fault, which the checks against published results must detect. A problem
-    without a published omega is returned unchanged.
-    """
+    """Return a published problem whose first omega, if any, is off by `size` times its accuracy."""
     value = known.values[0]
     figure = next((each for each in value.omega if each is not None), None)
     if figure is None:

@@ -17,10 +17,7 @@ RequestFault = Callable[[dict[str, Any]], None]
 
 @dataclass(frozen=True)
 class PortPlant:
-    """A fault that is planted in a port: its name, its description, and how to plant it.
-
-    Either `answer` changes the port's answer, or `request` changes the request that the port gets.
-    """
+    """A fault that is planted in a port's answer, or in the request that the port gets."""
 
     name: str
     fault: str
@@ -46,7 +43,7 @@ def _in_row(change: Callable[[list[float]], None], last: bool = False) -> Answer
 
 
 def _in_rows(change: Callable[[Rows], Rows], least: int = 2) -> AnswerFault:
-    """Return a fault that changes the list of all rows, if there are at least `least` of them."""
+    """Return a fault that changes the list of all rows, if it has at least `least`."""
 
     def plant(answer: dict[str, Any]) -> dict[str, Any] | None:
         if len(answer["rows"]) < least:

@@ -22,16 +22,8 @@ _MOST_CELLS = 24  # cells in which the faults are planted
 class Noticed:
     """The runs in which a planted fault changed the port's answer, and those that failed.
 
-    Attributes
-    ----------
-    plant : PortPlant or None
-        The planted fault; None for the control without a fault.
-    changed : int
-        The number of runs in which the fault changed the answer; all runs for the control.
-    failed : int
-        The number of these runs whose check failed.
-    example : str
-        The id and the note of one failed check.
+    For the control, which has no plant, all runs count as changed. `example` is the id and note of
+    a failed check.
     """
 
     plant: PortPlant | None
@@ -43,8 +35,7 @@ class Noticed:
     def passed(self) -> bool:
         """Return whether each changed answer was noticed; for the control, whether none failed.
 
-        A fault that changed no answer, as a fault of the stop test in runs without a stop, passes.
-        The report counts such faults.
+        A fault that changed no answer passes; the report counts these.
         """
         return self.changed == self.failed if self.plant else self.failed == 0
 
@@ -57,9 +48,8 @@ class Noticed:
 def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Noticed]:
     """Yield what the check of a port notices, first without any fault, then with each fault.
 
-    A fault has to be noticed in each run in which it changes the port's answer. At most
-    `_MOST_CELLS` of the runs `cells`, chosen always in the same way, are used. If the port gives no
-    valid answer, only a failed control is yielded. `command` starts the port.
+    At most `_MOST_CELLS` runs are used, always the same. Without valid answers, only a failed
+    control is yielded.
     """
     chosen = _chosen(cells)
     try:
@@ -146,10 +136,7 @@ def _same(faulty: dict[str, Any], answer: dict[str, Any]) -> bool:
 
 
 def as_check(noticed: Noticed) -> Check:
-    """Return the result for a planted fault as a check, which passes if the fault was noticed.
-
-    Its value is the number of runs in which the fault was noticed.
-    """
+    """Return the result for a planted fault as a check; its value is the runs that noticed it."""
     name = Name("self-test", "port", noticed.plant.name if noticed.plant else "none")
     return Check(name, noticed.passed, float(noticed.failed), None, None, _told(noticed))
 
@@ -164,10 +151,7 @@ def _told(noticed: Noticed) -> str:
 
 
 def report(command: str, found: Sequence[Noticed]) -> Report:
-    """Return the report of the self-test: for each planted fault, in how many runs it was noticed.
-
-    `command` started the port, and `found` has the results, the control first.
-    """
+    """Return the report: for each planted fault, in how many runs it was noticed."""
     again = f"python -m pyharness verify --port {shlex.quote(command)} --self-test"
     lines = []
     for each in found:

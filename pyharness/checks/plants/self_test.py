@@ -21,15 +21,7 @@ _DRAWS = 12
 class Caught:
     """The checks that failed with a planted fault or, as a control, without any fault.
 
-    Attributes
-    ----------
-    plant : Plant or None
-        The planted fault; None for the control.
-    failed : mapping of str to int
-        Number of failed checks by kind of check.
-    example : str
-        The id of one failed check. It is a comparison with stored results (the golden record) only
-        if no other check failed.
+    `failed` counts them by kind; `example` is of the golden record only if nothing else failed.
     """
 
     plant: Plant | None
@@ -38,11 +30,7 @@ class Caught:
 
     @property
     def passed(self) -> bool:
-        """Return whether a check besides the golden record detected the planted fault.
-
-        The golden record has stored results of programs and methods. For the control, which has no
-        fault, return whether no check failed.
-        """
+        """Return whether a check besides the record failed; for the control, whether none did."""
         return bool(self.failed.keys() - {_NOT_ENOUGH}) if self.plant else not self.failed
 
     @property
@@ -54,9 +42,7 @@ class Caught:
 def self_test(seed: str, record: Path) -> Iterator[Caught]:
     """Yield the failed checks, first without any fault, and then with each planted fault.
 
-    Without a fault, a few checks of every kind are made. With a fault, only the kinds of checks
-    that can detect it are made. `seed` determines the random scenes. `record` is the folder of the
-    golden record, which has stored results.
+    Without a fault, a few checks of every kind are made; with one, only the plant's kinds.
     """
     chosen = Selection(seed=seed, draws=_DRAWS, record=record, thin=True)
     yield _caught(None, chosen)
@@ -77,11 +63,7 @@ def _caught(plant: Plant | None, chosen: Selection) -> Caught:
 
 
 def as_check(caught: Caught) -> Check:
-    """Return the result for a planted fault as a check, which passes if the fault was detected.
-
-    Its value is the number of failed checks, without comparisons with stored results (the golden
-    record).
-    """
+    """Return the result for a planted fault as a check; its value leaves out the golden record."""
     name = Name("self-test", caught.plant.name if caught.plant else "none")
     value = float(caught.failed.total() - caught.failed[_NOT_ENOUGH])
     again = "python -m pyharness verify --self-test"
@@ -90,11 +72,7 @@ def as_check(caught: Caught) -> Check:
 
 
 def self_test_report(title: Sequence[str], found: Sequence[Caught], seed: str) -> Report:
-    """Return the report of each planted fault: how many checks of which kinds detected it.
-
-    `title` has the lines above the report. `found` has the failed checks for each fault, and `seed`
-    determined the random scenes.
-    """
+    """Return the report of each planted fault: how many checks of which kinds detected it."""
     told = []
     for caught in found:
         plant = caught.plant

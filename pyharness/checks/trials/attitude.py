@@ -69,11 +69,7 @@ _MOTIONS = {
 
 @dataclass(frozen=True)
 class Turn:
-    """A rotation of a test problem and its solution, about axes of the body or of space.
-
-    The function `scene` returns the rotated scene. The function `back` applies the inverse rotation
-    to the quaternions of the solution, shape (n, 4).
-    """
+    """A rotation of the scene about body or space axes; its inverse for quaternions (n, 4)."""
 
     scene: Callable[[Scene], Scene]
     back: Callable[[Array], Array]
@@ -108,9 +104,8 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
 def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> float:
     """Return the largest error of the attitude that a method may have at `time` (s), in rad.
 
-    A closed form may have rounding errors alone. Other methods may have an error of the tolerance,
-    plus rounding errors amplified by the motion. If the motion amplifies perturbations more than a
-    thousandfold, the tolerance is amplified too. `flow` has the error amplification.
+    A closed form may have rounding errors alone, others the tolerance and amplified rounding. If
+    the motion amplifies more than a thousandfold, it amplifies the tolerance too.
     """
     if method in FORMS:
         return ATTITUDE
@@ -162,11 +157,9 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterator[Check]:
-    """Yield the checks of a method's attitude at the last time of the true solution `known()`.
+    """Yield the checks of a method's attitude at the last time of `known()`: angle and norm.
 
-    `name` names the method and the scene. The checks are of the angle from the true attitude and of
-    the norm of the quaternion. For a closed form, the drift of the angular momentum in space is
-    checked too.
+    For a closed form, the drift of the angular momentum in space is checked too.
     """
     scene, truth = scene_of(name), known()
     tried = by_rows(name.subject, tolerance, scene, [truth.end])
@@ -185,10 +178,9 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
 
 
 def _omega_limit(scene: Scene) -> float:
-    """Return the error of the angular momentum that 16 rounding errors of omega may cause.
+    """Return the relative error of the angular momentum by 16 rounding errors of omega.
 
-    The error is relative to the norm of the angular momentum. The rounding error of each component
-    is 2**-53 times the largest component of omega.
+    That of each component is 2**-53 times the largest component.
     """
     momentum = np.array(scene.moments) * scene.omega
     size = float(np.linalg.norm(momentum)) or 1.0
@@ -207,11 +199,9 @@ def _momentum_drift(scene: Scene, found: Answer) -> float:
 def _montgomery(name: Name) -> Check:
     """Check the body's rotation about its angular momentum in a period by Montgomery's formula.
 
-    By this formula, the angle of the rotation is 2 E T/L less a solid angle. E is the energy, T the
-    period, and L the norm of the angular momentum. In the body, the angular momentum describes a
-    closed curve about the axis along which its component keeps its sign. This curve encloses the
-    solid angle. Because the angle of the rotation is no conserved quantity, no other check detects
-    a wrong rate of this rotation. `name` names the scene.
+    Its angle is 2 E T/L less a solid angle, with energy E, period T and angular momentum L. In the
+    body, L describes a closed curve about the axis along which its component keeps its sign, which
+    encloses the solid angle. As the angle is not conserved, no other check detects a wrong rate.
     """
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)
@@ -235,8 +225,7 @@ def _montgomery(name: Name) -> Check:
 def _solid_angle(scene: Scene, period: float) -> float:
     """Return the solid angle that the angular momentum encloses in the body in one period (s).
 
-    The angle is integrated by the trapezoidal rule, which converges exponentially for an analytic
-    periodic function. The elliptic functions for omega are computed in decimal arithmetic.
+    The trapezoidal rule converges exponentially for an analytic periodic function.
     """
     moments = np.array(scene.moments)
     before, count, rows = math.inf, 32, np.empty((0, 3))
@@ -261,8 +250,7 @@ def _solid_angle(scene: Scene, period: float) -> float:
 def _turned(turn: Turn, name: Name) -> Check:
     """Check that the attitude of the rotated problem, rotated back, is the original attitude.
 
-    `turn` is the rotation, and `name` names the scene and the method. Each of the two attitudes may
-    have the error that the method is allowed.
+    Each may have the error that the method is allowed.
     """
     scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
     plain, other = (
@@ -279,8 +267,7 @@ def _turned(turn: Turn, name: Name) -> Check:
 def _back(name: Name) -> Check:
     """Check that integrating forward and then back to time 0 gives the initial attitude.
 
-    `name` names the scene and the method. The limit is the sum of the errors that both integrations
-    may cause.
+    The limit is the sum of the errors that both integrations may cause.
     """
     scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
     there = solve(scene, [time], method, tolerance, attitude=True)
@@ -302,8 +289,8 @@ def _back(name: Name) -> Check:
 def _angles(off: float, name: Name) -> Check:
     """Check Euler angles near a pole by converting them to quaternions with SciPy's rotations.
 
-    The quaternions must agree with those from which our code computed the angles. `off` is the
-    distance of the second angle from the pole (rad), and `name` names the sequence of axes.
+    `off` is the distance of the second angle from the pole (rad); the name has the sequence of
+    axes.
     """
     from scipy.spatial.transform import Rotation
 

@@ -1,8 +1,7 @@
 """Trial of invariance: results must transform with a problem that is rotated or rescaled.
 
-Some methods perform the same operations on the transformed problem, in another order of axes, with
-other signs or with other exponents. Their results must then be bit-for-bit identical. The results
-of all other methods must agree within an error bound.
+Methods that perform the same operations in another order of axes, with other signs or exponents,
+must give the same bits; all others agree within an error bound.
 """
 
 import random
@@ -52,12 +51,10 @@ SCENES = {
 
 @dataclass(frozen=True)
 class Symmetry:
-    """A transformation of a problem (a rotation or rescaling), with its inverse for the result.
+    """A rotation or rescaling of a problem, and its inverse for omega.
 
-    The function `turn` transforms the scene. A motion that took a time t then takes the time
-    t/`faster`. The function `back` transforms the resulting omega back. `bitwise` names the methods
-    and programs whose operations are transformed in the same way, so that their results must be
-    bit-for-bit identical.
+    A motion of a time t takes t/`faster`. The methods and programs in `bitwise` must give the same
+    bits.
     """
 
     turn: Callable[[Scene], Scene]
@@ -140,21 +137,14 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
-    """Return omega at `time` (s) by the method `name`; NaN if a prepared solver ends before `time`.
-
-    `tolerance` is relative to the largest omega. A prepared solver is one that `prepare` has set up
-    for one scene.
-    """
+    """Return omega at `time` (s); NaN if a prepared solver ends before."""
     return run_method(name, scene, time, tolerance).omega
 
 
 def _turned(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Check:
     """Check that the result of the transformed problem, transformed back, is the original result.
 
-    `symmetry` is the transformation, and `name` names the scene and the method. For a method in
-    `symmetry.bitwise` the bits must agree. Otherwise, each of the two results may have the error
-    that the method is allowed. For any other method with a fixed step, the difference is reported
-    without a limit.
+    Outside `bitwise`, each may have its allowed error; fixed steps are only reported.
     """
     scene, method = scene_of(name), name.subject
     try:

@@ -1,4 +1,9 @@
-"""Trial of length: energy, momentum and phase over a million revolutions, against Brouwer's law."""
+"""Trial of length: energy, momentum and phase over a million revolutions, against Brouwer's law.
+
+The phase is the position along the closed curve of omega. By the law, rounding errors of energy and
+momentum grow like the power 1/2 of the number of steps, those of the phase like 3/2; if the errors
+of a step are biased, the powers are 1 and 2.
+"""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -66,20 +71,10 @@ Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
 class Integrator:
     """A method whose growth of errors is measured, with bounds on the errors of its steps.
 
-    Attributes
-    ----------
-    run : callable
-        ``run(scene, times)`` returns omega at the times, shape (n, 3), and the number of steps
-        until each time.
-    noise : callable
-        ``noise(orbit, scene, step)`` returns bounds on the errors that a step of the size `step`
-        (s) may add. `orbit` is the `Orbit` of the scene, which has factors for these errors.
-    revolutions, others : float
-        Number of revolutions in the longest run: from the first initial condition, and from each of
-        the other initial conditions.
-    preference : bool
-        Whether the errors of a step are known to be biased. Errors are then expected to grow like
-        the powers 1 (energy, momentum) and 2 (phase) of the number of steps.
+    ``run(scene, times)`` returns omega, shape (n, 3), and the number of steps until each time;
+    ``noise(orbit, scene, step)`` bounds the errors that a step (s) may add. `revolutions` is the
+    longest run from the first initial condition, `others` from the rest; `preference`, whether the
+    errors of a step are known to be biased.
     """
 
     run: Runner
@@ -111,11 +106,7 @@ def _gauss(stages: int) -> Runner:
 
 
 def _rate(scene: Scene) -> float:
-    """Return an estimate of the fastest rate of the linearised equations of a scene (1/s).
-
-    It is the largest magnitude of the coefficients A, B, C of Euler's equations, times the largest
-    component of the initial omega.
-    """
+    """Return an estimate of the fastest rate of a scene (1/s): largest coefficient times omega."""
     return speed(scene, max(map(abs, scene.omega)))
 
 
@@ -157,15 +148,7 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
-    """Yield the checks of the growth of a method's errors, against Brouwer's law.
-
-    By this law, rounding errors of energy and momentum grow like the power 1/2 of the number of
-    steps. Rounding errors of the phase (the position along the closed curve of omega) grow like the
-    power 3/2. If the errors of a step are biased, the powers are 1 and 2. The power that is fitted
-    to the errors is compared with the power of this law. The errors after each number of
-    revolutions are also compared with their bounds. `integrator` is the method, and `name` names
-    the motion.
-    """
+    """Yield the checks of the fitted powers, and of the errors after each number of revolutions."""
     motion = name.circumstance
     for what, found, steps, limits in measured(integrator, MOTIONS[motion], orbit_of(motion)):
         horizons = np.array(REVOLUTIONS[: len(steps)])
@@ -183,10 +166,7 @@ def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
 class Drift:
     """The errors of one quantity of a motion by one method, as a function of the number of steps.
 
-    The quantity `what` is energy, momentum or phase (the position along the closed curve of omega).
-    The arrays have an element for each length of the integration. `steps` is the number of steps.
-    `error` is the root mean square of the errors over the initial conditions, and `limits` is the
-    bound on the errors. `starts` is the number of initial conditions.
+    `error` is the root mean square over the initial conditions, whose number is `starts`.
     """
 
     motion: str
@@ -199,12 +179,7 @@ class Drift:
 
 
 def curves() -> Iterator[Drift]:
-    """Yield the errors of energy, momentum and phase by every method on every motion of the trial.
-
-    The trial of length integrates torque-free motions for up to a million revolutions. Each `Drift`
-    has the errors of one quantity as a function of the number of steps. The phase is the position
-    along the closed curve of omega.
-    """
+    """Yield the errors of all three quantities by every method on every motion."""
     for motion, scene in MOTIONS.items():
         for method, integrator in INTEGRATORS.items():
             for what, found, steps, limits in measured(integrator, scene, orbit_of(motion)):
@@ -218,11 +193,9 @@ def measured(
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
     """Yield the name, errors, numbers of steps and error bounds of energy, momentum and phase.
 
-    `integrator` is the method, and `body` has the factors of the scene for the errors. The method
-    runs from several initial conditions to several horizons, which are numbers of revolutions. The
-    errors have a row for each initial condition of `starts` and a column for each horizon. They are
-    NaN for a horizon after the end of the run. The numbers of steps and the bounds have an element
-    for each horizon. The phase is the position along the closed curve of omega.
+    Errors have a row for each initial condition and a column for each horizon, a number of
+    revolutions; they are NaN after the end of a run. Steps and bounds have an element for each
+    horizon.
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * integrator.revolutions]
@@ -244,19 +217,14 @@ def measured(
 
 @cache
 def orbit_of(motion: str) -> Orbit:
-    """Return the `Orbit` of a motion of `MOTIONS`, from which the error bounds follow.
-
-    An `Orbit` has the factors from errors of omega to errors of energy, momentum and phase.
-    `motion` is the name of the motion. The phase is the position along the closed curve of omega.
-    """
+    """Return the factors from errors of omega to those of energy, momentum and phase."""
     return brouwer.orbit(MOTIONS[motion])
 
 
 def starts(scene: Scene, body: Orbit) -> list[Scene]:
     """Return copies of the scene with different initial omegas along one and the same motion.
 
-    The errors are averaged over these scenes, since they depend on the initial phase of the motion.
-    `body` is the `Orbit` of the motion, which has the frequency of the motion.
+    Errors depend on the initial phase, and are averaged over these.
     """
     times = [0.37 * k / body.frequency for k in range(STARTS)]
     rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times]).tolist()
@@ -264,11 +232,7 @@ def starts(scene: Scene, body: Orbit) -> list[Scene]:
 
 
 def _prepared(name: Name) -> Check:
-    """Check that a prepared solver gives the same bits as the run whose errors the trial checks.
-
-    Both use the same method and the same steps, for 1e4 revolutions. `name` names the method and
-    the motion. A prepared solver is one that `prepare` has set up for one scene.
-    """
+    """Check that a prepared solver gives the same bits as the trial's run for 1e4 revolutions."""
     method, scene = name.subject, MOTIONS[name.circumstance]
     time = 1e4 * 2.0 * math.pi / orbit_of(name.circumstance).largest
     rows, _ = INTEGRATORS[method].run(scene, [time])
@@ -297,10 +261,7 @@ def _scipy(name: Name) -> Iterator[Check]:
 
 
 def _program(listing: Listing, name: Name) -> Iterator[Check]:
-    """Report the errors of a program of the thesis after 10 and 1e4 revolutions, without a limit.
-
-    `listing` is the program with a choice of its defects, and `name` names the scene.
-    """
+    """Report the errors of a program after 10 and 1e4 revolutions, without a limit."""
     scene = scene_of(name)
     found = unstopped(listing).rows(scene)
     for count in (1_000, 1_000_000):

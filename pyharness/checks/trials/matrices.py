@@ -67,8 +67,7 @@ def _condition_note(found: Solved) -> str:
 def _threshold(name: Name) -> Check:
     """Compare the step size up to which LEQT1F finds the matrix singular with the derived one.
 
-    The linear solver LEQT1F reports by IER = 129 that the collocation matrix of a program is
-    singular. The derived step size follows from the exact last pivot. `name` names the program.
+    The derived one follows from the exact last pivot.
     """
     program = name.subject
     wanted = singular_below(program)
@@ -83,9 +82,7 @@ def _threshold(name: Name) -> Check:
 def _counted(listing: Listing, name: Name) -> Check:
     """Check the number of steps of a run in which the program prints IER = 129 (singular matrix).
 
-    `listing` is the program with a choice of its defects, and `name` names the scene. In the
-    original programs the defect `dt-accumulates` moves the collocation points in later steps, so
-    that the matrix ceases to be singular.
+    The defect `dt-accumulates` moves the points in later steps, so that singularity ends.
     """
     scene = scene_of(name)
     ier = compiled.run(scene, listing, velocity=False).ier

@@ -47,12 +47,7 @@ _DIRECTIONS = {"real": -1.0 + 0.0j, "imaginary": 1.0j}
 
 
 def _attempts() -> Iterator[Attempt]:
-    """Yield deferred checks that compare the steps of every program with its amplification matrix.
-
-    Every program is tried in its original and its corrected version. The Runge-Kutta program is
-    also tried with a single defect, `stage-base` or `base-not-restored`. A deferred check is
-    computed only if it is requested.
-    """
+    """Yield deferred checks of every program, original, corrected and for Runge-Kutta in halves."""
     halves = [subset("runge-kutta", keep=[name]) for name in ("stage-base", "base-not-restored")]
     for listing in (*LISTINGS, *halves):
         label = "-".join(sorted(listing.defects)) if listing in halves else listing.label
@@ -119,12 +114,7 @@ def _polynomial(listing: Listing, name: Name) -> Check:
 
 
 def _spin(listing: Listing, name: Name) -> Check:
-    """Report, without a limit, by how much a wobble about axis 3 grows in a step of a program.
-
-    The growth is the spectral radius of the program's amplification matrix less 1. `listing` is the
-    program with a choice of its defects. `name` has the scene, a case of Table 1 of the thesis,
-    whose spin about axis 3 is the steady rotation.
-    """
+    """Report by how much a wobble about axis 3 grows in a step: the spectral radius less 1."""
     scene = scene_of(name)
     z = eigenvalues(replace(scene, omega=(0.0, 0.0, scene.omega[2])))
     spin = z[np.argmax(np.abs(z))]

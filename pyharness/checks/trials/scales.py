@@ -35,11 +35,9 @@ _OVERFLOW = Basis(
 
 
 def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
-    """Yield deferred checks that scaling a motion by a power of two changes no digit of its result.
+    """Yield deferred checks that scaling a motion by a power of two changes no digit.
 
-    The motion is computed by `method`, one of our own. `powers` has the exponents of the powers of
-    two by which omega is multiplied and the time divided. `kind` begins the last part of the
-    checks' ids, as in ``same-2^100``. A deferred check is computed only if it is requested.
+    Omega is multiplied by 2 to each of `powers`, and the time divided.
     """
     time = scene.step_size * scene.steps
     plain = cache(lambda: _tried(method, scene, time))
@@ -60,10 +58,7 @@ def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) ->
 
 
 def _beyond(name: Name) -> Check:
-    """Check that a method reports a failure if omega leaves the range of binary64.
-
-    `name` names the method and the scene.
-    """
+    """Check that a method reports a failure if omega leaves the range of binary64."""
     run = _tried(name.subject, scene_of(name), 1e300)
     silent = run.has_result
     note = "a silent wrong number" if silent else run.ended
@@ -83,11 +78,9 @@ def _flow() -> Conditioning:
 
 
 def _truth(scene: Scene, time: float) -> Truth:
-    """Return the true omega of a scaled motion at `time` (s), with its error amplification.
+    """Return the true omega of a scaled motion at `time` (s).
 
-    The scaled motion differs from the unscaled motion by a factor on omega, and by its inverse on
-    the time. It has the same error amplification, which is therefore computed only once, for the
-    unscaled motion.
+    The error amplification is that of the unscaled motion, computed once.
     """
     size = max(map(abs, scene.omega)) / max(map(abs, ORDINARY.omega))
     return truth_of(scene, time, replace(_flow(), largest=_flow().largest * size))

@@ -22,11 +22,9 @@ _UNDISTURBED = Basis(
 
 
 def _undisturbed() -> Iterator[Attempt]:
-    """Yield deferred checks that a rotation about the middle axis stays constant.
+    """Yield deferred checks that an exact rotation about the middle axis stays constant.
 
-    Without a perturbation the constant rotation is the exact solution. Every method must return it
-    exactly, except that the method `quick` may have one rounding error. A deferred check is
-    computed only if it is requested.
+    Every method must return it exactly, except that `quick` may have one rounding error.
     """
     scene = in_steps(
         Scene("middle axis, undisturbed", (0.0, 1.0, 0.0), moments=MIDDLE_AXIS), _STAYS

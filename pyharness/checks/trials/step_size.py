@@ -55,13 +55,10 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attempt]:
-    """Yield deferred checks of a method's errors and divergence in a case of Table 1 of the thesis.
+    """Yield deferred checks of a method's errors, their crossing, and its divergence in a case.
 
-    For every step size, the error at the end is compared with its predicted bound. The errors of
-    the original programs are only reported. The step size at which truncation and rounding errors
-    are equal is checked too. `place` is the beginning of the names of the checks, with the method
-    as subject. `listing` is the version of a program of the thesis, or None for any other method. A
-    deferred check is computed only if it is requested.
+    The error for every step size is compared with its predicted bound, or only reported for
+    original programs. `listing` is None for a method.
     """
     before = listing is not None and listing.label == "original"
     method, place = place.subject, replace(place, scene=case_scene(case))
@@ -94,9 +91,7 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
 def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
     """Compare the smallest step size at which truncation dominates with the predicted one.
 
-    `method` is the name of the method, and `case` the number of a case of Table 1 of the thesis.
-    `error` returns the relative error of omega for a number of steps. Truncation dominates if this
-    error equals the predicted truncation error within a factor of 2.
+    It does where the error equals the predicted truncation error within a factor of 2.
     """
     forecaster = _forecaster(case, method)
     smallest = SMALLEST
@@ -122,13 +117,7 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
 
 
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
-    """Return the relative error of omega at the end of a run, and a note on the run.
-
-    `name` is the method, and `case` the case of Table 1 of the thesis that `scene` solves.
-    `listing` is a program with a choice of its defects, or None for any other method. The error is
-    relative to the largest omega of the motion. It is infinite or NaN if the run does not reach the
-    end.
-    """
+    """Return omega's relative error at the end, not finite if the run ended early, and a note."""
     largest = _path(case).flow.largest
     note = ""
     if listing is not None:
@@ -144,10 +133,7 @@ def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple
 
 
 def _end(scene: Scene, name: str) -> Array:
-    """Return omega at the end of a run by a method with a fixed step; NaN after an overflow.
-
-    `name` is the method, which is no program of the thesis.
-    """
+    """Return omega at the end of a run by a method with a fixed step; NaN after an overflow."""
     if name in FIXED_STEP:
         rows = fixed_step(name)(scene, [TIME], 1.0).omega
         return rows[-1] if len(rows) else np.full(3, math.nan)
@@ -163,12 +149,7 @@ def _rows(name: str, scene: Scene) -> Trajectory:
 
 
 def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
-    """Compare the smallest step for which a run diverges with the prediction of linear stability.
-
-    `listing` is a program with a choice of its defects, or None for any other method, which `name`
-    names. If linear stability makes no prediction for the method in the case of Table 1 of the
-    thesis, the step is only reported.
-    """
+    """Compare the smallest divergent step with linear stability, if that predicts one."""
     scene, method = case_scene(case), name.subject
     if listing is None:
         runner: Runner = partial(_rows, method)

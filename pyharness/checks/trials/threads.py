@@ -1,7 +1,7 @@
 """Trial of threads: the same calls from many threads at once give bit-for-bit identical results.
 
-`choose_instructions` sets the instruction set of the kernels for the whole process. It must be
-called before threads start, and is therefore not called here.
+`choose_instructions` is for the whole process and must be called before threads start, and is
+therefore not called here.
 """
 
 import random
@@ -49,11 +49,7 @@ SCENES = (
 
 @dataclass(frozen=True)
 class Job:
-    """A call of a method or program that must always give bit-for-bit identical results.
-
-    `subject` is the name of the method or program, and the function `call` returns the bits of its
-    results.
-    """
+    """A call of a method or program; `call` returns the bits of its results."""
 
     subject: str
     scene: Scene
@@ -63,9 +59,7 @@ class Job:
 def _run(only: Sequence[str]) -> Iterator[Check]:
     """Yield, for each method, the check that its calls give the same bits in many threads as alone.
 
-    `only` has the leading parts of the ids of the requested checks. Each call is made alone first,
-    and then `_REPEATS` times by `THREADS` threads in mixed order. The value of a check is the
-    number of calls in threads whose bits differ, and the limit is 0.
+    The value is the number of calls whose bits differ.
     """
     asked = [job for job in jobs() if may_hold(f"threads/{job.subject}", only)]
     differing = different(asked)
@@ -78,11 +72,7 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
 
 
 def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEATS) -> list[Job]:
-    """Return the calls `jobs` that give other bits in many threads than when they are made alone.
-
-    Each call of a method or program (`Job`) is made `repeats` times from a pool of `threads`
-    threads. It is returned once for each time that its results have other bits.
-    """
+    """Return the calls that give other bits in threads than alone, once for each time."""
     alone = [bits(job) for job in jobs]
     order = [index for index in range(len(jobs)) for _ in range(repeats)]
     random.Random("threads").shuffle(order)
@@ -97,10 +87,7 @@ def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEA
 
 
 def bits(job: Job) -> bytes:
-    """Make the call of a job (a method or program with a scene) and return its results' bits.
-
-    If the call raises InputError, return the bytes of the error message.
-    """
+    """Return the bits of a job's results, or of the message of its InputError."""
     try:
         return job.call()
     except InputError as refusal:
@@ -108,11 +95,9 @@ def bits(job: Job) -> bytes:
 
 
 def jobs() -> list[Job]:
-    """Return calls of every method, prepared solver and program of the thesis in all scenes.
+    """Return calls of every method, prepared solver, program (both languages) in all scenes.
 
-    The programs run in Fortran and in Python. Calls that raise InputError, and calls of the linear
-    solver LEQT1F, are among the calls. A prepared solver is one that `prepare` has set up for one
-    scene.
+    Calls that raise InputError, and the linear solver LEQT1F, are among them.
     """
     found = []
     for scene in SCENES:
@@ -148,10 +133,7 @@ def _prepared(scene: Scene, name: str) -> bytes:
 
 @cache
 def _shared(scene: Scene, name: str) -> Solver:
-    """Return the prepared solver for a scene and the method `name`, which all threads share.
-
-    The solver is set up once by `prepare`, and then called by each thread.
-    """
+    """Return the prepared solver that all threads share."""
     return prepare(scene, name, 1e-7)
 
 

@@ -45,11 +45,7 @@ _START = (0.3, 1.0, 2.0)
 
 @dataclass(frozen=True, eq=False)
 class Circumstance:
-    """A scene that is solved until `time` (s), with the methods that are checked in it.
-
-    The function `truth` computes the true solution. If `programs` is set, the programs of the
-    thesis are also run over the scene's steps.
-    """
+    """A scene that is solved until `time` (s), with the methods that are checked in it."""
 
     scene: Scene
     time: float
@@ -61,11 +57,9 @@ class Circumstance:
 def axial(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a symmetric body whose torque acts along its axis.
 
-    The result also has a bound on the rounding errors of a method. The torque has waves (sines and
-    cosines), whose phase, frequency times t, has a random rounding error in every evaluation. The
-    function `conditioning` adds up n such errors in full, where n is the number of evaluations, at
-    least one per period. Random errors partly cancel, so that the bound of the result counts only
-    4 sqrt(n) of them (Hoeffding 1963).
+    The phase of a wave has a random rounding error in every evaluation. `conditioning` adds up n
+    such errors, at least one per period, in full; random ones partly cancel, so that only 4 sqrt(n)
+    are counted here (Hoeffding 1963).
     """
     flow = conditioning(scene, time)
     waves = scene.law.sines + scene.law.cosines
@@ -77,10 +71,9 @@ def axial(scene: Scene, time: float) -> Truth:
 
 
 def averaged(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) of a scene whose torque has very fast sine waves.
+    """Return the true omega at `time` (s) under very fast sine waves, which are left out.
 
-    The waves are left out of the solution, because they change omega little. A bound on this change
-    is added to the error bound of the solution.
+    A bound on the change by them is added to the error.
     """
     moments = np.array(scene.moments)
     waves = scene.law.sines + scene.law.cosines
@@ -92,9 +85,7 @@ def averaged(scene: Scene, time: float) -> Truth:
 def summed(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a sphere, with a bound on its few rounding errors.
 
-    The closed form computes the phase of a sine wave of the torque in double-double, so that the
-    phase has no rounding error. Only the rounding errors remain that arise when the terms of the
-    solution are summed.
+    The closed form has the phase of a wave in double-double; only the final sum rounds.
     """
     known = reference(scene, [time])
     largest = float(np.abs([known.omega[-1], scene.omega]).max())
@@ -104,10 +95,9 @@ def summed(scene: Scene, time: float) -> Truth:
 
 
 def _wave(frequency: float) -> Circumstance:
-    """Return a test scene with fast torque waves, to be solved until their phase is 500 rad.
+    """Return a scene with waves about all axes until their phase is 500 rad.
 
-    The waves (sines and cosines of time) are about all axes, and change omega by about 1 rad/s per
-    period. `frequency` is their angular frequency (rad/s).
+    They change omega by about 1 rad/s per period; `frequency` is in rad/s.
     """
     size = 10.0 * frequency
     law = TorqueLaw(
@@ -127,10 +117,7 @@ def _spun(frequency: float, time: float, programs: bool) -> Circumstance:
 
 
 def _huge(size: float, start: Triple = _START) -> Circumstance:
-    """Return a test scene with a constant torque that turns the body by some fifty radians in all.
-
-    `size` is the largest component of the torque (N m), and `start` is the initial omega (rad/s).
-    """
+    """Return a scene with a constant torque (N m) that turns the body by some fifty radians."""
     law = TorqueLaw((size, 0.7 * size, -0.5 * size))
     scene = Scene("huge torque", start, moments=_BODY, torque=law, steps=6)
     return Circumstance(scene, math.sqrt(4e3 / size), programs=size == 1e6)
@@ -143,10 +130,9 @@ def _tiny(size: float) -> Circumstance:
 
 
 def _resonant(moments: Triple) -> Circumstance:
-    """Return a test scene whose transverse torque rotates at the precession rate of a top, 5 rad/s.
+    """Return a scene whose transverse torque rotates at the precession rate of a top, 5 rad/s.
 
-    The top is the body of Case 2 of Table 1 of the thesis. `moments` are the moments of inertia of
-    the scene's body.
+    The top is the body of Case 2 (Table 1).
     """
     law = TorqueLaw(sines=(((0.0, -40.0, 0.0), 5.0),), cosines=(((40.0, 0.0, 0.0), 5.0),))
     scene = Scene("resonance", (0.0, 1.0, 10.0), moments=moments, torque=law, steps=2000)
@@ -198,11 +184,7 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check]:
-    """Yield the check of the error of one method at the last time of the true solution.
-
-    `name` names the method and the scene. The limit is the sum of the tolerance of the method and
-    the rounding errors, both times the error amplification.
-    """
+    """Yield the check of one method's error: tolerance and rounding, both amplified."""
     assert tolerance is not None
     method = name.subject
     kind = prepared_candidate if method in _PREPARED else method_candidate
@@ -213,11 +195,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
 
 
 def _describe_axial(name: Name) -> Iterator[Attempt]:
-    """Yield deferred checks that report, without a limit, the errors of runs with too large steps.
-
-    `name` names the scene, whose torque has a wave (sine or cosine). In one step the phase of the
-    wave changes by a hundred radians or more. A deferred check is computed only if it is requested.
-    """
+    """Yield deferred reports of errors where the phase advances 100 rad or more in a step."""
     scene = scene_of(name)
     truth = cache(lambda: brouwer.floats(axial_top(scene, scene.times())))
 

@@ -1,4 +1,4 @@
-# make compare [CASE=5] [ARGS="--listing corrected"], make test, make quick, make wheel,
+# make compare [CASE=5] [ARGS="--listing corrected"], make test, make test-all, make quick, make wheel,
 # make edition [OUT=DIR]: all set up what they need.
 # PYTHON= and FC= choose the interpreter and the Fortran compiler; INSTALL=no forbids apt, dnf, brew.
 
@@ -22,13 +22,20 @@ SCRIPTS := $(shell grep -sl '^\#!/bin/sh' .ci/*) .ci/packages verify-port/verify
   $(wildcard docs/how-to/cluster/*.sh)
 WORKFLOWS := $(wildcard .github/workflows/*.yml docs/how-to/port/.github/workflows/*.yml)
 
-.PHONY: compare test quick mutate cross-check wheel edition lint format clean FORCE
+.PHONY: compare test test-all test-changed quick mutate cross-check wheel edition lint format clean FORCE
 
 compare: .venv/ready
 	@$(BIN)/python -m pyharness compare --case $(CASE) $(ARGS)
 
 test: .venv/ready-to-test
+	@$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not campaign" $(ARGS)
+
+test-all: .venv/ready-to-test
 	@$(BIN)/python -m pytest -q -n auto --dist worksteal $(ARGS)
+
+# Of the packages that differ from the last commit of which all tests passed.
+test-changed: .venv/ready-to-test
+	@$(BIN)/python -m tests.changed $(ARGS)
 
 quick: .venv/ready-to-test
 	@$(BIN)/python -m tests.quick $(ARGS)

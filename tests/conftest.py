@@ -15,6 +15,7 @@ from tests.traps import guard
 if os.environ.get("PYHARNESS_TRAPS"):
     assert guard(extension()) > 0
 
+pytest_plugins = ["tests.tiers"]
 Printed = Callable[[str], str]
 # Tests that share the built site and the judgements of all claims, half a minute of work; and
 # tests that take long, at the end of which no process should wait for another.

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.changed import changed as changed_since
+from tests.changed import tests_of
 from tests.quick import ROOT, main, nearest, sources
 
 TESTS = {
@@ -47,9 +49,10 @@ def test_every_source_has_tests() -> None:
 
 def test_it_ends_when_the_time_is_up(tmp_path: Path) -> None:
     cases = [
-        (60.0, "pass", 0, "2 tests passed, of 2"),
-        (60.0, "assert False", 1, "1 tests passed, of 2"),
-        (2.0, "time.sleep(90)", 0, "1 tests passed, of 2"),
+        (60.0, "pass", 0, "2 tests passed of 2"),
+        (60.0, "assert False", 1, "1 tests passed of 2"),
+        (2.0, "time.sleep(90)", 0, "1 tests passed of 2"),
+        (-1.0, "pass", 0, "0 tests passed of 2"),
     ]
     (tmp_path / "test_z.py").write_text("def test_z(): pass\n")
     runs = []
@@ -66,9 +69,29 @@ def test_it_ends_when_the_time_is_up(tmp_path: Path) -> None:
     assert codes == str([code for _, _, code, _ in cases]), done.stdout + done.stderr
     said = [line for line in done.stdout.splitlines() if line.startswith("quick: ")]
     for line, (_, _, _, wanted) in zip(said, cases, strict=True):
-        assert line.startswith(f"quick: {wanted};")
+        assert line.startswith(f"quick: {wanted} files;")
 
 
 def test_a_commit_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["no-such-commit"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("paths", "wanted"),
+    [
+        ([], []),
+        (["docs/index.md", "tests/messages.txt"], []),
+        (["pyharness/history/account.py", "web/story/story.js"],
+         ["tests/browser", "tests/edition", "tests/history"]),
+        (["tests/bench/test_terms.py", "tests/browser/screen.py"],
+         ["tests/bench/test_terms.py", "tests/browser"]),
+        (["tests/history/test_gone.py"], []),
+        (["pyharness/model/scene.py"], ["tests"]),
+        (["fortran/modern/problem.f90"], ["tests"]),
+        (None, ["tests"]),
+    ],
+)  # fmt: skip
+def test_campaigns_of_what_differs(paths: list[str] | None, wanted: list[str]) -> None:
+    assert tests_of(paths) == wanted
+    assert changed_since("no-such-commit") is None

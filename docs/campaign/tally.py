@@ -1,7 +1,7 @@
 """The counts of a campaign against proved solutions: their file, and their table.
 
-The campaign is ``python -m tests.campaigns.proved``. A tally is of constant size: quotients of error and
-estimate are counted in a histogram of 100 bins for each power of 10.
+The campaign is ``python -m tests.campaigns.proved``. A tally is of constant size: quotients of
+error and estimate are counted in a histogram of 100 bins for each power of 10.
 """
 
 import json
@@ -159,9 +159,14 @@ class Tally:
         """Return the cells of the table, beginning with the names of the results."""
         return [[name, *row.cells()] for name, row in sorted(self.rows.items())]
 
-    def markdown(self) -> str:
-        """Return the counts and quantiles as a table in Markdown."""
-        return table(_HEAD, self.lines())
+    def markdown(self, above: float = 0.0) -> str:
+        """Return the counts and quantiles as a table in Markdown.
+
+        Rows have a broken promise, or their largest error over its limit is at least `above`.
+        """
+        rows = {name: row for name, row in sorted(self.rows.items())
+                if row.broken or row.largest >= above}  # fmt: skip
+        return table(_HEAD, [[name, *row.cells()] for name, row in rows.items()])
 
     def text(self) -> str:
         """Return the counts and quantiles as text."""
@@ -201,7 +206,8 @@ def command(count: int, seed: str, first: int, groups: Iterable[str], whole: boo
     """Return the command of a run of the campaign, which is `whole` if it leaves no result out."""
     name = seed if seed.replace("-", "").isalnum() else repr(seed)
     chosen = ",".join(groups)
-    return f"python -m tests.campaigns.proved {count} {name} {first} --groups {chosen}{' --all' * whole}"
+    run = f"python -m tests.campaigns.proved {count} {name} {first}"
+    return f"{run} --groups {chosen}{' --all' * whole}"
 
 
 def read(path: Path) -> Tally:

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 from docs.article.build import rendered, wrapped
@@ -21,7 +20,6 @@ from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.programs import run_program
-from pyharness.truth import certificate_checker
 from pyharness.truth.enclosed import Balls, rounded_up
 
 PAGE = "explanation/proofs.md"
@@ -69,8 +67,7 @@ def proofs_page() -> str:
             "check_limits": limits_table(),
         },
     )
-    source = Path(certificate_checker.__file__).read_text(encoding="utf-8")
-    return f"{wrapped(text)}\n```python\n{source}```\n"
+    return wrapped(text)
 
 
 @cache

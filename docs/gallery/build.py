@@ -26,11 +26,9 @@ GROUPS = {
         "detumbling",
         "antenna-contact",
         "gyro-fit",
-        "boom-deployment",
-        "flat-spin",
     ),
     "Many bodies": ("spreading-cloud", "tumbling-sweep"),
-    "The programs of the thesis": ("figure-7", "word-of-48-bits", "fortran-python"),
+    "The programs of the thesis": ("figure-7", "fortran-python"),
 }
 """The names of the examples, by the headings of the index."""
 
@@ -38,14 +36,10 @@ NOTEBOOKS = HERE.parents[1] / "build" / "notebooks"
 """The folder of the notebooks."""
 
 _HEAD = """
-Each page of this gallery has one question, a short program that uses only the public functions of
-pyharness, a picture, and the answer in numbers. The programs run as they are, in the folder of the
-checkout. They draw with matplotlib: a notebook shows the figure, and in a script
-`figure.savefig("picture.png")` writes it to a file.
-
-In a checkout, `python -m docs.gallery.build` executes all examples, and writes the outputs and
-pictures of the pages. It also writes a notebook for each page, and for each tutorial with Python,
-to the folder `build/notebooks`. The web pages of the edition have the notebooks too.
+For users who look for an example: each page has one question, a short program that uses public
+functions only, a picture, and the answer in numbers. The programs run as they are; in a script,
+`figure.savefig("picture.png")` writes the figure. `python -m docs.gallery.build` writes outputs,
+pictures, and notebooks to `build/notebooks`; the web pages have the notebooks too.
 """
 
 

@@ -1,12 +1,14 @@
 """Checks: their names, their results, and the selection of the checks that are computed."""
 
 import math
+import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
 from typing import Any
 
 from pyharness.model.basis import Basis
-from pyharness.model.errors import InputError
+from pyharness.model.errors import InputError, NotBuiltError, printable
 from pyharness.model.scene import Scene
 from pyharness.truth.bounded import ErrorBound
 
@@ -201,20 +203,29 @@ class Attempt:
 Attempts = Iterable[Check | Attempt]
 
 
-def made(attempts: Attempts, only: Sequence[str]) -> Iterator[Check]:
+def made(
+    attempts: Attempts, only: Sequence[str], raised: tuple[type[Exception], ...] = (NotBuiltError,)
+) -> Iterator[Check]:
     """Yield the requested checks of `attempts`, which has finished and deferred checks.
 
     `only` has the beginnings of the requested ids, as in ``cells/two-term``. A deferred check
-    (`Attempt`) is computed only if it is requested. A finished check in `attempts` is always
-    yielded.
+    (`Attempt`) is computed only if it is requested; an exception, except those in `raised`, becomes
+    a failed check. A finished check in `attempts` is always yielded.
     """
     for each in attempts:
         if isinstance(each, Check):
             yield each
         elif may_hold(each.name.id, only):
-            found = each.make(each.name)
-            parts = [found] if isinstance(found, Check) else found
-            yield from (check for check in made(parts, only) if selected(check.id, only))
+            try:
+                found = each.make(each.name)
+                parts = [found] if isinstance(found, Check) else found
+                yield from (
+                    check for check in made(parts, only, raised) if selected(check.id, only)
+                )
+            except raised:
+                raise
+            except Exception as error:
+                yield _ended(each.name, error)
 
 
 def run_suites(
@@ -227,21 +238,30 @@ def run_suites(
 
     `suites` maps the name of each suite to a function that returns its finished or deferred checks.
     `only` has the beginnings of the requested ids. `command` is the command of pyharness that
-    makes the checks, such as ``verify``. An InputError that ends a suite becomes a failed check. In
-    the suites `of_the_user` the InputError is raised again, because it is caused by a mistake in
-    the user's input.
+    makes the checks, such as ``verify``. An exception becomes a failed check, and the rest is
+    computed. NotBuiltError is raised again, and in the suites `of_the_user` also InputError, which
+    a mistake in the user's input causes.
     """
     for suite, attempts in suites.items():
         if not may_hold(suite, only):
             continue
+        raised = (NotBuiltError, InputError) if suite in of_the_user else (NotBuiltError,)
         try:
-            yield from made(attempts(), only)
-        except InputError as refusal:
-            if suite in of_the_user:
-                raise
-            again = Name(suite, command=command).replay
-            name = Name(suite, "refused", command=command)
-            yield replace(name.judged(False, f"ended here: {refusal}"), again=again)
+            yield from made(attempts(), only, raised)
+        except raised:
+            raise
+        except Exception as error:
+            yield _ended(Name(suite, command=command), error)
+
+
+def _ended(name: Name, error: Exception) -> Check:
+    """Return the failed check of a computation that an exception ended."""
+    said = f"ended here: {error}"
+    if not isinstance(error, InputError):
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(place.filename).name}, line {place.lineno}"
+        said = printable(f"ended here: {type(error).__name__}: {error} ({where})")
+    return replace(name.of("exception").judged(False, said), again=name.replay)
 
 
 def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:

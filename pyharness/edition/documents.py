@@ -10,8 +10,11 @@ from pyharness.edition.notebooks import has_examples, notebook
 from pyharness.model.errors import InputError
 from pyharness.model.facts import shipped
 
-# Suffixes of the pictures in the documents.
+# Suffixes of the pictures in the documents, and of all files that the site has beside them.
 _PICTURES = (".png", ".svg")
+_BESIDE = (*_PICTURES, ".csv", ".schema.json")
+# The folder of documents that are not on the site.
+_OFF_SITE = "contributing/"
 # Folders of documents that are notebooks too, if they have Python examples.
 _NOTEBOOKS = ("gallery", "tutorials")
 # Documents to which other pages of the site link.
@@ -47,10 +50,12 @@ def documents_folder(given: str | None = None) -> Path:
 def documents(folder: Path) -> Iterator[tuple[str, Document]]:
     """Yield the path in the web site and the rendered text of each document in a folder.
 
-    The documents are the Markdown files of the folder.
+    The documents are the Markdown files of the folder, except those for contributors.
     """
     for file in sorted(folder.rglob("*.md")):
         name = file.relative_to(folder).as_posix()
+        if not _is_on_site(name):
+            continue
         text = file.read_text(encoding="utf-8")
         yield page_of(name), document(text, partial(_link, folder, name))
 
@@ -61,14 +66,14 @@ def page_of(name: str) -> str:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Return the content of the pictures of the documents, by their path in the web site.
+    """Return the content of the pictures and tables of the documents, by their path in the site.
 
     `folder` is the folder of the documents.
     """
     return {
         f"docs/{file.relative_to(folder).as_posix()}": file.read_bytes()
         for file in sorted(folder.rglob("*"))
-        if file.suffix in _PICTURES
+        if file.name.endswith(_BESIDE) and _is_on_site(file.relative_to(folder).as_posix())
     }
 
 
@@ -109,9 +114,13 @@ def _link(folder: Path, name: str, target: str) -> str | None:
 
 
 def _exists(folder: Path, name: str) -> bool:
-    file = Path(name)
     return (
-        file.suffix in (".md", *_PICTURES)
+        name.endswith((".md", *_BESIDE))
         and not name.startswith("..")
-        and (folder / file).exists()
+        and _is_on_site(name)
+        and (folder / name).exists()
     )
+
+
+def _is_on_site(name: str) -> bool:
+    return not name.startswith(_OFF_SITE)

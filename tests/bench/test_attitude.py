@@ -113,7 +113,7 @@ def test_orekit_turns_as_the_closed_form(
 def test_orekit_takes_no_torque_and_needs_java(monkeypatch: pytest.MonkeyPatch) -> None:
     by_coefficients = replace(FREE, moments=None, coefficients=(0.5, -0.7, 0.2))
     for scene in (SCENE, by_coefficients):
-        with pytest.raises(InputError, match=r"^TorqueFree .*; allowed: moments, and no torque$"):
+        with pytest.raises(InputError, match="TorqueFree"):
             OREKIT.prepare(scene)
 
     def no_java(_: str) -> None:
@@ -121,7 +121,7 @@ def test_orekit_takes_no_torque_and_needs_java(monkeypatch: pytest.MonkeyPatch) 
 
     monkeypatch.setitem(sys.modules, "jpype", SimpleNamespace(isJVMStarted=lambda: False))
     monkeypatch.setitem(sys.modules, "orekit_jpype", SimpleNamespace(initVM=no_java))
-    with pytest.raises(InputError, match=r"^Java or Orekit fails: no libjvm$"):
+    with pytest.raises(InputError, match="no libjvm"):
         OREKIT.prepare(FREE)
 
 

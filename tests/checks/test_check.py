@@ -5,9 +5,10 @@ from collections.abc import Iterator
 import pytest
 
 from docs.certificates.limits import counts_table, limits
-from pyharness.checks.check import BITS, Attempt, Check, Name, made
+from pyharness.checks.check import BITS, Attempt, Attempts, Check, Name, made, run_suites
 from pyharness.checks.report import basis_note, marks
 from pyharness.model.basis import MARKS, Basis
+from pyharness.model.errors import InputError, NotBuiltError
 
 _MEASURED = Basis("measured", "a value", "a run")
 
@@ -88,3 +89,31 @@ def test_the_document_counts_every_basis_in_the_source() -> None:
     for mark in MARKS:
         count = sum(each.mark == mark for each in found)
         assert f"| {mark} | {MARKS[mark]} | {count} |" in counts_table()
+
+
+def test_an_exception_is_a_failed_check_and_the_rest_is_computed() -> None:
+    def suite(error: Exception) -> Attempts:
+        def broken(name: Name) -> Iterator[Check]:
+            yield name.of("error").bounded(1.0, 2.0, BITS)
+            raise error
+
+        yield Attempt(Name("some", "rk4"), broken)
+        yield Attempt(Name("some", "rk45"), lambda name: name.judged(True, ""))
+        raise error
+
+    def run(error: Exception, of_the_user: tuple[str, ...] = ()) -> dict[str, Check]:
+        suites = {"some": lambda: suite(error), "more": lambda: [Name("more").judged(True, "")]}
+        return {check.id: check for check in run_suites(suites, (), "verify", of_the_user)}
+
+    found = run(KeyError("x\ny"))
+    assert {id: check.passed for id, check in found.items()} == {
+        "some/rk4/error": True, "some/rk4/exception": False, "some/rk45": True,
+        "some/exception": False, "more": True,
+    }  # fmt: skip
+    failed = found["some/rk4/exception"]
+    assert failed.note.startswith("ended here: KeyError: 'x\\ny' (test_check.py, line ")
+    assert failed.replay == "python -m pyharness verify --only some/rk4"
+    assert run(InputError("too long"))["some/exception"].note == "ended here: too long"
+    for error, of_the_user in ((InputError("x"), ("some",)), (NotBuiltError(), ())):
+        with pytest.raises(type(error)):
+            run(error, of_the_user)

@@ -1,4 +1,4 @@
-"""Published figures: files are read strictly, all methods agree with them, and faults are found."""
+"""Published figures: all methods agree with them, and faults are found."""
 
 import re
 from collections.abc import Sequence
@@ -94,55 +94,9 @@ def test_a_file_of_the_users_is_read(tmp_path: Path) -> None:
     assert checks[0].replay == f"python -m pyharness verify --external {problem.path} {only}"
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('source = "a book"', "source = 3", "source is missing"),
-        ('where = "page 1"', 'where = " "', "where is missing"),
-        ("conditions", "condition", "unknown key 'condition'; did you mean 'conditions'"),
-        ("[body]\ncoefficients = [1.0, -1.0, -0.51]\n", "", r"\[body\] is missing"),
-        ("[initial]\nomega = [0.0, 1.0, 1.0]\n", "", r"\[initial\] is missing"),
-        ("coefficients", "moments", "allowed: a finite number above 0"),
-        ("[body]", "[run]\nsteps = 3\n[body]", "unknown key 'run'"),
-        ("[body]", 'unit = "rpm"\n[body]', "unknown unit 'rpm'"),
-        ('[[value]]\ntime = "20"', "[[values]]", "unknown key 'values'"),
-        ('time = "20"', "", "time: ''"),
-        ('time = "20"', "time = 20", "time: a whole number; allowed: the digits as text"),
-        ('time = "20"', 'time = "0.0"', "time is 0"),
-        ('time = "20"', 'time = "20"\nerror = 1.0', "unknown key 'error'"),
-        ('time = "20"', 'time = "20"\ngood_to = "x"', "good_to: text where a number belongs"),
-        ('time = "20"', 'time = "20"\ngood_to = -1.0', "good_to is -1"),
-        ('time = "20"', 'time = "20"\ngood_to = inf', "good_to is inf"),
-        (', "7.4141e-01"]', "]", "list of three texts"),
-        ('["-0.93966", "", "7.4141e-01"]', '"-0.93966"', "list of three texts"),
-        ('["-0.93966", "", "7.4141e-01"]', '["", "", ""]', "no component of omega is given"),
-        ('"-0.93966"', "-0.93966", "omega: a number; allowed: the digits as text"),
-        ('"-0.93966"', '"minus one"', "'minus one'; allowed: a printed number"),
-        ('"-0.93966"', '"nan"', "allowed: a printed number"),
-        ('"-0.93966"', '"9e999"', "too large for binary64"),
-        ('"-0.93966"', f'"{"9" * 1000}"', "allowed: a printed number"),
-        ('"20"\n', '"20"\nomega = ["1", "1", "1"]\n[[value]]\ntime = "20.0"\n', "given twice"),
-        ("[body]", "[body", "not TOML"),
-    ],
-)
-def test_a_mistake_in_a_file_is_told_in_one_line(
-    tmp_path: Path, old: str, new: str, message: str
-) -> None:
-    assert old in _GOOD
-    with pytest.raises(InputError, match=message) as caught:
-        _read(tmp_path, _GOOD.replace(old, new))
-    assert str(caught.value).startswith("external file '")
-    assert "\n" not in str(caught.value)
-
-
-def test_files_that_are_none(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="No such file"):
-        read_problem(tmp_path / "none.toml")
-    (tmp_path / "huge.toml").write_text("#" * 1_000_001)
-    with pytest.raises(InputError, match="larger than"):
-        read_problem(tmp_path / "huge.toml")
-    with pytest.raises(InputError, match="the name of its checks"):
-        _read(tmp_path, _GOOD, "two words.toml")
+def test_a_file_that_is_not_toml_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="TOML"):
+        _read(tmp_path, _GOOD.replace("[body]", "[body"))
 
 
 def test_problems_of_the_package_agree_with_every_method() -> None:
@@ -380,25 +334,3 @@ def test_attitudes_may_be_angles_and_stand_beside_omega(tmp_path: Path) -> None:
         assert {check.passed for check in turned} == {passes}
         assert all(check.passed for check in checks if check not in turned)
         assert len(checks) > 20
-
-
-@pytest.mark.parametrize(
-    ("entry", "told"),
-    [
-        ("attitude = ['1', '0', '0']", "attitude must be a list of 4 texts"),
-        ("attitude = [1, 0, 0, 0]", "allowed: the digits as text"),
-        ("attitude = ['0', '0', '0', '0']", "all four numbers are 0"),
-        ("angles_deg = ['1', '2']", "angles_deg must be a list of 3 texts"),
-        ("attitude = ['1', '0', '0', '0']\nangles_deg = ['1', '2', '3']", "either attitude or"),
-    ],
-)
-def test_attitudes_are_read_strictly(entry: str, told: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=re.escape(told)):
-        _with_attitudes(tmp_path, [("1", entry)])
-
-
-def test_angles_need_a_sequence_that_is_known(tmp_path: Path) -> None:
-    text = _GOOD + "angles_deg = ['1', '2', '3']\n"
-    for sequence in ("", "sequence = '3-3-1'\n"):
-        with pytest.raises(InputError, match="sequence"):
-            _read(tmp_path, text.replace("[body]", f"{sequence}[body]"))

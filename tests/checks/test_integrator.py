@@ -316,9 +316,7 @@ def test_an_integrator_that_refuses_everything_does_not_pass(
 @pytest.mark.parametrize("more", [[], ["--self-test"]])
 def test_a_port_is_sent_to_its_option(more: list[str], capsys: Capture) -> None:
     assert main(["verify", "--integrator", documented_command(), "--draws", "1", *more]) == 2
-    told = capsys.readouterr().err
-    assert told.endswith(": answers requests of --port; give it to --port\n")
-    assert told.count("\n") == 1
+    assert "--port" in capsys.readouterr().err
 
 
 def test_numbers_that_are_not_finite_are_an_error(tmp_path: Path, capsys: Capture) -> None:

@@ -97,23 +97,6 @@ def test_draws_come_after_the_cells_of_the_same_programs() -> None:
     assert random_cells("s", 5, ["two-term"]) == []
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--draws", "x"], "--draws: 'x' where a whole number belongs"),
-        (["--draws", "-1"], "--draws: -1"),
-        (["--only", "cells"], "--only has no meaning with --port"),
-        (["--cell", "random/x"], "--cell random/x: there is no such cell"),
-    ],
-)
-def test_mistakes_are_a_line(words: list[str], message: str, capsys: Capture) -> None:
-    assert main(["verify", "--port", "cat", *words]) == 2
-    captured = capsys.readouterr()
-    assert message in captured.err
-    assert captured.err.count("\n") == 1
-    assert captured.out == ""
-
-
 def test_every_planted_fault_is_noticed(tmp_path: Path) -> None:
     """All faults have an effect in the cells, and their names are different."""
     assert len(PLANTS) >= 40
@@ -225,24 +208,3 @@ def test_a_port_writes_no_markup_into_a_page(tmp_path: Path, capsys: Capture) ->
     (line,) = [x for x in capsys.readouterr().out.splitlines() if x.startswith("- FAILED")]
     assert line.rstrip().endswith("'</code> [a](b) <img>)`")
     assert line.count("`") == 2
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--also", "a.txt"], "--also 'a.txt': the name has no known ending; allowed: .md, .xml"),
-        (["--also", "a.md,a.md"], "--also 'a.md': the file is given twice"),
-        (["--also", "a.md", "--out", "a.md"], "--also 'a.md': the file is given twice"),
-        (["--also", "no-folder/a.md"], "--also 'no-folder/a.md': "),
-        (["--also", ""], "--also '': the name has no known ending"),
-        (["--also", "a.md", "--update"], "--also has no meaning with --update"),
-    ],
-)
-def test_wrong_files_are_refused_before_any_check(
-    words: list[str], message: str, capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    port = [] if "--update" in words else ["--port", "cat"]
-    assert main(["verify", *port, *words]) == 2
-    assert message in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []

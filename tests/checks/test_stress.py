@@ -193,26 +193,6 @@ def test_only_what_failed_is_saved_unless_a_folder_is_given(
     assert "the inputs of what failed are not saved: " in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["--only", "separatrx"], "did you mean 'separatrix'"),
-        (["--only", "separatrix/nothing"], "unknown check"),
-        (["--format", "csv"], "unknown format"),
-        (["--only", "separatrix,shapes", "--plot", "a.svg"], "--plot draws one trial"),
-        (["--only", "separatrix", "--plot", "a.gif"], "unknown picture format"),
-        (["--only", "separatrix", "--save", "/dev/null"], "is not a folder"),
-    ],
-)
-def test_wrong_usage_is_one_line(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], told: str
-) -> None:
-    assert main(["stress", *arguments]) == 2
-    error = capsys.readouterr().err
-    assert told in error
-    assert error.count("\n") == 1
-
-
 @pytest.fixture
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Return the list to which every saved figure will be appended."""

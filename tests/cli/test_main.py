@@ -1,4 +1,4 @@
-"""The command line: contracts, exit codes, and every mistake answered in one line."""
+"""The command line: contracts and exit codes."""
 
 import csv
 import ctypes

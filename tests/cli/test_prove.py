@@ -1,4 +1,4 @@
-"""The verb prove: its tables, its JSON and CSV, certificates, and what it refuses."""
+"""The verb prove: its tables, its JSON and CSV, and certificates."""
 
 import csv
 import io
@@ -36,14 +36,6 @@ def valid(text: str) -> dict[str, Any]:
     record: dict[str, Any] = json.loads(text)
     Draft202012Validator(schema_of("prove")).validate(record)
     return record
-
-
-def message(capsys: pytest.CaptureFixture[str], command: str, status: int) -> str:
-    """Run a command that fails with an exit status, and return its message of one line."""
-    assert main(command.split()) == status
-    text = capsys.readouterr().err
-    assert "Traceback" not in text
-    return text
 
 
 def test_table_has_the_proved_values(printed: Printed) -> None:
@@ -128,43 +120,3 @@ def test_falsified_certificate_has_exit_status_1(capsys: pytest.CaptureFixture[s
     shown = capsys.readouterr().out
     assert "not proved" in shown
     assert "step 2" in shown
-
-
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        ("prove --case 3 --digits 0", "--digits: 0; allowed: 1 to 1000"),
-        ("prove --case 3 --digits 1001", "--digits: 1001; allowed: 1 to 1000"),
-        ("prove --case 3 --digits x", "--digits"),
-        ("prove --case 3 --times 1,0.5", "lead away"),
-        ("prove --case 3 --times 1,0.5 --certificate new.json", "lead away"),
-        ("prove --case 3 --times=-1,1 --certificate new.json", "lead away"),
-        ("prove --case 3 --certificate new.json --velocity", "--velocity"),
-        ("prove --case 3 --certificate new.json --transition", "--transition"),
-        ("prove --scene damped.toml --certificate new.json", "prove without --certificate"),
-        ("prove --case 3 --certificate none/new.json", "--certificate"),
-        ("prove --case 3 --check good.json", "--check"),
-        ("prove --check good.json --times 1", "--check"),
-        ("prove --check good.json --digits 5", "--check"),
-        ("prove --check good.json --certificate new.json", "--check"),
-        ("prove --check good.json --effort 2", "--check"),
-        ("prove --case 7 --times 9 --effort 1e-3", "--effort"),
-    ],
-)
-def test_what_is_refused(capsys: pytest.CaptureFixture[str], command: str, words: str) -> None:
-    assert words in message(capsys, command, 2).replace("\n", " ")
-    assert not Path("new.json").exists()
-
-
-def test_a_folder_is_no_file_for_a_certificate(capsys: pytest.CaptureFixture[str]) -> None:
-    Path("folder").mkdir()
-    text = message(capsys, "prove --case 3 --times 0.1 --certificate folder", 2)
-    assert "--certificate" in text
-    assert not list(Path("folder").iterdir())
-
-
-def test_a_file_is_not_changed_if_the_proof_fails(capsys: pytest.CaptureFixture[str]) -> None:
-    Path("old.json").write_text("old")
-    message(capsys, "prove --case 7 --times 9 --effort 1e-3 --certificate old.json", 2)
-    assert Path("old.json").read_text() == "old"
-    assert {each.name for each in Path().iterdir()} == {"old.json", "damped.toml"}

@@ -50,53 +50,18 @@ def test_a_new_scene_file_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert read_scene(path).omega == case_scene(3).omega
 
 
-def test_check_describes_a_scene_or_says_what_is_wrong(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_check_describes_a_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = printed(capsys, "check", str(ROOT / "docs" / "satellite.toml"))
     assert "gravity gradient + wheels + damping" in found
     assert max(map(len, found.splitlines())) <= 100
     record = json.loads(printed(capsys, "check", str(FILES[0]), "--format", "json"))
     assert record["scene"]["name"] == read_scene(FILES[0]).name
-    path = tmp_path / "wrong.toml"
-    path.write_text("[body]\nmoment = [1, 2, 3]\n[initial]\nomega = [1, 2, 3]\n")
-    assert main(["scene", "check", str(path)]) == 2
-    assert "did you mean 'moments'?" in capsys.readouterr().err
+    path = tmp_path / "long.toml"
     path.write_text(
         "[body]\nmoments = [1, 2, 3]\n[initial]\nomega = [1, 2, 3]\nattitude = [2, 0, 0, 0]\n"
     )
     assert main(["scene", "check", str(path)]) == 0
     assert "the attitude has the norm 2" in capsys.readouterr().err
-
-
-def test_new_does_not_replace_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "mine.toml"
-    assert main(["scene", "new", "--out", str(path)]) == 0
-    path.write_text("mine")
-    assert main(["scene", "new", "--out", str(path)]) == 2
-    assert "exists; give another name" in capsys.readouterr().err
-    assert path.read_text() == "mine"
-
-
-@pytest.mark.parametrize(
-    ("command", "message"),
-    {
-        "scene": "give an action; allowed: new, check, schema",
-        "scene nwe": "unknown action 'nwe'; did you mean 'new'?",
-        "scene check": "give a scene file",
-        "scene new file.toml": "scene new takes no file",
-        "scene schema --case 3": "--case has no meaning with scene schema",
-        "scene schema --format json": "--format has no meaning with scene schema",
-        "scene new --case 9": "unknown case '9'",
-    }.items(),
-)
-def test_mistakes_are_one_line(
-    command: str, message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(command.split()) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert message in error
 
 
 def test_the_schema_is_printed_and_is_one(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""Every verb with a scene whose torque depends on the state: it works, or refuses in one line."""
+"""Every verb with a scene whose torque depends on the state: it works, or is refused."""
 
 import json
 import re
@@ -17,24 +17,17 @@ from pyharness import (
     Scene,
     StateTorque,
     case_scene,
-    compare_programs,
-    opaque,
     prepare,
     principal,
     read_scene,
-    run_many,
-    run_program,
     solve,
     solve_many,
-    subset,
 )
-from pyharness.checks.external_file import read_problem
 from pyharness.cli.main import VERBS, main
 from pyharness.cli.parser import Parser
 from pyharness.methods.registry import METHODS
 from pyharness.model.expressions import parsed
-from pyharness.model.scene import STATE_TORQUE
-from pyharness.theory.rotations import steady_rotations
+from tests.refusals.test_refusals import COMMANDS
 
 DAMPED = """\
 name = "damped"
@@ -56,17 +49,6 @@ momentum = [0.0, 1.0, 0.0]
 motor = { rate = [0.0, 0.0, 0.5] }
 [run]
 """
-# The verbs that take no torque that depends on the state, each with some of its options.
-REFUSED = (
-    "compare", "compare --ablate", "compare --word cdc48",
-    "compare --program two-term --format json", "limits", "family",
-    "family --terms 1 --weighting galerkin", "rotations", "rotations --format json",
-    "run --program two-term", "run --program four-term --implementation python",
-    "run --program runge-kutta --word cdc48", "run --program two-term --attitude quaternion",
-    "run --program two-term --format printer", "run --program two-term --format tape5",
-)  # fmt: skip
-ONES = np.ones((4, 3))
-CORRECTED = subset("two-term")
 
 
 @pytest.fixture
@@ -76,52 +58,14 @@ def damped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Scene:
     return read_scene("damped.toml")
 
 
-@pytest.mark.usefixtures("damped")
-@pytest.mark.parametrize("command", REFUSED)
-def test_verb_refuses_a_torque_that_depends_on_the_state(
-    command: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    verb, _, options = command.partition(" ")
-    assert main(shlex.split(f"{verb} --scene damped.toml {options}")) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err == f"pyharness: {STATE_TORQUE}\n"
-    assert [path.name for path in Path().iterdir()] == ["damped.toml"]
-
-
-EXTERNAL = """\
-title = "damped"
-source = "us"
-where = "here"
-conditions = "none"
-[body]
-moments = [3.0, 2.0, 1.0]
-[initial]
-omega = [1.0, 2.0, 3.0]
-[torque]
-expression = ["-w1", "0", "0"]
-[[value]]
-time = "1"
-omega = ["0.5", "", ""]
-"""
-
-
-def test_problem_with_published_numbers_refuses_a_torque_that_depends_on_the_state(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "damped.toml"
-    path.write_text(EXTERNAL)
-    assert main(["verify", "--external", str(path)]) == 2
-    message = f"pyharness: external file '{path}': {STATE_TORQUE}\n"
-    assert capsys.readouterr().err == message
-    path.write_text(EXTERNAL.replace("-w1", "1"))
-    assert read_problem(path).scene.body_torque.constant == (1.0, 0.0, 0.0)
-
-
-def test_every_verb_with_a_scene_is_tried() -> None:
-    """The verbs `plan`, `prove` and `stress`, and `run` with a method, take such a torque."""
+@pytest.mark.parametrize(
+    ("scene", "takers"),
+    [("damped.toml", {"plan", "prove", "stress"}), ("booms.toml", {"plan", "prove"})],
+)
+def test_every_verb_with_a_scene_is_tried(scene: str, takers: set[str]) -> None:
+    """The rows of refusals have all verbs but those that take such a scene."""
     with_scene = {verb for verb in VERBS if "--scene FILE" in Parser(verb).module.OPTIONS}
-    assert with_scene == {command.split()[0] for command in REFUSED} | {"plan", "prove", "stress"}
+    assert with_scene - takers <= {each.split()[0] for each in COMMANDS if scene in each}
 
 
 @pytest.mark.usefixtures("damped")
@@ -160,39 +104,6 @@ def test_law_in_expressions_gives_the_output_of_the_law(capsys: pytest.CaptureFi
 
 def _without_times(text: str) -> list[str]:
     return [line for line in text.splitlines() if '"seconds' not in line]
-
-
-CALLS: dict[str, Callable[[Scene], Any]] = {
-    "run_program": lambda scene: run_program(scene, CORRECTED),
-    "run_program, twin": lambda scene: run_program(scene, CORRECTED, implementation="python"),
-    "run_program, word": lambda scene: run_program(
-        scene, CORRECTED, implementation="python", word="cdc48"
-    ),
-    "run_many": lambda scene: run_many(scene, CORRECTED, omega0=ONES),
-    "run_many, torques": lambda scene: run_many(scene, CORRECTED, torque_constant=ONES),
-    "compare_programs": compare_programs,
-    "steady_rotations": lambda scene: steady_rotations(scene, 1e-3),
-    "right_hand_side": lambda scene: scene.right_hand_side(),
-}
-SCENES = {
-    "omega": ["-0.1*w1", "0", "0"],
-    "attitude": ["q0*q1", "0", "0"],
-    "time": ["sin(t)**2", "0", "0"],
-}
-
-
-@pytest.mark.parametrize("call", CALLS)
-@pytest.mark.parametrize("kind", [*SCENES, "opaque", "inertia"])
-def test_function_refuses_a_torque_that_depends_on_the_state(call: str, kind: str) -> None:
-    body: dict[str, Any] = {"moments": (1, 2, 3), "attitude": (1, 0, 0, 0)}
-    torque = opaque(lambda t, omega: omega) if kind == "opaque" else parsed(
-        SCENES.get(kind, SCENES["omega"]), {}
-    )  # fmt: skip
-    if kind == "inertia":
-        body = {"inertia": [[3, 0.1, 0], [0.1, 4, 0.2], [0, 0.2, 5]]}
-    scene = Scene(kind, (1, 2, 3), torque=torque, **body)
-    with pytest.raises(InputError, match=r"needs a TorqueLaw|takes principal axes"):
-        CALLS[call](scene)
 
 
 def _solved(method: str, scene: Scene) -> Any:
@@ -269,8 +180,6 @@ def test_run_with_ready_terms_shows_them(options: str, capsys: pytest.CaptureFix
     assert "wheels" not in rows[0]
     ends = [solve(read_scene(f"{name}.toml"), 0.05).omega[-1] for name in ("damped", "terms")]
     assert np.abs(ends[0] - ends[1]).max() > 1e-6
-    assert main(shlex.split("compare --scene terms.toml")) == 2
-    assert capsys.readouterr().err == f"pyharness: {STATE_TORQUE}\n"
 
 
 def test_principal_scene_has_the_torque_in_principal_axes() -> None:
@@ -289,7 +198,7 @@ def test_principal_scene_has_the_torque_in_principal_axes() -> None:
 
 
 @pytest.mark.usefixtures("damped")
-def test_sweep_solves_by_a_method_and_refuses_a_program(
+def test_sweep_solves_by_a_method(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     axis = '[[axis]]\nfield = "omega.1"\nvalues = [0.1, 2.0]\n'
@@ -302,7 +211,3 @@ def test_sweep_solves_by_a_method_and_refuses_a_program(
     lower, upper = np.sort([each.omega[0] for each in ends], axis=0)
     assert [each["least"] for each in shown] == pytest.approx(lower.tolist(), abs=1e-11)
     assert [each["largest"] for each in shown] == pytest.approx(upper.tolist(), abs=1e-11)
-    Path("sweep.toml").write_text(sweep.replace("t_end = 1.0", 'program = "two-term"'))
-    assert main(["sweep", "sweep.toml", "--out", "other"]) == 2
-    assert STATE_TORQUE in capsys.readouterr().err
-    assert not Path("other").exists()

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from pyharness import InputError, case_scene
+from pyharness import case_scene
 from pyharness.compare.candidates import (
     method_candidate,
     prepared_candidate,
     program_candidate,
-    unstopped,
 )
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.original.programs import IMPLEMENTATIONS
@@ -39,13 +38,6 @@ def test_a_twin_enters_no_compiled_program(monkeypatch: pytest.MonkeyPatch) -> N
 def test_end_of_a_method_is_that_of_its_rows() -> None:
     method = method_candidate("taylor", 1e-12)
     np.testing.assert_array_equal(method.end(SCENE, END).omega, method.rows(SCENE, [END]).omega[-1])
-
-
-def test_what_a_candidate_has_not_is_refused() -> None:
-    with pytest.raises(InputError, match=r"its last step ends at 1 s, not at 2 s"):
-        unstopped(Listing.original("two-term")).end(SCENE, 2.0)
-    with pytest.raises(InputError, match="the state at one time only"):
-        prepared_candidate("quick", 1e-3).rows(SCENE)
 
 
 def test_a_call_before_leaves_nothing_behind() -> None:

@@ -5,14 +5,13 @@ import io
 import json
 import math
 import shlex
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, case_scene, compare_methods, opaque, read_scene, torques
+from pyharness import Scene, case_scene, compare_methods, read_scene, torques
 from pyharness.cli.main import main
 from pyharness.compare.agreement import accuracy
 from pyharness.compare.comparison import Comparison
@@ -102,36 +101,6 @@ def test_error_without_a_row_to_compare_is_not_zero(with_attitude: bool) -> None
     assert max(accuracy(found.scene, run, empty).omega) == math.inf
 
 
-REFUSED: dict[str, tuple[Callable[[], object], str]] = {
-    "opaque": (
-        lambda: compare_methods(
-            replace(sphere(), torque=opaque(lambda t, omega: -omega)), ["dop853"]
-        ),
-        "opaque torque has no Taylor series",
-    ),
-    "method": (lambda: compare_methods(sphere(), ["closed-form"]), "closed-form can't solve"),
-    "unknown": (lambda: compare_methods(sphere(), ["tailor"]), "did you mean 'taylor'"),
-    "none": (lambda: compare_methods(sphere(), []), "the list is empty"),
-    "tolerance": (
-        lambda: compare_methods(sphere(), ["auto"], tolerance=1e-20), "tolerance is 1e-20",
-    ),
-    "inertia": (
-        lambda: compare_methods(
-            Scene("full", (1, 2, 3), inertia=[[3, 0.1, 0], [0.1, 4, 0], [0, 0, 5]], torque=DECAY)
-        ),
-        "full inertia matrix",
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_can_not_be_compared_is_refused_in_one_line(name: str) -> None:
-    call, words = REFUSED[name]
-    with pytest.raises(InputError, match=words) as caught:
-        call()
-    assert "\n" not in str(caught.value)
-
-
 def test_ready_terms_are_compared() -> None:
     moments = (4.0, 3.0, 2.0)
     torque = torques.gravity_gradient(moments, 0.7) + torques.damping(0.1)
@@ -149,8 +118,3 @@ def test_verb_compares_methods(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert main(shlex.split(f"{command} --format json --out {out}")) == 0
     methods = json.loads(out.read_text())["methods"]
     assert [each["method"] for each in methods] == ["auto", "dop853"]
-    capsys.readouterr()
-    assert main(shlex.split(f"{command} --program two-term")) == 2
-    assert capsys.readouterr().err == "pyharness: --program has no meaning with --method\n"
-    assert main(shlex.split(f"compare --scene {DAMPED}")) == 2
-    assert "verbs run and compare with --method" in capsys.readouterr().err

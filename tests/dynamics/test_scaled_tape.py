@@ -10,7 +10,6 @@ import pytest
 
 from pyharness import (
     ChangingMoments,
-    InputError,
     Scene,
     TorqueLaw,
     opaque,
@@ -25,7 +24,7 @@ from pyharness.model.codes import Statuses
 from pyharness.model.expressions import parsed
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import FLOATS, Tape, evaluate
-from pyharness.scenes.rescaled import rescaling_factor, scaled
+from pyharness.scenes.rescaled import rescaling_factor
 from pyharness.truth.reference import reference
 
 OMEGA = np.array([0.3, 1.0, 0.2])
@@ -197,5 +196,3 @@ def test_estimate_counts_the_torque_and_an_opaque_one_is_not_rescaled() -> None:
     assert rescaling_factor(pushed, 1.0) * 1e-100 < 1e5
     brake = replace(tiny, torque=opaque(lambda t, w: -1e-200 * w))
     assert rescaling_factor(brake, 1e200) == 1.0
-    with pytest.raises(InputError, match="needs a TorqueLaw"):
-        scaled(brake, 2.0)

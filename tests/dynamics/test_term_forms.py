@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, StateTorque, TorqueLaw, opaque, solve, torques
+from pyharness import Scene, StateTorque, TorqueLaw, solve, torques
 from pyharness.model.expressions import parsed
 from pyharness.model.records import scene_record
-from pyharness.model.scene_file import MOST_TERMS, scene_text
-from pyharness.model.state_torque import recorded
+from pyharness.model.scene_file import MOST_TERMS
 from tests.dynamics.test_term_file import LAW, MATRIX, SPACE, TERMS, is_documented, restored
 from tests.dynamics.test_terms import INERTIA
 
@@ -98,41 +97,6 @@ def scene_heading(scene: Scene) -> str:
     from pyharness.model.scene_report import heading
 
     return heading(scene)[1]
-
-
-def long_table(seed: int) -> StateTorque:
-    """Return a table of some 700 kB in a scene file."""
-    rows = np.random.default_rng(seed).normal(size=(9000, 3))
-    return torques.table(np.arange(9000) / 7, rows)
-
-
-def brake(t: float, omega: Any) -> Any:
-    return -0.1 * omega
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: torques.damping(1.0) + brake, "that is recorded from a function can't be written"),
-        (lambda: LAW + (torques.damping(1.0) + (torques.drag([1]) + recorded(brake))),
-         "that is recorded from a function can't be written"),
-        (lambda: recorded(brake), "that is recorded from a function can't be written"),
-        (lambda: opaque(brake), "that is an opaque function can't be written"),
-        (lambda: torques.damping(1.0) + LAW + SPACE, "a sum of several expressions or laws"),
-        (lambda: torques.damping(1.0) + WRITTEN + LAW, "a sum of several expressions or laws"),
-        (lambda: WRITTEN + WRITTEN, "a sum of several expressions or laws can't be written"),
-        (lambda: sum([torques.damping(1.0)] * (MOST_TERMS + 1)),
-         "[[torque.terms]]: 51 terms; allowed: at most 50"),
-        (lambda: sum(long_table(n) for n in range(2)), "bytes; allowed: at most 1000000"),
-    ],
-)  # fmt: skip
-def test_torque_that_no_file_can_describe_is_refused_in_one_line(
-    make: Callable[[], Any], words: str
-) -> None:
-    with pytest.raises(InputError) as raised:
-        scene_text(scene_with(make()))
-    assert words in str(raised.value)
-    assert "\n" not in str(raised.value)
 
 
 def test_law_that_cancels_is_not_written(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Each torque term equals an independent formula, about the axes of the body; refusals."""
+"""Each torque term equals an independent formula, about the axes of the body."""
 
 import doctest
 from collections.abc import Callable
@@ -9,7 +9,7 @@ import pytest
 from numpydoc.validate import validate
 from scipy.spatial.transform import Rotation
 
-from pyharness import InputError, Scene, StateTorque, TorqueLaw, principal, torques
+from pyharness import Scene, StateTorque, TorqueLaw, principal, torques
 from pyharness.dynamics import field_terms, table_terms, terms
 from pyharness.dynamics.system import slopes_of
 from pyharness.model.trajectory import Array
@@ -209,48 +209,6 @@ def test_the_components_are_about_the_axes_of_the_body_not_the_principal_ones() 
         turned = np.roll(Rotation.from_matrix(r @ axes).as_quat(), 1)
         found = axes @ slopes(t, [*(axes.T @ omega), *turned])[:3]
         assert found == pytest.approx(wanted, rel=1e-7, abs=1e-7)
-
-
-@pytest.mark.parametrize(
-    ("make", "arguments", "message"),
-    [
-        (damping, ("much",), "damping matrix: text; allowed: a number, three numbers"),
-        (damping, ([1, 2],), "damping matrix: 2 numbers or rows; allowed"),
-        (damping, (iter(int, 1),), "damping matrix: more than 3 numbers or rows"),
-        (damping, ([[1, 2, 3], [1, 2], [1, 2, 3]],), "damping matrix: 2 numbers"),
-        (damping, (float("nan"),), "damping matrix: nan is not finite"),
-        (damping, ([1, 2, float("inf")],), "damping matrix: inf is not finite"),
-        (drag, ([],), "drag coefficients: no coefficients; allowed: a list of 1 to 50"),
-        (drag, (1.0,), "drag coefficients: a number; allowed: a list of 1 to 50"),
-        (drag, (iter(int, 1),), "drag coefficients: more than 50 coefficients"),
-        (drag, ([1, [2]],), "drag coefficients, number 1: 1 numbers or rows"),
-        (rate_control, (1, [1, 2],), "rate control target: 2 numbers; allowed: three"),
-        (attitude_control, (None, 1,), "attitude control stiffness: nothing; allowed"),
-        (attitude_control, (1, [[]],), "attitude control gain: 1 numbers or rows"),
-        (attitude_control, (1, 1, [0, 0, 0, 0],), "attitude control target: all four"),
-        (wheels, (1.0,), "wheels momentum: a number; allowed: three numbers"),
-        (wheels, (V, 1.0,), "wheels motor: a number; allowed: three numbers, or a Torque"),
-        (wheels, (V, LAW_IN_SPACE,), "motor: a TorqueLaw with frame space; allowed"),
-        (gravity_gradient, (1.0, 1.0,), "inertia: a number; allowed: three moments"),
-        (gravity_gradient, ([1, 2, 0], 1.0,), "inertia: a moment is not above 0"),
-        (gravity_gradient, (D, 1.0,), "gravity gradient inertia: not symmetric"),
-        (gravity_gradient, (MOMENTS, V,), "gravity gradient rate: a list where a number"),
-        (magnetic_dipole, (V, LAW,), "dipole field: a TorqueLaw with frame body; allowed"),
-        (magnetic_dipole, ([1], V,), "magnetic dipole moment: 1 number; allowed"),
-        (magnetic_damping, ([1], V,), "magnetic damping gain: a list where a number"),
-        (magnetic_damping, (1, "up",), "magnetic damping field: text; allowed: three numb"),
-        (in_space, (LAW,), "in space: a TorqueLaw with frame body; allowed"),
-        (in_space, ((1e999, 0, 0),), "in space: inf is not finite"),
-        (gravity_gradient, (MOMENTS, 1e200,), "a constant overflows"),
-    ],
-)  # fmt: skip
-def test_arguments_that_are_refused(
-    make: Callable[..., Any], arguments: tuple[Any, ...], message: str
-) -> None:
-    with pytest.raises(InputError) as found:
-        make(*arguments)
-    assert message in str(found.value)
-    assert str(found.value).startswith("[torque]")
 
 
 # The documentation.

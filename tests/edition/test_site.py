@@ -336,6 +336,8 @@ def test_pictures_and_licences_are_beside_the_pages(built_site: dict[str, bytes]
         ),
         ("explanation/methods.md", "../figures/growth.svg", "../figures/growth.svg"),
         ("explanation/methods.md", "../../README.md", None),
+        ("explanation/methods.md", "../contributing/testing.md", None),
+        ("explanation/methods.md", "../atlas/stops.csv", "../atlas/stops.csv"),
         ("explanation/methods.md", "missing.md", None),
         ("explanation/methods.md", "../space-torque.toml", None),
         ("explanation/methods.md", "#which-one", "#which-one"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pyharness import InputError, case_scene, run_program, solve
+from pyharness import case_scene, run_program, solve
 from pyharness.ensembles.batches import batches, listing_of
 from pyharness.ensembles.chunk import solve_chunk
 from pyharness.ensembles.reductions import REDUCTIONS
@@ -111,8 +111,6 @@ def test_initial_attitudes_may_vary_where_a_quantity_needs_them(tmp_path: Path) 
         assert np.abs(found["attitude"][i] - rows.attitude[-1]).max() < 1e-11
         axis3 = rows.rotation().as_matrix()[-1, 2, 2]
         assert found["pointing-error"][i] == pytest.approx(np.arccos(axis3), abs=1e-7)
-    with pytest.raises(InputError, match="neither the torque nor a reduction"):
-        read_sweep(written(tmp_path, text(axis, top='reductions = ["end"]')))
 
 
 def test_error_and_drift_are_those_of_the_method(tmp_path: Path) -> None:

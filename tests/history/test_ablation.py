@@ -95,26 +95,6 @@ def test_defects_on_the_command_line(capsys: Capture) -> None:
     assert record["effects"][5]["original"]["ended"] == "overflow"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["defects", "stagebase"], "did you mean 'stage-base'"),
-        (["defects", "--kind", "defct"], "did you mean 'defect'"),
-        (["defects", "stage-base", "--kind", "defect"], "--kind has no meaning with a name"),
-        (["compare", "--case", "3", "--ablate", "--fix", "stage-base"], "--fix has no meaning"),
-        (["compare", "--case", "3", "--ablate", "--reading", "x"], "unknown reading 'x'"),
-        (["limits"], "--case N"),
-        (["limits", "--case", "3", "--halvings", "0"], "allowed: 1 to 12"),
-        (["limits", "--case", "3", "--program", "x"], "unknown program 'x'"),
-    ],
-)
-def test_mistakes(arguments: list[str], words: str, capsys: Capture) -> None:
-    assert main(arguments) == 2
-    captured = capsys.readouterr()
-    assert (captured.out, captured.err.count("\n")) == ("", 1)
-    assert words in captured.err
-
-
 def test_ablate_in_every_form(capsys: Capture) -> None:
     arguments = ["compare", "--case", "4", "--ablate"]
     assert main(arguments) == 0

@@ -97,6 +97,3 @@ def test_the_verb_shows_it_in_every_form(
     assert [each["first"] for each in record["recaptures"]] == [e.first for e in recaptures()]
     table = list(csv.DictReader(told("--format", "csv").splitlines()))
     assert [each["unit"] for each in table] == ["places", "cards"]
-    for words in (["two-term"], ["--classes"], ["--origins"], ["--scan", "x"]):
-        assert main(["cards", "--second-reading", *words]) == 2
-        assert capsys.readouterr().err.count("\n") == 1

@@ -38,4 +38,4 @@ def test_tape_goes_through_a_pipe_and_not_to_a_terminal(
     assert capsysbinary.readouterr().out == wanted
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     assert main(arguments) == 2
-    assert b"give --out FILE" in capsysbinary.readouterr().err
+    assert b"--out" in capsysbinary.readouterr().err

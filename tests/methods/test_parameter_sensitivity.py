@@ -18,7 +18,7 @@ from pyharness.dynamics.scene_reader import scene_of_file
 from pyharness.events import crosses
 from pyharness.model.attitude import product
 from pyharness.model.changing import ChangingMoments
-from pyharness.torques import damping, opaque, recorded, table
+from pyharness.torques import damping, recorded, table
 from tests.campaigns import parameter_campaign
 from tests.campaigns.parameter_campaign import KINDS, LIMIT, random_scene
 
@@ -368,47 +368,10 @@ def test_saved_and_loaded(tmp_path: Path) -> None:
     assert solve(BRICK, 1.0).sensitivities is None
 
 
-def _absolute(t: Any, omega: Any) -> Any:
-    return [-abs(w) for w in omega]
-
-
-@pytest.mark.parametrize(
-    ("scene", "names", "options", "message"),
-    [
-        (BRICK, ["mass"], {}, "sensitivities: unknown parameter 'mass'; allowed: omega0, moments"),
-        (BRICK, "omega0", {}, "sensitivities: text; allowed: names, as in"),
-        (BRICK, [1], {}, "sensitivities: a whole number; allowed: names"),
-        (BRICK, 3, {}, "sensitivities: a whole number; allowed: names"),
-        (
-            replace(BRICK, torque=TorqueLaw(frame="space")), ["torque.constant"], {},
-            "the torque depends on the attitude; give attitude=True",
-        ),
-        (
-            replace(BRICK, torque=TorqueLaw(sines=[((0.1, 0, 0), 1.0 * k) for k in range(60)])),
-            ["torque.sines"], {}, "more than 200 values",
-        ),
-        (
-            replace(BRICK, torque=recorded(_decay) + LAW), ["torque.rate"], {},
-            "torque.rate is the name of two parameters",
-        ),
-        (BRICK, ["attitude"], {}, "the attitude is not computed; give attitude=True"),
-        (BRICK, ["omega0"], {"method": "rk45"}, "the method is rk45; allowed: auto, taylor"),
-        (
-            replace(BRICK, torque=opaque(_absolute)), ["omega0"], {"method": "dop853"},
-            "the method is dop853",
-        ),
-        (
-            replace(BRICK, torque=damping(-0.5)), ["omega0"], {"effort": 1e-4, "times": 50.0},
-            "work limit",
-        ),
-    ],
-)  # fmt: skip
-def test_mistakes_are_one_line(
-    scene: Scene, names: Any, options: dict[str, Any], message: str
-) -> None:
-    times = options.pop("times", 1.0)
-    with pytest.raises(InputError, match=message.replace("(", r"\(")):
-        solve(scene, times, **options, sensitivities=names)
+@pytest.mark.parametrize("names", ["omega0", [1], 3])
+def test_names_are_a_list_of_texts(names: Any) -> None:
+    with pytest.raises(InputError, match="sensitivities"):
+        solve(BRICK, 1.0, sensitivities=names)
 
 
 PERIODIC = {

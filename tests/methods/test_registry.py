@@ -7,7 +7,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, case_scene
+from pyharness import Scene, TorqueLaw, case_scene
 from pyharness.methods.registry import METHODS, REGISTRY, SCIPY_METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.errors import TimedError
@@ -20,12 +20,7 @@ def test_properties_of_the_registry_are_those_of_its_methods() -> None:
         assert method.name == name
         assert re.search(r"[12][09]\d\d|\.f90|solve_ivp|pyharness\.", method.source), name
         assert method.is_fixed_step == (method.evaluations > 0) == (method.finest == 1.0)
-        if method.is_fixed_step:
-            with pytest.raises(InputError, match=f"{name} has a fixed step and no tolerance"):
-                solve(case_scene(3), [1.0], name, 1e-3)
     assert [name for name in REGISTRY if name not in METHODS] == ["quick"]
-    with pytest.raises(InputError, match="returns the state at one time only"):
-        REGISTRY["quick"].solve(case_scene(3), [1.0], 1e-6)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -62,39 +57,10 @@ def test_solution_that_blows_up_returns_the_rows_until_then(method: str) -> None
     np.testing.assert_allclose(sign * found.omega, [[2.0] * 3, [10.0] * 3], rtol=limit)
 
 
-@pytest.mark.parametrize(
-    ("times", "words"),
-    [
-        ([], "none is given"),
-        ([1.0, float("nan")], "not finite"),
-        ([-1.0, 1.0, 0.0], "monotonic"),
-        ([1.0, 1.0], "monotonic"),
-        ([1.0, 3.0, 2.0], "monotonic"),
-    ],
-)
-def test_times_are_checked(times: list[float], words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        solve(case_scene(3), times, "dop853", 1e-6)
-
-
-@pytest.mark.parametrize("tolerance", [-1.0, 1e-17, 2.0, float("nan")])
-def test_tolerance_is_checked(tolerance: float) -> None:
-    with pytest.raises(InputError, match="tolerance"):
-        solve(case_scene(3), [1.0], "dop853", tolerance)
-
-
 @pytest.mark.parametrize("power", [0, -400, 400])
-@pytest.mark.parametrize(
-    ("method", "words"),
-    [
-        ("dop853", r"exceeded its work limit at t = ([\d.e+-]+) s after 2000 right-hand sides"),
-        ("closed-form", r"at t = ([\d.e+-]+) s the phase"),
-        ("taylor", r"would exceed its work limit before t = ([\d.e+-]+) s;"),
-        ("rk4", r"steps of ([\d.e+-]+) s would take too long"),
-    ],
-)
+@pytest.mark.parametrize("method", ["dop853", "closed-form", "taylor", "rk4"])
 def test_time_of_a_refusal_is_in_the_seconds_of_the_scene(
-    method: str, words: str, power: int, monkeypatch: pytest.MonkeyPatch
+    method: str, power: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The time belongs to the result that could not be reached, neither the first nor the last."""
     monkeypatch.setattr("pyharness.methods.scipy_ivp._MOST_EVALUATIONS", 2000)
@@ -106,7 +72,7 @@ def test_time_of_a_refusal_is_in_the_seconds_of_the_scene(
     tolerance = max(1e-6, METHODS[method].finest)
     with pytest.raises(TimedError) as refusal:
         solve(scene, times, method, tolerance)
-    found = re.search(words, str(refusal.value))
+    found = re.search(r"([\d.e+-]+) s\b", str(refusal.value))
     assert found is not None, refusal.value
     time = float(found[1]) * factor
     if method == "dop853":
@@ -146,8 +112,3 @@ def test_orders_of_the_programs_are_those_of_their_schemes() -> None:
     """Two or four points with one correction have order 2; eq. 31 has order 4."""
     orders = {name: program.order for name, program in PROGRAM_REGISTRY.items()}
     assert orders == {"two-term": 2, "four-term": 2, "runge-kutta": 4}
-
-
-def test_steps_that_are_too_many_are_those_to_the_last_time() -> None:
-    with pytest.raises(InputError, match=r"rk4: 1e\+10 steps of 0\.01 s would take too long"):
-        solve(case_scene(3), [1.0, 1e8], "rk4", 1.0)

@@ -66,7 +66,7 @@ def test_reason_before_and_after_time_0() -> None:
 
 def test_stepper_refuses_it_in_one_line() -> None:
     stepper = Stepper(_scene(UNDEFINED["root of time"][0]))
-    with pytest.raises(InputError, match=r"not defined at t = 0.5 s: the square root") as caught:
+    with pytest.raises(InputError, match=r"t = 0\.5 s") as caught:
         stepper.until(1.0)
     assert isinstance(caught.value, SingularError)
     again = pickle.loads(pickle.dumps(caught.value))

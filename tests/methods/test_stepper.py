@@ -1,22 +1,18 @@
 """Tests of motions that are computed step by step."""
 
 import math
-import re
 from random import Random
-from typing import Any, cast
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 from pyharness import (
-    ChangingMoments,
     InputError,
     Scene,
     Stepper,
     TorqueLaw,
     case_scene,
-    opaque,
     solve,
 )
 from pyharness.scenes.state_scenes import draw, draw_ready
@@ -119,8 +115,6 @@ def test_the_state_within_the_last_step() -> None:
         np.testing.assert_allclose(stepper.at(end), now, rtol=0.0, atol=1e-15)
         begin = end
     assert stepper.steps == 5
-    with pytest.raises(InputError, match=r"^t is outside the last step; allowed: .* to .* s$"):
-        stepper.at(0.0)
 
 
 def test_before_the_first_step_the_state_is_that_of_time_0() -> None:
@@ -199,8 +193,6 @@ def test_a_tiny_step_does_not_shorten_the_next() -> None:
     stepper.step(math.ulp(usual))
     assert stepper.time == math.nextafter(usual, math.inf)
     assert stepper.step() > 1.5 * usual
-    with pytest.raises(InputError, match=r"^longest is 1e-300 s; allowed: .*, larger than"):
-        stepper.step(1e-300)
 
 
 def test_a_singular_torque_ends_the_steps() -> None:
@@ -209,60 +201,16 @@ def test_a_singular_torque_ends_the_steps() -> None:
         torque=lambda t, omega: [1.0 / (1.0 - t) + 0.0 * omega[0], 0.0, 0.0],
     )  # fmt: skip
     stepper = Stepper(scene)
-    with pytest.raises(InputError, match="omega or its torque becomes infinite at t = 1 s"):
+    with pytest.raises(InputError, match="t = 1 s"):
         stepper.until(2.0)
     assert stepper.time < 1.0
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: setattr(Stepper(BRICK), "scene", 3), "scene is a whole number; it must be a"),
-        (lambda: Stepper(BRICK, 1e-16), "tolerance is 1e-16; allowed: 1e-14 to 1"),
-        (lambda: Stepper(BRICK, math.nan), "tolerance is nan; allowed: 1e-14 to 1"),
-        (
-            lambda: Stepper(Scene("", (1, 2, 3), ChangingMoments([[1, 1], [2], [3]]))),
-            "the scene's inertia changes with time, and this takes a constant one",
-        ),
-        (
-            lambda: Stepper(Scene("", (1, 2, 3), (1, 2, 3), torque=opaque(lambda t, w: w))),
-            "an opaque torque can't be computed step by step",
-        ),
-        (
-            lambda: Stepper(Scene("", (1, 2, 3), (1, 2, 3), torque=in_space((1, 2, 3)))),
-            "the torque depends on the attitude; give attitude=True",
-        ),
-        (lambda: Stepper(BRICK).step(0.0), "longest is 0 s; allowed: a positive or"),
-        (lambda: Stepper(BRICK).step(math.nan), "longest is nan s; allowed: a positive or"),
-        (lambda: Stepper(BRICK).step(cast("Any", "a")), "longest: text where a number belongs"),
-        (lambda: Stepper(BRICK).at(10**400), "times are 1000"),
-        (lambda: Stepper(BRICK).at(cast("Any", "x")), "times are 'x'; allowed: numbers"),
-        (
-            lambda: Stepper(BRICK).until(math.inf),
-            "time: inf is not finite; allowed: finite numbers",
-        ),
-        (
-            lambda: setattr(Stepper(BRICK), "omega", (1, 2)),
-            "omega: 2 numbers; allowed: three numbers",
-        ),
-        (
-            lambda: setattr(Stepper(BRICK), "held_torque", (1, 2, math.nan)),
-            "held_torque: nan is not finite; allowed",
-        ),
-        (lambda: setattr(Stepper(BRICK), "attitude", (1, 0, 0, 0)), "attitude is not computed"),
-    ],
-)
-def test_mistakes_are_one_line(call: Any, message: str) -> None:
-    with pytest.raises(InputError) as caught:
-        call()
-    assert str(caught.value).startswith(message)
-    assert re.search("allowed|give|must|belongs", str(caught.value))
-
-
 def test_a_refused_change_changes_nothing() -> None:
     stepper = Stepper(BRICK)
-    with pytest.raises(InputError):
-        stepper.omega = (1.0, math.inf, 2.0)
+    for omega in ((1.0, math.inf, 2.0), (1.0, 2.0)):
+        with pytest.raises(InputError, match="omega"):
+            stepper.omega = omega
     with pytest.raises(InputError):
         stepper.scene = Scene("", (1, 2, 3), (1, 2, 3), torque=in_space((1, 2, 3)))
     assert stepper.scene is BRICK

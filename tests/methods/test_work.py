@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pyharness import InputError, Scene, TorqueLaw, opaque, run_program, solve, subset
+from pyharness import Scene, TorqueLaw, opaque, solve
 from pyharness.dynamics.scene_reader import scene_of
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import Array
 from pyharness.torques import (
     attitude_control,
     damping,
@@ -194,21 +194,6 @@ def test_rows_before_an_overflow_have_power_and_work() -> None:
     assert found.work() == pytest.approx([3.0 * first], rel=1e-10)
     none = solve(scene, [2.0, 3.0])
     assert none.power().shape == none.work().shape == (0,)
-
-
-def test_power_and_work_need_moments_and_a_torque() -> None:
-    scene = scene_with(damping(0.3))
-    by_coefficients = replace(scene, moments=None, coefficients=(0.5, -0.5, 0.1))
-    programs: Trajectory = replace(
-        run_program(replace(scene, torque=TorqueLaw()), subset("two-term")), moments=MOMENTS
-    )
-    for found, words in (
-        (solve(by_coefficients, 1.0), "result needs its moments"),
-        (programs, "allowed: a trajectory that solve has returned"),
-    ):
-        for method in (found.power, found.work):
-            with pytest.raises(InputError, match=words):
-                method()
 
 
 def test_torque_of_a_file_has_power_and_work() -> None:

@@ -1,6 +1,5 @@
 """Attitudes as given and as printed; full inertia matrices."""
 
-import contextlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +9,6 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from pyharness import (
-    InputError,
     Scene,
     TorqueLaw,
     prepare,
@@ -76,56 +74,11 @@ def test_attitude_is_divided_by_its_length(tmp_path: Path) -> None:
     assert huge.attitude == pytest.approx((0.5**0.5, 0.0, 0.5**0.5, 0.0))
 
 
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("attitude = [0, 0, 0, 0]", "all four numbers are 0"),
-        ("attitude = [nan, 0, 0, 1]", "not finite"),
-        ("attitude = [1, 0, 0, 0, 0]", "5 numbers"),
-        ("attitude = 3", "whole number"),
-        ("angles_deg = [1, 2, 3]\nsequence = '3-1-2'", "unknown sequence '3-1-2'"),
-        ("angles_deg = [1, 2]\nsequence = '3-1-3'", "2 numbers"),
-        ("angles_deg = [1, 2, 3]", "with a sequence"),
-        ("attitude = [1, 0, 0, 0]\nsequence = '3-1-3'", "with a sequence"),
-    ],
-)
-def test_what_is_no_attitude_is_refused(text: str, told: str, tmp_path: Path) -> None:
-    file = tmp_path / "scene.toml"
-    file.write_text(BODY + text)
-    with pytest.raises(InputError, match=told) as caught:
-        read_scene(file)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("inertia", "told"),
-    [
-        (((1.0, 0.1, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), "not symmetric, row 2 column 1"),
-        (((1.0, 2.0, 0.0), (2.0, 1.0, 0.0), (0.0, 0.0, 1.0)), "least principal moment is -1"),
-        (((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "2 rows"),
-        (((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, float("inf"), 1.0)), "not finite"),
-    ],
-)
-def test_what_is_no_inertia_is_refused(inertia: object, told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        Scene("", (1.0, 2.0, 3.0), inertia=inertia)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(("apart", "taken"), [(0.9e-12, True), (1.1e-12, False)])
-def test_rounding_alone_may_make_inertia_unsymmetric(apart: float, taken: bool) -> None:
-    inertia = ((2.0, 0.0, 0.0), (2.0 * apart, 2.0, 0.0), (0.0, 0.0, 2.0))
-    with contextlib.nullcontext() if taken else pytest.raises(InputError, match="not symmetric"):
-        Scene("", (1.0, 2.0, 3.0), inertia=inertia)
-
-
 def test_inertia_near_the_end_of_numbers_has_its_moments() -> None:
     scene = Scene(
         "", (1.0, 2.0, 3.0), inertia=((1.0, 0.1, 0.0), (0.1, 1.0, 0.0), (0.0, 0.0, 1e308))
     )
     assert principal(scene)[0].moments == (0.9, 1.1, 1e308)
-    beyond = replace(scene, inertia=((1.7e308, 1e308, 0.0), (1e308, 1.7e308, 0.0), (0.0, 0.0, 1.0)))
-    with pytest.raises(InputError, match="I2 is inf"):
-        principal(beyond)
 
 
 def test_full_inertia_is_solved_about_the_bodys_own_axes() -> None:
@@ -159,18 +112,14 @@ def test_diagonal_inertia_is_its_moments() -> None:
     assert principal(bare)[0] is bare
 
 
+def test_rounding_alone_may_make_inertia_unsymmetric() -> None:
+    Scene("", (1, 2, 3), inertia=((2.0, 0.0, 0.0), (1.8e-12, 2.0, 0.0), (0.0, 0.0, 2.0)))
+
+
 def test_impossible_inertia_is_told() -> None:
     thin = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 3.0))
     assert Scene("", (0.0, 0.0, 1.0), inertia=thin).is_impossible
     assert not Scene("", (0.0, 0.0, 1.0), inertia=TILTED).is_impossible
-
-
-def test_who_takes_principal_axes_says_so() -> None:
-    scene = Scene("", (1.0, 2.0, 3.0), inertia=TILTED)
-    with pytest.raises(InputError, match="full inertia"):
-        scene.right_hand_side()
-    with pytest.raises(InputError, match="full inertia"):
-        _ = scene.euler_coefficients
 
 
 def test_principal_axes_are_a_right_handed_frame() -> None:
@@ -206,5 +155,3 @@ def test_a_rotation_of_scipy_is_an_attitude_everywhere() -> None:
     np.testing.assert_array_equal(
         solver(starts[0], 1.0, turns[1])[1], solver(starts[0], 1.0, rows[1])[1]
     )
-    with pytest.raises(InputError, match=r"\[initial\] attitude"):
-        replace(body, attitude=turns)

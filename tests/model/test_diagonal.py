@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene
+from pyharness import Scene
 from pyharness.model.diagonal import diagonalised
 from pyharness.model.inertia import Matrix, principal_axes, principal_frame
 
@@ -75,19 +75,7 @@ def test_the_moments_are_rounded_to_nearest_and_the_axes_are_a_frame() -> None:
         assert (moments, axes.tolist()) == (frame.moments, frame.axes.tolist())
 
 
-@pytest.mark.parametrize(
-    ("matrix", "told"),
-    [
-        (_symmetric(1.0, 1.0, 0.0, 1.0, 0.0, 1.0), "moment is 0;"),
-        (_symmetric(1.0, 1.0, 1.0, 1.0, 1.0, 1.0), "moment is 0;"),
-        (_symmetric(1.0, 1.0 + 2.0**-52, 0.0, 1.0, 0.0, 1.0), "moment is -2.22045e-16;"),
-        (_symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), "moment is 0;"),
-    ],
-)
-def test_what_is_not_positive_definite_is_seen_without_rounding(matrix: Matrix, told: str) -> None:
-    with pytest.raises(InputError, match=f"its least principal {told} allowed: a positive"):
-        Scene("", (1.0, 2.0, 3.0), inertia=matrix)
-    # The next float gives a possible body, though a thin one.
+def test_a_thin_body_is_seen_without_rounding() -> None:
     thin = _symmetric(1.0, 1.0 - 2.0**-53, 0.0, 1.0, 0.0, 1.0)
     assert min(principal_frame(thin).moments) == 2.0**-53
 

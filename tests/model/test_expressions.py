@@ -1,4 +1,4 @@
-"""Torques as text: their values, what is refused, and that no text raises another exception."""
+"""Torques as text: their values, and that no text raises another exception than InputError."""
 
 import math
 import random
@@ -21,82 +21,6 @@ VALUES = (
     "q0*q0 + q1*q1 - q2*q2 - q3*q3", "w1\n + w2", "\tw1 ", "7*k/3*w2", "exp(sin(w1)*cos(w2))",
 )  # fmt: skip
 CONSTANTS = {"k": 0.25, "wheel": 3, "_unused": -1.5}
-
-MISTAKES = {
-    "": "is empty",
-    " \n ": "is empty",
-    "w1 +": "no arithmetic expression",
-    "w1 w2": "no arithmetic expression, at 'w2'",
-    "3w1": "no arithmetic expression",
-    "(" * 3000: "no arithmetic expression",
-    "9" * 5000: "no arithmetic expression",
-    "9" * 4000: "too large for binary64",
-    "1e999": "too large for binary64",
-    "1e300*1e300": "too large for binary64",
-    "9**9**9**9": "too large for binary64",
-    "exp(1e4)": "too large for binary64",
-    "exp(1e4 + 0*t)": "too large for binary64",
-    "1e200*w1*1e200": "a constant overflows",
-    "1/0": "division by the constant 0",
-    "w1/(1 - 1)": "division by the constant 0",
-    "w1/(w2 - w2)": "division by the constant 0",
-    "0**-1": "division by the constant 0",
-    "w2/(1e-200*w1*1e-200)": "division by the constant 0",
-    "sqrt(-2)": "square root of the constant -2",
-    "sqrt(w1 - w1 - 2)": "square root of the constant -2",
-    "(-8)**(1/3)": "the constant -8 has no real power",
-    "2**w1": "the exponent of ** is not constant",
-    "w1**1.5": "the exponent of ** is 1.5; allowed: a whole number up to 1000",
-    "w1**1001": "the exponent of ** is 1001",
-    "x" * 10_001: "10001 characters; allowed: at most 10000",
-    "x" * 9999: "unknown name 'xxx",
-    "omega": "unknown name 'omega'; allowed: t, w1,",
-    "wheal*w1": "did you mean 'wheel'",
-    "w4": "unknown name 'w4'; did you mean 'w",
-    "__import__": "unknown name '__import__'",
-    "coss(t)": "unknown function 'coss'; did you mean 'cos'",
-    "pi(t)": "unknown function 'pi'",
-    "sin*t": "sin without an argument; write sin(...)",
-    "sin()": "sin of 0 arguments; allowed: one",
-    "sin(w1, w2)": "sin of 2 arguments; allowed: one",
-    "sin(**w1)": "sin of 0 arguments",
-    "sin(*w1)": "'*w1' is not allowed",
-    "2(t)": "'2(t)' is not allowed",
-    "sin(t)(t)": "'sin(t)(t)' is not allowed",
-    "w1.real": "'w1.real' is not allowed",
-    "w1 if t else w2": "'w1 if t else w2' is not allowed",
-    "1if t else 2": "is not allowed",
-    "w1 and w2": "'w1 and w2' is not allowed",
-    "not w1": "'not w1' is not allowed",
-    "w1 is w2": "'w1 is w2' is not allowed",
-    "w1//w2": "'w1//w2' is not allowed",
-    "await t": "'await t' is not allowed",
-    "yield": "no arithmetic expression",
-    "w1, w2": "'w1, w2' is not allowed",
-    "()": "'()' is not allowed",
-    "1j": "'1j' is not allowed",
-    "True": "'True' is not allowed",
-    "None": "'None' is not allowed",
-    "lambda: w1": "unknown character ':'",
-    "(x := 3)": "unknown character ':'",
-    "[w1]": "unknown character '['",
-    "'w1'": "unknown character '''",
-    'f"{w1}"': "unknown character '\"'",
-    "w1 < w2": "unknown character '<'",
-    "w1 % 2": "unknown character '%'",
-    "w1^2": "unknown character '^'",
-    "w1 # damping": "unknown character '#'",
-    "w1\\\n": "unknown character '\\'",
-    "w1\0": r"unknown character '\x00'",
-    "\u03c9": "unknown character '\u03c9'",
-    "w\u00b9": "unknown character '\u00b9'",
-    "\u00a0w1": "unknown character '\\xa0'",
-    "-" * 9999 + "1": "nested too deeply",
-    "-" * 600 + "1": "nested too deeply",
-    "+".join(["w1"] * 600): "nested too deeply; allowed: at most 500 levels",
-    "+".join(["w1"] * 3300): "nested too deeply",
-    "**".join(["w1"] * 2500): "nested too deeply",
-}  # fmt: skip
 
 
 def _torque(text: str, **constants: Any) -> StateTorque | TorqueLaw:
@@ -192,17 +116,6 @@ def test_repr_of_a_long_torque_is_short() -> None:
     assert "\n" not in found
 
 
-@pytest.mark.parametrize(("text", "words"), MISTAKES.items(), ids=range(len(MISTAKES)))
-def test_mistake_is_one_line_with_its_place(text: str, words: str) -> None:
-    with pytest.raises(InputError) as raised:
-        _torque(text, wheel=1.0)
-    message = str(raised.value)
-    assert message.startswith("[torque] expression 2")
-    assert words in message
-    assert "\n" not in message
-    assert len(message) < 1000
-
-
 def test_same_depth_is_allowed_from_a_deep_stack() -> None:
     text = "+".join(["w1"] * 490)
 
@@ -210,61 +123,6 @@ def test_same_depth_is_allowed_from_a_deep_stack() -> None:
         return below(depth - 1) if depth else _torque(text)
 
     assert _value(below(300), [0.0, 2.0, *[0.0] * 6]) == 980.0
-
-
-def test_too_many_operations_are_refused_with_the_place() -> None:
-    text = "+".join(f"({'+'.join(f'sin({n}*w1)' for n in range(k, k + 100))})"
-                    for k in range(0, 700, 100))  # fmt: skip
-    with pytest.raises(InputError, match=r"^\[torque\] expression 2: more than 2000 operations"):
-        parsed([text, text.replace("sin", "cos"), text.replace("w1", "w2")], {})
-
-
-@pytest.mark.parametrize(
-    ("expressions", "words"),
-    [
-        ("w1", "[torque] expression: text; allowed: a list of three texts"),
-        (3, "[torque] expression: a whole number; allowed"),
-        ({"x": "w1"}, "[torque] expression: a table; allowed"),
-        (["w1", "w2"], "[torque] expression: 2 entries; allowed: a list of three texts"),
-        (["0"] * 5, "[torque] expression: more than 3 entries"),
-        ((f"{n}" for n in iter(int, 1)), "[torque] expression: more than 3 entries"),
-        (["w1", 2.0, "0"], "[torque] expression 2 is a number; it must be text"),
-        (["w1", "0", None], "[torque] expression 3 is nothing; it must be text"),
-    ],
-)
-def test_other_values_are_refused(expressions: Any, words: str) -> None:
-    with pytest.raises(InputError) as raised:
-        parsed(expressions, {})
-    assert str(raised.value).startswith(words)
-
-
-@pytest.mark.parametrize(
-    ("constants", "words"),
-    [
-        (["k"], "[torque.constants] is a list; allowed: names and numbers"),
-        ({1: 2.0}, "[torque.constants]: a name is a whole number; allowed: text"),
-        ({"": 1.0}, "[torque.constants]: '' is no name"),
-        ({"2k": 1.0}, "[torque.constants]: '2k' is no name"),
-        ({"k k": 1.0}, "'k k' is no name"),
-        ({"k\n": 1.0}, "is no name"),
-        ({"\u03c9": 1.0}, "'\u03c9' is no name"),
-        ({"lambda": 1.0}, "'lambda' is no name"),
-        ({"t": 1.0}, "'t' has a meaning in expressions already"),
-        ({"w1": 1.0}, "'w1' has a meaning"),
-        ({"q3": 1.0}, "'q3' has a meaning"),
-        ({"pi": 3.0}, "'pi' has a meaning"),
-        ({"sinh": 1.0}, "'sinh' has a meaning"),
-        ({"k": "1"}, "[torque.constants] k: text where a number belongs"),
-        ({"k": True}, "[torque.constants] k: true or false where a number belongs"),
-        ({"k": math.inf}, "[torque.constants] k: inf is not finite"),
-        ({"k": math.nan}, "[torque.constants] k: nan is not finite"),
-        ({"k": 10**400}, "[torque.constants] k: a number too large for binary64"),
-    ],
-)
-def test_constant_that_is_refused(constants: Any, words: str) -> None:
-    with pytest.raises(InputError) as raised:
-        parsed(["k*w1", "0", "0"], constants)
-    assert words in str(raised.value)
 
 
 def _is_torque_or_one_line(text: str) -> None:

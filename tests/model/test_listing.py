@@ -4,9 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-from pyharness import InputError, subset
+from pyharness import subset
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, flagged, names_of, switches
 
@@ -80,34 +78,6 @@ def test_no_reading_or_conjecture_changes_a_corrected_listing() -> None:
     assert fixed == Listing.original("runge-kutta")
     everything = [*switches("runge-kutta"), "do-variable"]
     assert subset("runge-kutta", fix=everything, **given).active == {"initial-torque"}
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        ({"program": "two-term", "fix": ["stage-base"]}, "program two-term has no defect"),
-        ({"program": "two-term", "fix": ["dt-acumulates"]}, "did you mean 'dt-accumulates'"),
-        ({"program": "four-term", "keep": ["c1-for-c"]}, "--keep: program four-term has no defect"),
-        ({"program": "two-term", "readings": ["do-variable"]}, "has no reading 'do-variable'"),
-        ({"program": "two-term", "base": "mended"}, "unknown listing 'mended'"),
-        ({"program": "two-term", "fix": ["a"], "keep": ["a"]}, "both --fix and --keep"),
-        ({"program": "four-term", "readings": ["c1-for-c"]}, "allowed: none"),
-        ({"program": "four-term", "conjectures": ["torque"]}, "--conjecture: unknown conjecture"),
-        ({"program": "four-term", "fix": ["torque"]}, "--fix: unknown defect 'torque'"),
-    ],
-)
-def test_mistakes_are_named(call: dict[str, Any], words: str) -> None:
-    with pytest.raises(InputError, match=re.escape(words)):
-        subset(**call)
-
-
-@pytest.mark.parametrize(
-    ("program", "words"),
-    [("three-term", "unknown program 'three-term'"), ("two-term", "has no defect 'stage-base'")],
-)
-def test_listing_refuses_what_the_program_has_not(program: str, words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        Listing(program, ["stage-base"])
 
 
 def test_divergences_are_complete_entries() -> None:

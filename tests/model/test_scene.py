@@ -1,4 +1,4 @@
-"""Scenes and scene files: what is read, what is refused, and the messages."""
+"""Scenes and scene files: what is read."""
 
 import math
 from dataclasses import replace
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, case_scene, principal, read_scene
+from pyharness import Scene, TorqueLaw, case_scene, principal, read_scene
 from pyharness.model.attitude import matrices
 from pyharness.model.records import scene_record
 from pyharness.model.scene import most_steps
@@ -96,77 +96,6 @@ def test_torque_about_the_axes_of_space_stays_as_the_axes_of_the_body_turn() -> 
     later = restarted_at(scene, np.ones(3), 0.5, (0.0, 0.0, 1.0, 0.0))
     assert later.law.at(0.25) == pytest.approx(law.at(0.75))
     assert (later.law.frame, later.attitude) == ("space", (0.0, 0.0, 1.0, 0.0))
-    with pytest.raises(InputError, match="can't be restarted without the attitude"):
-        restarted_at(scene, np.ones(3), 0.5)
-
-
-def test_torque_about_unknown_axes_is_refused(tmp_path: Path) -> None:
-    text = GOOD.replace("[torque]", '[torque]\nframe = "spaec"')
-    told = r"\[torque\] frame: unknown frame 'spaec'; did you mean 'space'\? allowed: body, space"
-    with pytest.raises(InputError, match=told):
-        _read(tmp_path, text)
-    with pytest.raises(InputError, match="frame is a whole number; allowed: body, space"):
-        _read(tmp_path, text.replace('"spaec"', "3"))
-    coefficients = text.replace("spaec", "space").replace("moments", "coefficients")
-    with pytest.raises(InputError, match="frame is space, and the body is given by coefficients"):
-        _read(tmp_path, coefficients)
-
-
-BODY = "[body]\nmoments=[3,2,1]\n"
-INITIAL = "[initial]\nomega=[1,2,3]\n"
-
-BAD = {
-    BODY + INITIAL + "[run]\nstep_sise = 1\n": "unknown key 'step_sise'; did you mean 'step_size'",
-    BODY + INITIAL + "[runn]\n": "unknown key 'runn'; did you mean 'run'",
-    BODY: "omega is missing",
-    INITIAL: "either moments or coefficients",
-    BODY + "coefficients=[1,2,3]\n" + INITIAL: "either moments or coefficients",
-    "[body]\nmoments=[3,2]\n" + INITIAL: "three numbers",
-    "[body]\nmoments=[3,2,0]\n" + INITIAL: "I3 is 0; allowed: a finite number above 0",
-    "[body]\nmoments=[3,-2,1]\n" + INITIAL: "I2 is -2",
-    "[body]\nmoments=[inf,2,1]\n" + INITIAL: "I1 is inf",
-    "[body]\nmoments=[nan,2,1]\n" + INITIAL: "I1 is nan",
-    "[body]\nmoments=[1,2,'x']\n" + INITIAL: "text where a number belongs",
-    "[body]\nmoments=[1,2,true]\n" + INITIAL: "true or false where a number belongs",
-    f"[body]\nmoments=[1,2,1{'0' * 400}]\n" + INITIAL: "too large for binary64",
-    BODY + "[initial]\nomega=[1,2,inf]\n": "omega: inf is not finite",
-    BODY + INITIAL + "[run]\nstep_size=0\n": "step_size is 0",
-    BODY + INITIAL + "[run]\nstep_size=-1\n": "step_size is -1",
-    BODY + INITIAL + "[run]\nsteps=0\n": "steps is 0",
-    BODY + INITIAL + "[run]\nsteps=10000000000\n": "GB",
-    BODY + INITIAL + "[run]\nsteps=1.5\n": "whole number",
-    BODY + INITIAL + "[run]\nsteps=1000\nstep_size=1e308\n": "not finite",
-    BODY + INITIAL + "[torque]\nsines=[{amplitude=[1,2,3]}]\n": "frequency is missing",
-    BODY + INITIAL + "[torque]\nsines=[3]\n": "list of",
-    BODY + INITIAL + "[torque]\nsines=[{amplitude=[1,2,3],frequency=1,phase=0}]\n": "'phase'",
-    BODY + INITIAL + "[torque]\nrate=[1,2,inf]\n": "rate: inf is not finite",
-    "name = 3\n" + BODY + INITIAL: "it must be text",
-    "body = 3\n" + INITIAL: "must be a table",
-    "[body\n": "not TOML",
-    "x = " + "[" * 100_000: "nested too deeply",
-}
-
-
-@pytest.mark.parametrize("text", BAD, ids=range(len(BAD)))
-def test_bad_scene_file_is_one_line_that_says_what_and_where(text: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError) as caught:
-        _read(tmp_path, text)
-    message = str(caught.value)
-    assert BAD[text] in message
-    assert "scene.toml" in message
-    assert "\n" not in message
-    assert len(message) < 400
-
-
-def test_files_that_are_no_scene(tmp_path: Path) -> None:
-    path = tmp_path / "x.toml"
-    for content, words in ((b"\xff\xfe\x00\x01", "not UTF-8"), (b"#" * 1_000_001, "larger than")):
-        path.write_bytes(content)
-        with pytest.raises(InputError, match=words):
-            read_scene(path)
-    for other, words in (("missing", "No such file"), (".", "directory"), ("a\0b", "null")):
-        with pytest.raises(InputError, match=words):
-            read_scene(tmp_path / other)
 
 
 def test_cases_are_those_of_table_1() -> None:
@@ -174,8 +103,6 @@ def test_cases_are_those_of_table_1() -> None:
     assert [case_scene(n).is_impossible for n in range(1, 8)] == [False] * 5 + [True, False]
     assert case_scene(7).law.at(0.0) == (0.0, 1.0, 0.0)
     assert case_scene(7).law.at(0.25) == (math.sin(25.0), math.cos(25.0), 0.25)
-    with pytest.raises(InputError, match="unknown case '8'"):
-        case_scene(8)
 
 
 def test_right_hand_side_is_the_normalized_form() -> None:
@@ -203,16 +130,12 @@ def test_largest_number_of_steps_fits() -> None:
     assert 10_000_000 < most_steps() <= 400_000_000
 
 
-def test_name_is_short_and_vectors_have_three_numbers(tmp_path: Path) -> None:
+def test_name_is_short(tmp_path: Path) -> None:
     path = tmp_path / "x.toml"
-    text = 'name = "%s"\n[body]\nmoments = [3, 2, 1]\n[initial]\nomega = [%s]\n'
+    text = 'name = "%s"\n[body]\nmoments = [3, 2, 1]\n[initial]\nomega = [1, 2, 3]\n'
     for given, kept in (("long " * 30, "long " * 11 + "long"), ("x" * 70, "x" * 60)):
-        path.write_text(text % (given, "1, 2, 3"))
+        path.write_text(text % given)
         assert read_scene(path).name == kept
-    for numbers in ("1, 2", "1, 2, 3, 4", ""):
-        path.write_text(text % ("x", numbers))
-        with pytest.raises(InputError, match=r"omega: .* numbers; allowed: three numbers"):
-            read_scene(path)
 
 
 def test_rate_alone_makes_a_torque_vary() -> None:

@@ -16,7 +16,6 @@ from pyharness.checks.external_file import read_problem
 from pyharness.checks.golden import read_record
 from pyharness.checks.integrators import protocol
 from pyharness.checks.port_protocol import request
-from pyharness.cli.main import main
 from pyharness.cli.output import check_tree
 from pyharness.dynamics.scene_reader import read_scene
 from pyharness.edition.crate import PACKAGE_MARK
@@ -205,14 +204,3 @@ def test_number_of_any_kind_is_a_line() -> None:
         with pytest.raises(InputError, match=r"^x: schema"):
             check_schema("x", "scene file", found, "give another")
     check_schema("x", "scene file", SCHEMAS["scene file"], "give another")
-
-
-def test_command_line_refuses_a_scene_of_another_version(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_text(scene_text(case_scene(3)).replace("schema = 1", "schema = 9"))
-    assert main(["run", "--scene", str(path), "--method", "taylor"]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith(f"pyharness: scene file '{path}': top level: schema 9; this version")
-    assert said.count("\n") == 1

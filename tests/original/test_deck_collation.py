@@ -140,6 +140,3 @@ def test_the_verb_shows_the_table_in_every_form(capsys: pytest.CaptureFixture[st
     assert set(step["cards"]) == set(PROGRAMS)
     table = list(csv.DictReader(told("--format", "csv").splitlines()))
     assert [each["step"] for each in table] == [row.what for row in rows()]
-    for words in (["two-term"], ["--classes"], ["--scan", "x"], ["--format", "tei"]):
-        assert main(["cards", "--collate", *words]) == 2
-        assert capsys.readouterr().err.count("\n") == 1

@@ -168,30 +168,6 @@ def test_page_is_what_a_fortran_compiler_writes(program: str, tmp_path: Path) ->
     assert sum("*" in line for line in written) > 100
 
 
-@pytest.mark.parametrize("form", ["printer", "tape5"])
-def test_formats_of_programs_are_refused_elsewhere(
-    form: str, capsys: Capture, tmp_path: Path
-) -> None:
-    for arguments, words in (
-        (["run", "--case", "3", "--method", "dop853"], "no meaning with --method; allowed: table"),
-        (["doctor"], f"unknown format '{form}'"),
-    ):
-        assert main([*arguments, "--format", form, "--out", str(tmp_path / "x")]) == 2
-        error = capsys.readouterr().err
-        assert words in error
-        assert "table" in error
-        assert error.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_scene_without_moments_has_no_header(capsys: Capture, tmp_path: Path) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_text("[body]\ncoefficients=[0.5,-0.5,0]\n[initial]\nomega=[0,1,10]\n")
-    arguments = ["run", "--scene", str(path), "--program", "two-term", "--format", "printer"]
-    assert main(arguments) == 2
-    assert "give moments" in capsys.readouterr().err
-
-
 def test_page_goes_to_a_file_and_both_implementations_print_the_same(
     capsys: Capture, tmp_path: Path
 ) -> None:

@@ -1,5 +1,6 @@
 """Names that the calls of `calls.toml` use."""
 
+from dataclasses import replace
 from math import inf, nan, pi
 from types import SimpleNamespace
 
@@ -7,9 +8,25 @@ import numpy as np
 
 import pyharness
 from pyharness import *  # noqa: F403
-from pyharness import Scene, case_scene, events, interchange, opaque, torques
+from pyharness import (
+    ChangingMoments,
+    Scene,
+    TorqueLaw,
+    case_scene,
+    events,
+    interchange,
+    opaque,
+    torques,
+)
+from tests.refusals.names_cli import *  # noqa: F403
+from tests.refusals.names_model import *  # noqa: F403
 
-__all__ = ["BRICK", "SimpleNamespace", "case_scene", "events", "inf", "interchange", "nan", "np",
-           "opaque", "pi", "pyharness", "torques"]  # fmt: skip
+__all__ = ["BRICK", "IN_SPACE", "SHRINKING", "WEAK", "SimpleNamespace", "case_scene", "events",
+           "inf", "interchange", "nan", "np", "opaque", "pi", "pyharness", "replace",
+           "torques"]  # fmt: skip
 
 BRICK = Scene("brick", (0.1, 1.0, 0.2), moments=(1.0, 2.0, 2.5))
+IN_SPACE = replace(BRICK, torque=TorqueLaw((1.0, 0.0, 0.0), frame="space"))
+# For the method `averaged`.
+WEAK = replace(BRICK, omega=(0.3, 0.2, 1.1), torque=TorqueLaw((1e-6, 2e-6, 1e-6)))
+SHRINKING = replace(BRICK, moments=ChangingMoments([[9.0], [8.0, -0.4], [7.0]]))

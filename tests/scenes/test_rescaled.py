@@ -101,14 +101,11 @@ def test_solve_ivp_in_spans_whose_square_is_no_number(method: str) -> None:
 @pytest.mark.parametrize(
     ("method", "words"),
     [
-        *(
-            (name, f"{name} exceeded its work limit at t = ")
-            for name in ("lsoda", "dop853", "rk45", "radau")
-        ),
-        ("gauss-2", "gauss-2 exceeded its work limit at t = 0 s"),
-        ("taylor", "taylor would exceed its work limit before t = 0.75 s;"),
-        ("auto", "closed-form: at t = 0.75 s the phase is above"),
-        ("rk4", "steps of 1e-12 s would take too long"),
+        *((name, "t = ") for name in ("lsoda", "dop853", "rk45", "radau")),
+        ("gauss-2", "t = 0 s"),
+        ("taylor", "t = 0.75 s"),
+        ("auto", "t = 0.75 s"),
+        ("rk4", " 1e-12 s "),
     ],
 )
 def test_a_refusal_tells_the_time_in_the_seconds_of_the_scene(

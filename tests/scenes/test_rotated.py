@@ -5,7 +5,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, opaque, solve, torques
+from pyharness import Scene, solve, torques
 from pyharness.model.scene import Triple
 from pyharness.model.state_torque import StateTorque
 from pyharness.scenes.rotated import axes_of, later, restarted_at, rotated
@@ -66,11 +66,3 @@ def test_motion_continues_after_a_restart() -> None:
     assert rest.attitude is not None
     assert rest.omega[0] == pytest.approx(whole.omega[1], abs=3e-12)
     assert rest.attitude[0] == pytest.approx(whole.attitude[1], abs=3e-12)
-
-
-def test_what_can_not_be_shifted_is_refused() -> None:
-    with pytest.raises(InputError, match="opaque torque can't be shifted"):
-        later(opaque(np.subtract), 1.0)
-    scene = Scene("in space", (1, 0, 0), moments=MOMENTS, torque=lambda t, w, q: q[1:])
-    with pytest.raises(InputError, match="can't be restarted without the attitude"):
-        restarted_at(scene, np.ones(3), 1.0)

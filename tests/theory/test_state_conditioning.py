@@ -70,9 +70,3 @@ def test_the_largest_sensitivity_at_any_time_counts() -> None:
     both = conditioning_at(scene, [1.0, 20.0])
     assert both.rounding > conditioning_at(scene, [20.0]).rounding
     assert both == conditioning_at(scene, [20.0, 1.0])
-
-
-def test_motion_that_diverges_has_no_conditioning() -> None:
-    scene = Scene("out", (1.0, 0.0, 0.0), moments=(1, 1, 1), torque=lambda t, w: w * w)
-    with pytest.raises(InputError, match="grows without bound"):
-        conditioning_at(scene, [2.0])

@@ -7,7 +7,6 @@ import mpmath
 import numpy as np
 import pytest
 
-from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.truth.elliptic import jacobi, torque_free
 from pyharness.truth.reference import reference
@@ -104,17 +103,6 @@ def test_coefficients_as_binary64_holds_them() -> None:
     np.testing.assert_array_equal(
         [float(x) for x in torque_free(powers, 50.0)], [float(x) for x in held]
     )
-
-
-@pytest.mark.parametrize(
-    "coefficients",
-    [(1.0, 1.0, 1.0), (0.0, 1.0, 2.0), (0.0, -1.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 2.0)],
-)
-def test_unbounded_motion_is_refused(coefficients: tuple[float, float, float]) -> None:
-    """If only one coefficient is not 0, its component of omega is linear in time."""
-    scene = Scene("", _START, coefficients=coefficients)
-    with pytest.raises(InputError, match="not bounded; allowed"):
-        torque_free(scene, 1.0)
 
 
 @pytest.mark.parametrize(

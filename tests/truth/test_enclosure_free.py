@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, case_scene
+from pyharness import Scene, case_scene
 from pyharness.model.attitude import product
 from pyharness.model.scene import Triple
 from pyharness.scenes.free_motions import KINDS, draw, draw_top
@@ -205,23 +205,3 @@ def test_precision_of_the_caller_is_restored() -> None:
     with flint.ctx.workprec(77):
         enclosed(case_scene(4), 1.0, 100)
         assert flint.ctx.prec == 77
-
-
-TOP = Scene("", (0.4, -1.1, 0.7), moments=(6.0, 5.0, 2.0))
-
-
-@pytest.mark.parametrize(
-    ("scene", "end", "digits", "attitude", "message"),
-    [
-        (replace(TOP, torque=TorqueLaw((1.0, 0.0, 0.0))), 1.0, 9, False, "without torque"),
-        (TOP, float("inf"), 9, False, "a time is not finite"),
-        (TOP, 1.0, -1, False, "digits is -1; allowed: 0 or more"),
-        (TOP, 1.0, 9000, False, "more than 20000 bits"),
-        (TOP, 1.0, 9, True, "needs moments and an initial attitude"),
-        (Scene("", TOP.omega, coefficients=(1.0, 1.0, 1.0)), 1.0, 9, False, "unbounded"),
-        (Scene("", TOP.omega, coefficients=(0.0, -1.0, 0.0)), 1.0, 9, False, "unbounded"),
-    ],
-)
-def test_refusals(scene: Scene, end: float, digits: int, attitude: bool, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        enclosed(scene, end, digits, attitude)

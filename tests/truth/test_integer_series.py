@@ -64,17 +64,17 @@ def test_way_passes_through_the_largest_omega() -> None:
 
 
 @pytest.mark.parametrize(
-    ("scene", "time", "steps", "words"),
+    ("scene", "time", "steps"),
     [
-        (Scene("", (1.0,) * 3, coefficients=(1.0,) * 3), 2.0, 300, "grows without bound|300 steps"),
-        (Scene("", (1.0, 2.0, 3.0), BODY), 1e5, 20, "more than 20 steps"),
+        (Scene("", (1.0,) * 3, coefficients=(1.0,) * 3), 2.0, 300),
+        (Scene("", (1.0, 2.0, 3.0), BODY), 1e5, 20),
     ],
 )
 def test_what_has_no_truth_is_refused(
-    scene: Scene, time: float, steps: int, words: str, monkeypatch: pytest.MonkeyPatch
+    scene: Scene, time: float, steps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("pyharness.truth.integer_series._MOST_STEPS", steps)
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(InputError, match="integer series"):
         integer_series(scene, [time])
 
 

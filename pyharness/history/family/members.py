@@ -106,7 +106,7 @@ def converged_order(member: Member) -> int:
     `member` is a weighted residual method, which computes a first estimate of omega in each step. A
     correction solves again for omega, with the right-hand side of Euler's equations at the last
     estimate. Beyond some number of corrections, further ones do not raise the order.
-    docs/explanation/family.md derives these orders.
+    docs/explanation/methods.md derives these orders.
     """
     n = member.terms
     if member.weighting == "galerkin":

@@ -41,7 +41,7 @@ MOST_STEPS = 2_000
 class OrderFinding:
     """The order of convergence of one method in one scene, derived and measured, and its error.
 
-    `member` is a weighted residual method. docs/explanation/family.md derives its order
+    `member` is a weighted residual method. docs/explanation/methods.md derives its order
     `predicted`. `measured` is None if no order can be measured, because the errors are rounding
     errors alone, or too large with every step size. `settled` is true if the last two measured
     values of the order differ by at most a tenth. `error` is the largest error of any omega

@@ -23,7 +23,7 @@ from tests.campaigns.function_errors.sources import (
     rounded,
 )
 
-PAGE = (ROOT / "docs/explanation/function-errors.md").read_text()
+PAGE = (ROOT / "docs/contributing/function-errors.md").read_text()
 U = Fraction(1, 2**53)
 SINE, COSINE = 1.24e-16, 1.9e-16  # as the page states them
 WIDE_BITS, JAVASCRIPT_BITS = 53, 19

@@ -1,0 +1,232 @@
+"""The table of tolerances: every entry point solves every kind of scene to what it promises.
+
+A scene is a row of `tests/methods/tolerance_scenes.py`, its true motion is that of the reference,
+and `tests/within.py` judges.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import islice
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pyharness import Scene, Stepper, Taylor, TorqueLaw, prepare, principal, solve, solve_many
+from pyharness.dynamics.system import is_recorded
+from pyharness.methods.problem import closed_form
+from pyharness.methods.registry import GAUSS, METHODS, REGISTRY, SCIPY_METHODS
+from pyharness.model.attitude import IDENTITY, quaternion_rates
+from pyharness.model.state_torque import of_law, torque_of
+from tests.methods.tolerance_scenes import KINDS, motions
+from tests.within import Motion, check_error
+
+TOLERANCES = (1e-4, 1e-8, 1e-12)
+# SciPy's methods claim less and take long for it, so that they solve a few scenes of each kind.
+_SCIPY = {"dop853": (1e-4, 1e-8), "rk45": (1e-5,), "lsoda": (1e-5,), "radau": (1e-4,)}
+_FEW = 3
+_ENDED = ("complete", "sensitive")
+
+
+def takes(method: str, scene: Scene, attitude: bool) -> bool:
+    """Return whether a method solves scenes of this kind."""
+    chosen = REGISTRY[method]
+    if attitude and not chosen.attitude:
+        return False
+    if attitude and method == "closed-form" and (scene.coefficients or not scene.torque.is_zero):
+        return False
+    if scene.torque.needs_attitude and not attitude:
+        return False
+    if is_recorded(scene):
+        return chosen.state_torque
+    if scene.torque.in_space:
+        return chosen.space_torque
+    bare = principal(scene)[0]
+    if method == "quick":
+        return all(bare.euler_coefficients)
+    return method != "closed-form" or closed_form(bare) is not None
+
+
+def by_solve(method: str, motion: Motion, tolerance: float, attitude: bool, what: str) -> None:
+    """Check the rows of `solve`."""
+    found = solve(motion.scene, motion.times, method, tolerance, attitude=attitude)
+    assert found.ended in _ENDED, what
+    check_error(
+        motion, found.omega, found.attitude, tolerance, what, steps=found.steps,
+        estimate=found.error,
+    )  # fmt: skip
+
+
+def by_dense_output(
+    method: str, motion: Motion, tolerance: float, attitude: bool, what: str
+) -> None:
+    """Check the dense output at a time that is no row."""
+    found = solve(
+        motion.scene, motion.times[-1], method, tolerance, attitude=attitude, dense_output=True
+    )
+    assert found.sol is not None
+    state = found.sol(motion.times).T
+    turns = state[:, 3:] if attitude else None
+    check_error(motion, state[:, :3], turns, tolerance, what, steps=found.steps)
+
+
+def by_call(method: str, motion: Motion, tolerance: float, attitude: bool, what: str) -> None:
+    """Check a prepared solver: its call, and its trajectory without attitude."""
+    scene, end = motion.scene, motion.times[-1]
+    if attitude:
+        turning = prepare(scene, method, tolerance, attitude=True)
+        omega, turns = turning(scene.omega, end)
+        assert turning.status in _ENDED, what
+        check_error(motion, omega, turns, tolerance, what, estimate=turning.error)
+        return
+    solver = prepare(scene, method, tolerance)
+    omega = solver(scene.omega, end)
+    assert solver.status in _ENDED, what
+    steps = abs(solver.steps)
+    check_error(motion, omega, None, tolerance, what, steps=steps, estimate=solver.error)
+    if method in METHODS:
+        rows = solver.trajectory(scene.omega, motion.times)
+        check_error(motion, rows.omega, None, tolerance, what, steps=steps, estimate=rows.error)
+
+
+def by_stepper(method: str, motion: Motion, tolerance: float, attitude: bool, what: str) -> None:
+    """Check the stepper, whose tolerance is that of a step."""
+    stepper = Stepper(motion.scene, tolerance, attitude=attitude)
+    rows, turns = [], []
+    for time in motion.times:
+        stepper.until(time)
+        rows.append(stepper.omega)
+        turns.append(stepper.attitude)
+    allowed = tolerance * max(1.0, motion.growth) * stepper.steps
+    check_error(motion, np.array(rows), np.array(turns) if attitude else None, allowed, what)
+
+
+def equations(scene: Scene) -> Callable[[Any, Any], Any]:
+    """Return the equations of motion of omega and attitude as a function for `solve_ivp`."""
+    torque: Any = scene.torque
+    tape = (of_law(torque) if isinstance(torque, TorqueLaw) else torque).tape
+
+    def rates(t: Any, y: Any) -> Any:
+        omega, q = y[:3], list(y[3:])
+        push = np.array(torque_of(tape, t, omega, q))
+        if scene.inertia is not None:
+            inertia = np.array(scene.inertia)
+            turned: Any = np.linalg.inv(inertia) @ (push - np.cross(omega, inertia @ omega))
+        else:
+            products = np.array([omega[1] * omega[2], omega[2] * omega[0], omega[0] * omega[1]])
+            turned = np.array(scene.euler_coefficients) * products
+            turned = turned + push / np.array(scene.moments or (1.0, 1.0, 1.0))
+        return [*turned, *quaternion_rates(omega, q)]
+
+    return rates
+
+
+def by_solve_ivp(method: str, motion: Motion, tolerance: float, attitude: bool, what: str) -> None:
+    """Check the method for SciPy's function, whose tolerances are those of a step."""
+    start = [*motion.scene.omega, *(motion.scene.attitude or IDENTITY)]
+    found = solve_ivp(
+        equations(motion.scene), (0.0, motion.times[-1]), start, method=Taylor,
+        t_eval=motion.times, rtol=tolerance,
+        atol=[tolerance * motion.largest] * 3 + [tolerance] * 4,
+    )  # fmt: skip
+    assert found.success, what
+    y = found.y.T
+    turns = y[:, 3:] / np.linalg.norm(y[:, 3:], axis=1)[:, None]
+    allowed = 2.0 * tolerance * max(1.0, motion.growth) * (1.0 + found.nfev)
+    check_error(motion, y[:, :3], turns, allowed, what)
+
+
+Entry = Callable[[str, Motion, float, bool, str], None]
+OURS = ("auto", "taylor", "closed-form")
+ENTRIES: dict[str, tuple[Entry, tuple[str, ...], tuple[bool, ...]]] = {
+    "solve": (by_solve, OURS, (False, True)),
+    "Gauss collocation": (by_solve, GAUSS, (False,)),
+    "methods of SciPy": (by_solve, SCIPY_METHODS, (True,)),
+    "dense output": (by_dense_output, OURS, (False, True)),
+    "prepare": (by_call, (*OURS, "quick"), (False, True)),
+    "Stepper": (by_stepper, ("taylor",), (False, True)),
+    "solve_ivp": (by_solve_ivp, ("taylor",), (True,)),
+}
+
+
+def is_for(entry: str, kind: str, scene: Scene) -> bool:
+    """Return whether an entry point takes a scene that its method takes."""
+    if entry in ("Stepper", "solve_ivp"):
+        breaks = getattr(getattr(scene.torque, "tape", None), "breaks", ())
+        # Neither adds waves of one frequency before it solves them.
+        is_able = scene.changing is None and kind != "cancelling"
+        return is_able and not (entry == "solve_ivp" and breaks)
+    return True
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("entry", ENTRIES)
+def test_errors_are_within_the_tolerance(entry: str, kind: str) -> None:
+    check, methods, attitudes = ENTRIES[entry]
+    checked = 0
+    for name, motion in islice(motions(kind).items(), _FEW if methods is SCIPY_METHODS else None):
+        for method in methods:
+            for attitude in attitudes:
+                if not (
+                    takes(method, motion.scene, attitude) and is_for(entry, kind, motion.scene)
+                ):
+                    continue
+                for tolerance in _SCIPY.get(method, TOLERANCES):
+                    if tolerance >= REGISTRY[method].finest:
+                        what = f"{entry}, {method}, {name}" + ", attitude" * attitude
+                        check(method, motion, tolerance, attitude, what)
+                        checked += 1
+    if not checked:
+        pytest.skip("no scene of this kind is for this entry point")
+
+
+def alone(scene: Scene) -> bool:
+    """Return whether a scene of a list is solved without the others."""
+    return is_recorded(scene) or scene.torque.in_space
+
+
+# The kinds whose scenes are solved side by side, each in a lane of one call.
+LAWS = [kind for kind in KINDS if not any(alone(drawn()[0]) for drawn in KINDS[kind].values())]
+
+
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+@pytest.mark.parametrize("attitude", [False, True])
+@pytest.mark.parametrize("by_moments", [False, True])
+def test_many_bodies_side_by_side(
+    by_moments: bool, attitude: bool, tolerance: float, level: int
+) -> None:
+    rows = [
+        (name, motion)
+        for kind in LAWS
+        for name, motion in motions(kind).items()
+        if (motion.scene.coefficients is None) == by_moments
+    ]
+    scenes = [
+        replace(
+            motion.scene,
+            attitude=motion.scene.attitude or IDENTITY if attitude else None,
+            step_size=0.01,
+        )
+        for _, motion in rows
+    ]
+    times = [motion.times[-1] for _, motion in rows]
+    found = solve_many(scenes, times, tolerance=tolerance, estimates=True)
+    assert found.error is not None
+    for row, (name, motion) in enumerate(rows):
+        assert found.ended[row] in _ENDED, name
+        turns = None if found.attitude is None else found.attitude[row]
+        estimate = float(found.error[row])
+        check_error(motion, found.omega[row], turns, tolerance, name, estimate=estimate)
+
+
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in LAWS])
+def test_many_bodies_under_one_torque(kind: str, tolerance: float, level: int) -> None:
+    for name, motion in motions(kind).items():
+        scene = replace(motion.scene, attitude=motion.scene.attitude or IDENTITY)
+        starts = np.tile(scene.omega, (9, 1))
+        found = solve_many(scene, motion.times[-1], omega0=starts, tolerance=tolerance)
+        assert found.attitude is not None
+        assert found.ended[8] in _ENDED, name
+        check_error(motion, found.omega[8], found.attitude[8], tolerance, name)

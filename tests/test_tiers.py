@@ -1,0 +1,40 @@
+"""A long test without the mark fails in the fast tier alone, and says what to do."""
+
+from pathlib import Path
+
+import pytest
+
+from tests import tiers
+
+TESTS = """
+import pytest, time
+def busy():
+    begin = time.process_time()
+    while time.process_time() < begin + 0.1: pass
+def test_long(): busy()
+@pytest.mark.campaign
+def test_marked(): busy()
+def test_short(): pass
+"""
+
+
+@pytest.mark.parametrize(
+    ("mark", "passed", "failed"),
+    [(["-m", tiers.FAST], ["test_short"], ["test_long"]),
+     ([], ["test_long", "test_marked", "test_short"], [])],
+)  # fmt: skip
+def test_a_long_test_is_marked(
+    mark: list[str], passed: list[str], failed: list[str],
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.setattr(tiers, "LIMIT", 0.05)
+    monkeypatch.setattr(tiers, "_slowness", lambda: 1.0)
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = campaign\n")
+    (tmp_path / f"test_{len(mark)}.py").write_text(TESTS)
+    pytest.main(
+        [str(tmp_path), "-p", "no:cacheprovider", "-p", "no:zarr", "-v", *mark], plugins=[tiers]
+    )
+    said = capsys.readouterr().out
+    for outcome, names in (("PASSED", passed), ("FAILED", failed)):
+        assert [name for name in names if f"{name} {outcome}" not in said] == []
+    assert ("mark it with @pytest.mark.campaign" in said) == bool(failed)

@@ -1,7 +1,6 @@
-"""The build backend: meson-python's, but it refuses an editable install that no import survives.
+"""The build backend: meson-python's, but it refuses an editable install in build isolation.
 
-An editable install runs ninja at each import, with the NumPy that it was configured with. Both are
-of the isolated environment that pip, or uv, removes when the installation is done.
+At each import such an install runs ninja and NumPy of an environment that has been removed by then.
 """
 
 import subprocess
@@ -10,38 +9,22 @@ from pathlib import Path
 from typing import Any
 
 import mesonpy
-from mesonpy import (
-    build_editable,
-    build_sdist,
-    build_wheel,
-    get_requires_for_build_sdist,
-    get_requires_for_build_wheel,
-)
 
-__all__ = [
-    "build_editable", "build_sdist", "build_wheel", "get_requires_for_build_editable",
-    "get_requires_for_build_sdist", "get_requires_for_build_wheel",
-]  # fmt: skip
+
+def __getattr__(name: str) -> Any:
+    return getattr(mesonpy, name)
 
 
 def get_requires_for_build_editable(config_settings: dict[str, Any] | None = None) -> list[str]:
     """Return what an editable install needs; SystemExit, with one line, in isolation."""
-    if _isolated():
-        print(
+    # uv makes an environment of its own; pip adds a folder to the path of this process alone.
+    isolated = Path(sys.prefix).parent.name.startswith("builds-v")
+    command = [sys.executable, "-E", "-c", "import mesonpy; print(mesonpy.__file__)"]
+    later = subprocess.run(command, capture_output=True, text=True, check=False)
+    if isolated or later.stdout.strip() != mesonpy.__file__:
+        sys.exit(
             "an editable install needs its build tools at each import, and build isolation removes "
             "them: run 'make .venv/ready', or 'pip install --group build && "
             "pip install --no-build-isolation --editable .'"
         )
-        raise SystemExit(1)
-    needed: list[str] = mesonpy.get_requires_for_build_editable(config_settings)
-    return needed
-
-
-def _isolated() -> bool:
-    """Whether the build tools are in an environment that is removed after the build."""
-    # uv makes an environment of its own; pip adds a folder to the path of this process alone.
-    if Path(sys.prefix).parent.name.startswith("builds-v"):
-        return True
-    command = [sys.executable, "-E", "-c", "import mesonpy; print(mesonpy.__file__)"]
-    later = subprocess.run(command, capture_output=True, text=True, check=False)
-    return later.stdout.strip() != mesonpy.__file__
+    return mesonpy.get_requires_for_build_editable(config_settings)

@@ -204,7 +204,7 @@ def test_guard_knows_an_infinity_that_was_given(guarded_entry: Guarded) -> None:
 @pytest.mark.external
 @pytest.mark.skipif(not (ROOT / ".ci/flang").exists(), reason="needs a checkout")
 @pytest.mark.parametrize(
-    ("named", "words"), [("", "no flang, and none could be installed"), ("none", "no 'none'")]
+    ("named", "words"), [("", "no 'flang', and none was installed"), ("none", "no 'none'")]
 )
 def test_flang_that_can_not_be_had_is_one_line(named: str, words: str, tmp_path: Path) -> None:
     """The cross-check shows the line and continues."""

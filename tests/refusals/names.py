@@ -29,4 +29,4 @@ BRICK = Scene("brick", (0.1, 1.0, 0.2), moments=(1.0, 2.0, 2.5))
 IN_SPACE = replace(BRICK, torque=TorqueLaw((1.0, 0.0, 0.0), frame="space"))
 # For the method `averaged`.
 WEAK = replace(BRICK, omega=(0.3, 0.2, 1.1), torque=TorqueLaw((1e-6, 2e-6, 1e-6)))
-SHRINKING = replace(BRICK, moments=ChangingMoments([[9.0], [8.0, -0.4], [7.0]]))
+SHRINKING = Scene("shrinking", BRICK.omega, ChangingMoments([[9.0], [8.0, -0.4], [7.0]]))

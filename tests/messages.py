@@ -19,37 +19,37 @@ def catalogue() -> str:
     lines = {
         f"{path.relative_to(ROOT / 'pyharness')}: {message}"
         for path, tree in _trees().items()
-        for message in _messages(tree)
+        for message in _messages(tree, {**_constants(), **_of_module(tree)})
     }
     return "".join(f"{line}\n" for line in sorted(lines))
 
 
-def _messages(tree: ast.Module) -> Iterator[str]:
+def _messages(tree: ast.Module, constants: dict[str, ast.expr]) -> Iterator[str]:
     for node in ast.walk(tree):
         name = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
         if isinstance(node, ast.Call) and name in _ERRORS and node.args:
             if name == "unknown":
-                what, name, allowed, *where = (_text(each) for each in node.args)
+                what, name, allowed, *where = (_text(each, constants) for each in node.args)
                 place = "".join(f"{each}: " for each in where)
                 yield f"{place}unknown {what} '{name}'; allowed: {allowed}"
                 continue
-            text = _text(node.args[0])
+            text = _text(node.args[0], constants)
             # A message that another function composed is listed where it is composed.
             if not (text.startswith("{") and text.endswith("}") and text.count("{") == 1):
                 yield text
 
 
-def _text(node: ast.expr) -> str:
+def _text(node: ast.expr, constants: dict[str, ast.expr]) -> str:
     if isinstance(node, ast.Constant):
         return str(node.value)
     if isinstance(node, ast.JoinedStr):
-        return "".join(_text(each) for each in node.values)
+        return "".join(_text(each, constants) for each in node.values)
     if isinstance(node, ast.FormattedValue):
-        return _text(node.value)
+        return _text(node.value, constants)
     if isinstance(node, ast.BinOp) and _is_text(node.left):
-        return _text(node.left) + _text(node.right)
-    if isinstance(node, ast.Name) and node.id in _constants():
-        return _text(_constants()[node.id])
+        return _text(node.left, constants) + _text(node.right, constants)
+    if isinstance(node, ast.Name) and node.id in constants:
+        return _text(constants[node.id], constants)
     return f"{{{ast.unparse(node)}}}"
 
 
@@ -66,10 +66,13 @@ def _trees() -> dict[Path, ast.Module]:
 
 @cache
 def _constants() -> dict[str, ast.expr]:
-    """Return the texts that modules give to a name in capitals."""
+    """Return the texts that modules give to a name in capitals, which others may import."""
+    return {name: text for tree in _trees().values() for name, text in _of_module(tree).items()}
+
+
+def _of_module(tree: ast.Module) -> dict[str, ast.expr]:
     return {
         target.id: node.value
-        for tree in _trees().values()
         for node in tree.body
         if isinstance(node, ast.Assign)
         for target in node.targets

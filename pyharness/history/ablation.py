@@ -1,7 +1,7 @@
 """The effects of the defects of the programs on the errors of a run.
 
-Each defect is corrected alone and kept alone, and every subset of the defects is run. The errors
-are against the reference solution.
+Each defect is corrected alone and kept alone, and every subset is run. Errors are against the
+reference solution.
 """
 
 import math
@@ -27,11 +27,8 @@ from pyharness.truth.reference import Reference, reference
 class Effect:
     """The outcome of one listing on one scene: its largest errors, and how the run ended.
 
-    A listing is a program with a choice of its defects. `omega` (rad/s) and `velocity`
-    (translational, m/s) are the largest errors of any component over the completed `steps`, against
-    the reference solution. `ended` is how the run ended, for example ``complete`` or ``overflow``.
-    `stop` is the variable and step at which the Lipschitz test of the Runge-Kutta program ended the
-    run, or None.
+    `omega` (rad/s) and `velocity` (translational, m/s) are over the completed `steps`; `stop` is
+    where the Lipschitz test ended the run, if it did.
     """
 
     listing: Listing
@@ -46,11 +43,8 @@ class Effect:
 class CaseEffects:
     """The effect of one apparatus entry in one program and case, shown by four listings.
 
-    An apparatus entry describes, for example, one defect of the printed programs. A listing is a
-    program with a choice of its defects. The four listings are the original program, the original
-    with this entry alone corrected, the corrected program with this entry alone kept, and the
-    corrected program. For an interpretation of a doubtful card, or an assumption where no card
-    exists, `effects_of` describes the listings.
+    They are the original, the original with this entry alone corrected, the corrected with it alone
+    kept, and the corrected.
     """
 
     program: str
@@ -62,11 +56,9 @@ class CaseEffects:
 
 
 def entries(kind: str | None = None) -> list[dict[str, Any]]:
-    """Return the apparatus entries of one kind, as in `data/apparatus.toml`; None means all kinds.
+    """Return the apparatus entries of one kind (None: of all), as in `data/apparatus.toml`.
 
-    An apparatus entry describes a doubtful or faulty passage of the printed programs. `kind` is,
-    for example, ``defect``, or ``reading`` (an interpretation of a doubtful card). Raise InputError
-    if no entry has that kind.
+    Raise InputError if no entry has that kind.
     """
     everything: list[dict[str, Any]] = facts("apparatus")["entry"]
     kinds = sorted({entry["kind"] for entry in everything})
@@ -76,10 +68,7 @@ def entries(kind: str | None = None) -> list[dict[str, Any]]:
 
 
 def entry(name: str) -> dict[str, Any]:
-    """Return the apparatus entry with the identifier `name`; raise InputError if none has it.
-
-    An apparatus entry describes a doubtful or faulty passage of the printed programs.
-    """
+    """Return the apparatus entry `name`; raise InputError if there is none."""
     by_name = {each["id"]: each for each in entries()}
     if name not in by_name:
         raise unknown("entry", name, list(by_name))
@@ -89,8 +78,7 @@ def entry(name: str) -> dict[str, Any]:
 def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0) -> Effect:
     """Run a listing on a scene, and return its largest errors and how the run ended.
 
-    A listing is a program with a choice of its defects. `truth` is the reference solution at the
-    end of each step of the scene, with the translational velocity. `effort` is a factor on the work
+    `truth` is at the end of each step, with translational velocity; `effort` multiplies the work
     limit.
     """
     run = run_program(scene, listing, effort=effort)
@@ -101,11 +89,7 @@ def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0
 
 @cache
 def case_truth(case: int) -> Reference:
-    """Return the reference solution of a case at the end of each step, with translational velocity.
-
-    `case` is the number of one of the seven cases in Table 1 of the thesis. The solution is
-    computed once and cached.
-    """
+    """Return the reference solution of a case at its steps, with translational velocity; cached."""
     scene = case_scene(case)
     return reference(scene, scene.times(), velocity=True)
 
@@ -113,11 +97,8 @@ def case_truth(case: int) -> Reference:
 def effects_of(name: str) -> Iterator[CaseEffects]:
     """Yield the effect of the apparatus entry `name` in each of its programs, case by case.
 
-    The entry must have a switch in the programs. The effect is shown by four listings (versions of
-    the program), which `CaseEffects` describes for a defect. For a reading (interpretation of a
-    doubtful card) or a conjecture (assumption where no card exists), the fields `original` and
-    `corrected_alone` have the original program with and without the entry. The fields `kept_alone`
-    and `corrected` have the corrected program with and without the entry.
+    For a reading or a conjecture, `original` and `corrected_alone` have the original with and
+    without it, `kept_alone` and `corrected` the corrected program.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -145,11 +126,8 @@ def lattice(
 ) -> list[Effect]:
     """Return the outcomes of a program with every subset of its defects, largest error first.
 
-    The errors are of omega against the reference solution, and an overflow counts as infinite. The
-    subsets also include or omit each of the `readings` (interpretations of doubtful cards). If the
-    torque varies, they also include or omit the original program's conjectures (assumptions where
-    no card exists). A reading of a statement has no effect if a defect of this statement is
-    corrected. `effort` is a factor on the work limit.
+    An overflow is infinite. Each of `readings`, and of the original's conjectures if the torque
+    varies, is in or out as well. A reading has no effect if a defect of its statement is corrected.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
@@ -159,12 +137,7 @@ def lattice(
 
 
 def switched(scene: Scene, program: str) -> tuple[str, ...]:
-    """Return the names of the program's defects and conjectures that can affect a run on a scene.
-
-    A conjecture is an assumption about a torque statement for which no card exists. Under a
-    constant torque only defects can affect the run, because the conjectures are about varying
-    torques.
-    """
+    """Return the defects and, for a varying torque, the conjectures of a program."""
     return switches(program) if scene.torque.varies else names_of("defect", program)
 
 

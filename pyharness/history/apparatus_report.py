@@ -39,11 +39,7 @@ _HALF = 48  # width, in characters, of each of two texts printed side by side
 
 
 def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
-    """Return the report of the critical apparatus, with a line for each entry.
-
-    An entry describes a doubtful or faulty passage of the printed programs. The line of an entry
-    has its name, kind, certainty, flag (number of the switch in the programs) and summary.
-    """
+    """Return the report of the critical apparatus, with a line for each entry."""
     rows = [
         [each["id"], each["kind"], each["certainty"], each.get("flag", "-"), each["summary"]]
         for each in entries
@@ -59,12 +55,7 @@ def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
 def entry_report(
     entry: dict[str, Any], effects: Sequence[CaseEffects], names: Sequence[str] = FIELDS
 ) -> Report:
-    """Return the report of one entry of the critical apparatus, and of its effect on the errors.
-
-    An entry describes a doubtful or faulty passage of the printed programs. `names` are the fields
-    of the entry that are shown. `effects` has the effect for each program and case, and is empty if
-    no effect is to be shown.
-    """
+    """Return the report of one entry with the fields `names`, and of its effect if any is given."""
     cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
     what = {each["siglum"]: each["what"] for each in facts("cards/scan")["ground"]}
     grounds = "; ".join(f"{siglum}, {what[siglum]}" for siglum in entry["grounds"])
@@ -87,23 +78,16 @@ def entry_report(
 
 
 def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
-    """Return lines with two of the `texts` side by side.
-
-    Two further arguments, `heads`, are the keys of the two texts to show, and also the headings
-    above them.
-    """
+    """Return lines with two of the `texts` side by side; `heads` are their keys and headings."""
     columns = [[head, "-" * _HALF, *textwrap.wrap(texts[head], _HALF)] for head in heads]
     pairs = zip_longest(*columns, fillvalue="")
     return [Line(f"{a.ljust(_HALF)}   {b}".rstrip()) for a, b in pairs]
 
 
 def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
-    """Return a legend, and for each program a table of the errors of four of its versions.
+    """Return a legend, and for each program a table of the errors of its four listings by case.
 
-    A table has a row for each case. A row also shows where the Lipschitz test stopped a run.
-    `is_reading` is true if the effects are those of an interpretation of a doubtful card, or of an
-    assumption where no card exists. The legend then describes the listings as original and
-    corrected, each with and without it.
+    `is_reading`: the entry is a reading or conjecture, and the listings are with and without it.
     """
     columns = ("original", "this alone corrected", "this alone kept", "all corrected")
     if is_reading:
@@ -129,10 +113,7 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
 def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
     """Return the report of every subset of each program's defects, with the errors it causes.
 
-    `scene` is the scene that was run. `found` maps each program to its outcomes, in the order in
-    which the report shows them. The report writes a subset as letters: one for each defect, reading
-    (interpretation of a doubtful card) or conjecture (assumption where no card exists) that the
-    program has in this run.
+    A subset is written as letters, one for each defect, reading or conjecture in this run.
     """
     text: list[Section] = []
     rows = []

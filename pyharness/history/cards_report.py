@@ -23,12 +23,7 @@ _HALF = 48  # width, in characters, of each of two texts printed side by side
 
 
 def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
-    """Return the report of `cards` of the printed programs, with a block of lines for each card.
-
-    A block shows the card, its line in the scan, and the corresponding lines of the Fortran port
-    and of the Python version, the twin. The apparatus entries that name the card follow; they
-    describe doubtful or faulty passages. `title` is the name of the command that shows the report.
-    """
+    """Return the report of `cards`: each with its scan line, Fortran, twin and entries."""
     rows = [
         [each.program, each.number, each.statement, each.scan, " ".join(each.entries)]
         for each in cards
@@ -42,11 +37,9 @@ def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
 
 
 def card_record(card: Card) -> dict[str, Any]:
-    """Return a card of a printed program as a JSON record, with its lines in Fortran and Python.
+    """Return a card as a JSON record, with its lines in Fortran and Python.
 
-    The keys `fortran` and `twin` have the corresponding lines of our Fortran and Python versions.
-    The value of the key `scan` is the card's line in the scan if it differs from the card. It is
-    null if the scan agrees with the card, and empty if the scan lacks the card.
+    `scan` is null if the scan agrees with the card, and empty if it lacks the card.
     """
     found = deck(card.program)
     scan = (card.scan or "") if card.deviates else None
@@ -67,13 +60,10 @@ def card_record(card: Card) -> dict[str, Any]:
 def scan_report(
     faults: Sequence[str], undeclared: Sequence[str], lines: int, digest: str
 ) -> Report:
-    """Return the report on whether our text of the programs explains every line of a scan of them.
+    """Return the report on whether our text of the programs explains every line of a scan.
 
-    The text is our tables of the cards and of their differences from the scan. `faults` has a
-    sentence for each line in which the scan and these tables disagree. `undeclared` has a sentence
-    for each disagreement between the cards and the apparatus entries, which describe doubtful or
-    faulty cards. `lines` is the number of lines that the tables expect, and `digest` the SHA-256 of
-    the scan.
+    `faults` are lines in which scan and tables disagree, `undeclared` disagreements of cards and
+    apparatus; `lines` is the expected number, `digest` the SHA-256 of the scan.
     """
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)
@@ -103,14 +93,7 @@ def scan_report(
 
 
 def classes_report() -> Report:
-    """Return a report that counts the entries of the apparatus, and the cards they name, by kind.
-
-    An entry describes a doubtful or faulty passage of the printed programs. There is a row for each
-    kind of entry, such as `defect`. The first columns count the entries, and the entries with a
-    flag (a switch in the programs). The next columns count, for each program, the cards that the
-    entries name. The last column counts the passages in which the scan differs from our text
-    because of such an entry.
-    """
+    """Return a report that counts the apparatus entries and the cards they name, by kind."""
     entries = facts("apparatus")["entry"]
     rows = []
     for kind in dict.fromkeys(each["kind"] for each in entries):

@@ -1,7 +1,4 @@
-"""The report of `cards --collate`: the three decks compared with each other and with the thesis.
-
-A deck is the cards of one program.
-"""
+"""The report of `cards --collate`: the three decks compared with each other and with the thesis."""
 
 from collections.abc import Sequence
 
@@ -17,12 +14,7 @@ _COLUMNS = (
 
 
 def collation_report(found: Sequence[Row]) -> Report:
-    """Return the report on whether the three decks agree with each other and with the thesis.
-
-    A deck consists of the cards of one of the three programs. Each row of `found` is one operation
-    of the programs. It states whether the decks' statements agree, whether they agree with the text
-    of the thesis, and the reason for any disagreement.
-    """
+    """Return the report of the rows: for each operation, whether the texts agree."""
     told = faults([*found])
     rows = [
         [

@@ -49,9 +49,8 @@ _END: dict[str, Any] = {
 class FigurePlan:
     """A figure of the thesis that is drawn again: its case and the programs whose curves it shows.
 
-    `number` and `part` are those of the figure in the thesis; `part` is `A`, `B` or empty. `set` is
-    ``original`` or ``corrected``, for the programs as printed or as corrected. `caption` is our own
-    text. `source` is the place in the thesis that supports the choice of programs.
+    `part` is `A`, `B` or empty. `caption` is ours; `source` is the place that supports the choice
+    of programs.
     """
 
     number: int
@@ -91,10 +90,7 @@ class Curve:
 
     @property
     def ending(self) -> str:
-        """Return text that states at which step and why the program ended early, or an empty text.
-
-        The text is empty if the program ran all steps.
-        """
+        """Return at which step and why the program ended early, or an empty text."""
         run = self.trajectory
         if run.stop is not None:
             return f"stopped at step {run.stop.step} by {run.stop.variable}"
@@ -102,21 +98,13 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Return the curve's label in a legend: the program, and where and why its run ended early.
-
-        The label of a complete run is the name of the program alone.
-        """
+        """Return the curve's label in a legend: the program, and where and why it ended early."""
         return self.listing.program + (f" ({self.ending})" if self.ending else "")
 
 
 @dataclass(frozen=True, eq=False)
 class FigureFinding:
-    """A figure with everything that is drawn: the scene, the reference solution and the curves.
-
-    `plan` states which programs the figure shows. The curve of a program ends where its run ended.
-    If `limit` is not None, it is a label and omega (rad/s) over time: the function to which one of
-    the programs converges as its step size goes to zero.
-    """
+    """A figure with everything that is drawn: the scene, the reference solution and the curves."""
 
     plan: FigurePlan
     scene: Scene
@@ -126,10 +114,7 @@ class FigureFinding:
 
 
 def plans() -> list[FigurePlan]:
-    """Return the plans of all figures to be drawn, first the figures of the original programs.
-
-    A plan states the number, the case and the programs of a figure.
-    """
+    """Return the plans of all figures to be drawn, first the figures of the original programs."""
     return [
         FigurePlan(
             entry["number"], entry.get("part", ""), each, entry["case"], tuple(entry[each]),
@@ -141,10 +126,7 @@ def plans() -> list[FigurePlan]:
 
 
 def findings() -> Iterator[FigureFinding]:
-    """Compute the curves and the reference solution of each figure, and yield the figures.
-
-    The figures are in the order of `plans`, and nothing is drawn.
-    """
+    """Compute the figures in the order of `plans`; nothing is drawn."""
     truths: dict[int, Reference] = {}
     for plan in plans():
         scene = case_scene(plan.case)
@@ -158,12 +140,7 @@ def findings() -> Iterator[FigureFinding]:
 def _limit(
     plan: FigurePlan, scene: Scene, truths: dict[int, Reference]
 ) -> tuple[str, Array] | None:
-    """Return the label and the omega (rad/s) of a program's limit that a figure shows, or None.
-
-    The limit is the omega to which a program converges as its step size goes to zero. Only figures
-    of the original programs show a limit, and not all of them. `plan` describes the figure, and
-    `truths` has the reference solutions by number of the case.
-    """
+    """Return the label and the omega (rad/s) of a program's limit, if the figure shows one."""
     asked = {entry["number"]: entry.get("limit_of") for entry in facts("figures")["figure"]}
     program = asked[plan.number]
     if program is None or plan.set != "original":
@@ -228,10 +205,7 @@ def _from_zero(values: Array, start: Array | float = 0.0) -> Array:
 
 
 def figure_picture(finding: FigureFinding) -> Picture:
-    """Draw a figure: omega of each program over time, in front of the reference solution.
-
-    There is a plot for each of the three components of omega.
-    """
+    """Draw a figure: each omega of the programs over time, in front of the reference solution."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 8.6), dpi=110, layout="constrained")
@@ -266,10 +240,8 @@ def figure_picture(finding: FigureFinding) -> Picture:
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
     """Draw omega1 of a figure of the original programs and of a corrected figure in one picture.
 
-    The figure of the original programs, `first`, must contain a limit: the curve to which a program
-    converges as its step size goes to zero. This limit shows approximately how omega1 of a run that
-    ended early would have continued. Of the figure of the corrected programs, `second`, only the
-    last curve is drawn, because its other curves would cover the same line.
+    The limit in `first` shows about how a run that ended early would have continued. Of `second`
+    only the last curve is drawn; the others would cover the same line.
     """
     from matplotlib.figure import Figure
 
@@ -321,11 +293,10 @@ def _draw(
 
 
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
-    """Return the bottom and top (rad/s) of the vertical axis in the plot of one omega component.
+    """Return the bottom and top (rad/s) of the plot of one omega component.
 
-    `row` is the component: 0, 1 or 2. The range contains the reference solution and the curves of
-    `finding`. A curve counts as diverging if its distance from the reference's range of values
-    exceeds the largest |omega| of the reference. Such a curve may leave the plot.
+    They contain the reference and the curves, except that a curve may leave the plot if its
+    distance from the reference's range exceeds the largest |omega|.
     """
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())

@@ -1,7 +1,7 @@
 """Software Heritage identifiers (SWHIDs) of files, folders and cards, computed offline.
 
-A SWHID (ISO/IEC 18670) names a file or a folder by a SHA-1 hash of its content. Anyone who has the
-content can compute the identifier again, and the archive Software Heritage finds a copy by it.
+A SWHID (ISO/IEC 18670) names a file or a folder by a SHA-1 hash of its content, that of git's blob
+or tree. Anyone who has the content can compute it again, and the archive finds a copy by it.
 """
 
 from collections.abc import Collection, Mapping
@@ -19,44 +19,28 @@ DATA = "pyharness/data"
 
 
 def content_identifier(content: bytes) -> str:
-    """Return the SWHID of a file with the bytes `content`, which begins with ``swh:1:cnt:``.
-
-    The hash in the identifier is the hash that git gives to the same file, as a blob.
-    """
+    """Return the SWHID of a file, which begins with ``swh:1:cnt:``."""
     return f"swh:1:cnt:{_hash('blob', content).hex()}"
 
 
 def directory_identifier(files: Mapping[str, bytes], executable: Collection[str] = ()) -> str:
-    """Return the SWHID of a folder with the given files, which begins with ``swh:1:dir:``.
+    """Return the SWHID of a folder, which begins with ``swh:1:dir:``, by the paths of its files.
 
-    The hash in the identifier is the hash that git gives to the same folder, as a tree.
-
-    Parameters
-    ----------
-    files : mapping of str to bytes
-        The content of each file by its path in the folder, as in ``cards/scan.toml``. The folder
-        can contain neither links nor empty folders.
-    executable : collection of str, optional
-        The paths of the files that are executable.
+    The folder can contain neither links nor empty folders.
     """
     return f"swh:1:dir:{_tree(files, executable).hex()}"
 
 
 def identifier_of_lines(identifier: str, first: int, last: int | None = None) -> str:
-    """Return the SWHID `identifier` of a file, qualified by a range of its lines.
-
-    `first` and `last` are line numbers, counted from 1. Without `last`, the identifier names the
-    line `first` only.
-    """
+    """Return the SWHID of a file, qualified by a line or a range of lines, counted from 1."""
     return f"{identifier};lines={first}" + ("" if last is None else f"-{last}")
 
 
 @cache
 def source_files() -> dict[str, bytes]:
-    """Return the files of the edition's data and of the Fortran port, by their path in the source.
+    """Return the files of the edition's data and of the Fortran port, by path in the repository.
 
-    The path is that in the source repository, as in ``pyharness/data/apparatus.toml``. The result
-    is the same in an installed package, which has some of the files in other places.
+    An installed package has some of them in other places, and gives the same result.
     """
     folder = facts_folder()
     found = {
@@ -70,10 +54,7 @@ def source_files() -> dict[str, bytes]:
 
 
 def data_identifier() -> str:
-    """Return the SWHID of the folder `DATA`, the data of the edition, as in the source repository.
-
-    The folder has the cards, the apparatus, the claims and the other facts of the edition.
-    """
+    """Return the SWHID of the folder `DATA`, as in the source repository."""
     data = Path(DATA)
     return directory_identifier(
         {
@@ -85,20 +66,14 @@ def data_identifier() -> str:
 
 
 def card_identifier(card: Card) -> str:
-    """Return the SWHID of a card: that of its deck's file, qualified by the line of the card.
-
-    The file is ``cards/<program>.toml`` in the folder `DATA`.
-    """
+    """Return the SWHID of a card: that of ``cards/<program>.toml``, qualified by its line."""
     content = source_files()[f"{DATA}/cards/{card.program}.toml"]
     return identifier_of_lines(content_identifier(content), card_lines(content)[card.number])
 
 
 @cache
 def card_lines(content: bytes) -> dict[int, int]:
-    """Return the line, counted from 1, of each card in the file of a deck, by card number.
-
-    `content` is the content of the file, in which each card has a line of its own.
-    """
+    """Return the line, counted from 1, of each card in the file of a deck, by card number."""
     lines = enumerate(content.decode().splitlines(), 1)
     keys = ((line.partition(" = ")[0], number) for number, line in lines)
     return {int(key): number for key, number in keys if key.isdigit()}
@@ -110,7 +85,7 @@ def _hash(kind: str, content: bytes) -> bytes:
 
 
 def _tree(files: Mapping[str, bytes], executable: Collection[str]) -> bytes:
-    """Return the hash of a folder as a git tree. The arguments are as in `directory_identifier`."""
+    """Return the hash of a folder as a git tree, as `directory_identifier` takes it."""
     folders: dict[str, dict[str, bytes]] = {}
     entries = []
     for path, content in files.items():

@@ -1,9 +1,9 @@
 """The limits of the original programs as the step size goes to zero.
 
 With ever smaller steps an original program may converge to the solution of Euler's equations, to
-another function of time, or to no function. docs/article/article.md derives these limits. This
-module computes each limit independently of the programs, and compares the programs with their
-limits while the step is halved.
+another function of time, or to no function (docs/article/article.md). Each limit is computed
+independently of the programs, which are compared with it while the step is halved. `effort`
+multiplies the work limit of some ten seconds.
 """
 
 import math
@@ -46,11 +46,9 @@ Rate = Callable[[float, Sequence[float]], list[float]]
 
 @dataclass(frozen=True)
 class Halving:
-    """The distances of one run from the limit of its program and from the reference solution.
+    """The largest distances (rad/s) of one run from the limit and from the reference solution.
 
-    The limit is the omega to which the program converges as its step size goes to zero. Each
-    distance is the largest difference of any omega component (rad/s) at the scene's times. The run
-    has the step size `step_size` (s). Both distances are infinite after an overflow.
+    They are infinite after an overflow.
     """
 
     step_size: float
@@ -62,11 +60,8 @@ class Halving:
 class Limit:
     """The limit of an original program as the step size goes to zero, and the order of convergence.
 
-    `program` is the program as printed, and `tends_to` describes its limit. `halvings` has the
-    distances of a run from the limit for each step size, the largest first. `order` is the measured
-    order of convergence to the limit, computed from the last two runs. It is None if their distance
-    from the limit is rounding error alone, if one of them overflows, or if there is no limit. It is
-    also None if the limit is unbounded at the time `blow_up` (s).
+    `halvings` are by step size, the largest first. `order` is from the last two; None if one is
+    rounding or overflows, without a limit, or if the limit is unbounded at `blow_up` (s).
     """
 
     program: str
@@ -89,11 +84,8 @@ class Limit:
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
     """Measure how an original program, without its stop test, converges to its limit.
 
-    `program` runs as printed. The limit is the omega to which it tends as its step size goes to
-    zero. The step size of the scene is halved `halvings` times, with one run for each step size. If
-    the torque varies with time, the collocation programs have no limit, and the limit of the
-    Runge-Kutta program is computed by integrating differential equations for it. Raise InputError
-    if a run exceeds the work limit (some ten seconds, multiplied by `effort`).
+    Under a varying torque the collocation programs have no limit, and that of the Runge-Kutta
+    program is integrated. Raise InputError if a run exceeds the work limit.
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
@@ -124,24 +116,14 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
 def limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float = 1.0
 ) -> Array:
-    """Return the limit of an original program's omega (rad/s) as its step size goes to zero.
-
-    The shape is (times, 3); rows are NaN where the program has no limit. `program` is the program
-    as printed. `truth` is the reference solution at `times` (s). `effort` multiplies the work limit
-    of some ten seconds.
-    """
+    """Return the limit of an original program's omega (rad/s), shape (times, 3), or NaN."""
     return _limit_solution(program, scene, times, truth, effort)[0]
 
 
 def _limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float
 ) -> tuple[Array, str, float | None]:
-    """Return the limit of an original program, its description, and its blow-up time (s) or None.
-
-    The limit is the omega (rad/s) to which the program as printed tends as its step size goes to
-    zero, at `times` (s), shape (times, 3). At the blow-up time it becomes unbounded. `truth` is the
-    reference solution at `times`, and `effort` multiplies the work limit of some ten seconds.
-    """
+    """Return the limit of an original program, its description, and its blow-up time (s)."""
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)
     if program == "runge-kutta":
@@ -161,16 +143,14 @@ def _limit_solution(
 def _extrapolated(scene: Scene) -> Rate:
     """Return the right-hand side of the two-term program's limit equation.
 
-    The solution of this equation is the omega to which the program tends as its step size h goes to
-    zero. The original program adds h to its interval length DT in every step. In step n the
-    collocation points are therefore t/3 and 2t/3 after the beginning of the step, with t = n h. Let
-    w be omega, F the right-hand side of Euler's equations at w, F' its Jacobian, and Q its
-    quadratic part. At the time s after the beginning of the step, the slope along the first
-    estimate is
+    The original program adds the step size h to its interval length DT in every step, so that in
+    step n the collocation points are t/3 and 2t/3 after the beginning of the step, with t = n h.
+    Let w be omega, F the right-hand side of Euler's equations at w, F' its Jacobian, and Q its
+    quadratic part. The slope along the first estimate, s after the beginning, is
 
     g(s) = F(w + s F) = F + s F' F + s^2 Q(F).
 
-    The right-hand side is the line through g(t/3) and g(2t/3), extrapolated to s = 0:
+    The line through g(t/3) and g(2t/3), extrapolated to s = 0, is
 
     2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
     """
@@ -188,11 +168,9 @@ def _extrapolated(scene: Scene) -> Rate:
 def _slow_slopes(scene: Scene) -> Rate:
     """Return the right-hand side of the Runge-Kutta program's limit equations, for varying torque.
 
-    The solution of these equations is the omega to which the program tends as its step size goes to
-    zero. Let p be the program's U(1), the omega at which it evaluates the first slopes of a step.
-    Let F be the right-hand side of Euler's equations. In every step of size h, p grows by h/2 F(p),
-    and the omega that the program prints by h F(p). The slopes are therefore taken at an omega that
-    changes at half speed. The state of the limit equations is p, then the printed omega.
+    Let p be what U(1) holds, at which the first slopes of a step are taken, and F the right-hand
+    side of Euler's equations. Each step of size h adds h/2 F(p) to p, and h F(p) to the printed
+    omega; so the slopes are at an omega of half speed. The state is p, then the printed omega.
     """
     right_hand_side = scene.right_hand_side()
 
@@ -206,13 +184,9 @@ def _slow_slopes(scene: Scene) -> Rate:
 def _solved(
     rate: Rate, start: list[float], times: Sequence[float], scale: float, effort: float
 ) -> tuple[Array, float | None]:
-    """Integrate a differential equation, with the right-hand side `rate`, from `start` at time 0.
+    """Return the solution at `times` (s), NaN after a blow-up, and the blow-up time (s) or None.
 
-    The solution is the limit of a program as its step size goes to zero. Return two values. The
-    first is the solution at `times` (s), shape (times, components), which is NaN after a blow-up.
-    The second is the time of the blow-up (s), or None. A blow-up is the growth of a component to a
-    million times `scale`, the largest omega of scene and reference (rad/s). `effort` multiplies the
-    work limit of some ten seconds.
+    `start` is at time 0. A blow-up is the growth of a component to a million times `scale` (rad/s).
     """
     from scipy.integrate import solve_ivp
 
@@ -248,10 +222,9 @@ def _solved(
 
 
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Return, by program, the names of the defects that change no omega of a scene beyond rounding.
+    """Return, by program, the defects that change no omega of a scene beyond rounding.
 
-    Such a defect is called invisible: its correction alone, with all other defects kept, changes
-    omega by rounding error at most, and changes neither the number of steps nor how the run ended.
+    The correction of such a defect alone also leaves the steps and the ending of the run.
     """
     found = {}
     for program in PROGRAMS:
@@ -274,12 +247,7 @@ def _same(first: Array, second: Array) -> bool:
 def limits_report(
     scene: Scene, found: Sequence[Limit], invisible: Mapping[str, Sequence[str]]
 ) -> Report:
-    """Return the report of `pyharness limits`: the programs' distances from their limits.
-
-    A limit is the omega to which an original program tends as its step size goes to zero. `found`
-    has, for each program, the distances by step size. `invisible` has, by program, the names of the
-    defects that do not change omega in this scene.
-    """
+    """Return the report of `pyharness limits`: the programs' distances from their limits."""
     text: list[Section] = [heading(scene)]
     data = []
     for each in found:

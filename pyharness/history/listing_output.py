@@ -1,7 +1,6 @@
 """A page printed by any machine, compared with the pages that our programs print.
 
-Our programs print their pages in each of several arithmetics. The digits that a machine printed,
-real or emulated, therefore show in which arithmetic its program ran.
+Our pages are printed in several arithmetics, so that the digits show in which one a program ran.
 """
 
 from collections.abc import Sequence
@@ -35,8 +34,7 @@ _LARGEST = 1 << 24  # largest size of a page's file, in bytes
 def read_page(path: str) -> list[list[str]]:
     """Return the lines of a printed page that contain only numbers, split into these numbers.
 
-    The page is the file `path`, as a program printed it. Raise InputError if no line has at least
-    six numbers.
+    Raise InputError if no line has at least six numbers.
     """
     where = f"--listing-output '{path}'"
     content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
@@ -56,13 +54,9 @@ def fits(
 ) -> list[Fit]:
     """Compare a page from another machine with those of our pages that have the same form.
 
-    `lines` are the lines of numbers of the page, from `read_page`. Our pages are printed by the
-    `programs` in the `cases`, with the `listings_of` each program, in every arithmetic that we
-    emulate. Two pages have the same form if their moments and torques (in the heading) and their
-    numbers of columns agree. Our runs have as many steps as the text of the thesis says, or as the
-    cards say if the page has more rows. Return the comparisons, sorted by the number of
-    differences, the smallest first. Raise InputError if none of our pages has the form of the page.
-    `progress` is called before each comparison.
+    The form is the moments and torques in the heading and the number of columns. Our runs have the
+    steps of the text of the thesis, or of the cards if the page has more rows. The comparison with
+    the fewest differences is first. Raise InputError if none of our pages has the form.
     """
     found: list[Fit] = []
     listings = {program: listings_of(program) for program in programs}
@@ -89,11 +83,7 @@ def fits(
 
 
 def listings_of(program: str) -> dict[str, Listing]:
-    """Return the listings of a program whose pages are compared, by name.
-
-    The names are ``original`` and ``corrected``, and ``original with`` and the name of a reading,
-    for each reading (an interpretation of a doubtful card) that we do not adopt.
-    """
+    """Return a program's original, its corrected and the original with each other reading."""
     readings = names_of("reading", program)
     return {
         "original": Listing.original(program),
@@ -104,10 +94,7 @@ def listings_of(program: str) -> dict[str, Listing]:
 
 @cache
 def our_page(listing: Listing, case: int, steps: int, word: str) -> str:
-    """Return the page that a listing prints in a case with `steps` steps, in the arithmetic `word`.
-
-    The page ends earlier if the run stops. It is computed once and cached.
-    """
+    """Return the page that a listing prints in a case, in the arithmetic `word`; cached."""
     scene = replace(case_scene(case), steps=steps)
     return page(scene, listing.program, run_program(scene, listing, "python", word=word))
 
@@ -120,9 +107,7 @@ def _lines(listing: Listing, case: int, steps: int, word: str = BINARY64) -> lis
 def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
     """Return the report on which program, listing and arithmetic print the page in file `path`.
 
-    A listing is a form of a program, one of `listings_of`. `found` has the comparisons of
-    this page with the pages of our programs, the page with the fewest differences first. If every
-    comparison has differences, the report shows the first differences from the first page.
+    If all have differences, those from the first are shown.
     """
     best = found[0]
     rows = [

@@ -1,10 +1,11 @@
 """The lost experiments of section IV.2 of the thesis: mistakes that may explain their failure.
 
-The thesis does not print its programs for the weightings subdomain, Galerkin and least squares.
-IV.2 says that they gave no meaningful results where the solution is known, in Cases 1 and 2. Each
-entry of `data/lost.toml` is a conjecture: a mistake that such a program could have had. The method
-is programmed as IV.2 describes it: a trial function of two terms, the products written out as
-polynomials, one solution for a constant right-hand side, and one correction.
+The thesis does not print its programs for subdomain, Galerkin and least squares. By IV.2 they gave
+no meaningful results in Cases 1 and 2, where the solution is known. Each entry of `data/lost.toml`
+is a conjecture: a mistake that such a program could have had. The method is programmed as IV.2
+describes it: a trial function of two terms, the products written out as polynomials, one solution
+for a constant right-hand side, and one correction. It fails in a case if its error exceeds a tenth
+of the largest omega.
 """
 
 from collections.abc import Sequence
@@ -33,13 +34,10 @@ TERMS = 2
 
 @dataclass(frozen=True)
 class Attempt:
-    """The result of one method, programmed with one mistake, on Cases 1 and 2 of the thesis.
+    """The result of one method, programmed with one mistake, on Cases 1 and 2.
 
-    `weighting` names the weighted residual method, whose program the thesis does not print.
-    `mistake` is the identifier in `data/lost.toml` of a mistake that this program may have had. The
-    solutions of both cases are known. `shares` maps the number of a case to the largest error of
-    omega, divided by the largest omega; it is infinite after an overflow. `failed` has the cases in
-    which this ratio exceeds 0.1, the limit in `data/lost.toml`.
+    `shares` has the largest error over the largest omega by case, infinite after an overflow;
+    `failed`, the cases in which it exceeds the limit.
     """
 
     mistake: str
@@ -50,13 +48,7 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A mistake that lost programs of the thesis may have had, with its results.
-
-    The lost programs, which the thesis does not print, were for the weighted residual methods
-    `WEIGHTINGS`. `attempts` has an `Attempt` for each of these methods: its errors if it is
-    programmed with the mistake. `mistake` is the identifier of the mistake, and `summary` its
-    description, in `data/lost.toml`.
-    """
+    """A mistake, with its description and the attempts of all methods."""
 
     mistake: str
     summary: str
@@ -64,32 +56,19 @@ class Ranked:
 
     @property
     def in_both(self) -> int:
-        """Return how many weighted residual methods fail, with this mistake, in both cases.
-
-        The cases are Cases 1 and 2 of Table 1 of the thesis. A method fails in a case if its error
-        exceeds a tenth of the largest omega.
-        """
+        """Return how many methods fail with this mistake in both cases."""
         return sum(len(each.failed) == len(CASES) for each in self.attempts)
 
     @property
     def in_either(self) -> int:
-        """Return how many weighted residual methods fail, with this mistake, in at least one case.
-
-        The cases are Cases 1 and 2 of Table 1 of the thesis. A method fails in a case if its error
-        exceeds a tenth of the largest omega.
-        """
+        """Return how many methods fail with this mistake in at least one case."""
         return sum(bool(each.failed) for each in self.attempts)
 
 
 def ranked(word: str = BINARY64) -> list[Ranked]:
-    """Run each method with each mistake that its lost program may have had, in arithmetic `word`.
+    """Run each method with each mistake, in arithmetic `word`, and rank the mistakes.
 
-    The methods are the weighted residual methods `WEIGHTINGS`, whose programs the thesis does not
-    print. They run on Cases 1 and 2 of Table 1 of the thesis. `word` is the name of the arithmetic,
-    such as binary64. A method fails in a case if its error exceeds a tenth of the largest omega.
-    Return the mistakes, sorted by the number of methods that fail with them in both cases, the
-    largest number first. Mistakes with equal numbers are sorted by the number of methods that fail
-    in at least one case.
+    First is the one with the most failures in both cases, then in at least one.
     """
     limit = facts("lost")["limit"]
     found = []
@@ -106,12 +85,7 @@ def ranked(word: str = BINARY64) -> list[Ranked]:
 
 
 def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> float:
-    """Return a method's largest error against the reference, relative to the largest omega.
-
-    `weighting` names the weighted residual method. `mistake` is the identifier of the mistake with
-    which it is programmed, from `data/lost.toml`, or ``none``. `word` is the name of the
-    arithmetic. The result is infinite after an overflow.
-    """
+    """Return a method's largest error against the reference, relative to the largest omega."""
     given = scene if word == BINARY64 else scene_in(scene, WORDS[word])
     omega = integrate(given, weighting, mistake)
     truth = reference(scene, scene.times()).omega
@@ -123,10 +97,8 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
 def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
     """Integrate a scene of constant torque by a method that is programmed with one mistake.
 
-    `weighting` is the weighted residual method, one of `WEIGHTINGS`. `mistake` is the identifier of
-    the mistake in `data/lost.toml`, or ``none``. Return omega (rad/s), shape (steps, 3); NaN from
-    an overflow on. The scene's numbers are floats, or numbers of an arithmetic in `WORDS`; they
-    determine the arithmetic of the integration.
+    Return omega (rad/s), shape (steps, 3); NaN from an overflow on. The scene's numbers, floats or
+    of `WORDS`, determine the arithmetic.
     """
     h = scene.step_size
     coefficients = scene.euler_coefficients
@@ -158,11 +130,9 @@ def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
 
 
 def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
-    """Return A omega2 omega3, B omega1 omega3 and C omega1 omega2 as polynomials of the time t (s).
+    """Return A omega2 omega3, B omega1 omega3 and C omega1 omega2 as polynomials of the time (s).
 
-    The result has a column for each product, with its coefficients of 1, t, t**2, ... `estimate`
-    has the components of omega as polynomials in the same form. `coefficients` are A, B and C of
-    Euler's equations.
+    Each product is a column of coefficients of 1, t, t**2, ..., as each omega in `estimate`.
     """
     columns = [
         polynomial.polymul(estimate[:, j], estimate[:, k]) * a
@@ -175,8 +145,7 @@ def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
 def _matrix(weighting: str, length: float) -> Array:
     """Return the weighted integrals over (0, length) of the derivatives of t and t**2.
 
-    The shape is (2, 2). A row belongs to one of the two weight functions of the weighted residual
-    method `weighting`, and a column to a power of the time t. `length` is in s.
+    The shape is (2, 2), a row for each weight function; `length` is in s.
     """
     columns = [_weighted(weighting, length, (i + 1) * _power(i)) for i in range(TERMS)]
     return np.array(columns).T
@@ -185,11 +154,8 @@ def _matrix(weighting: str, length: float) -> Array:
 def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
     """Return c1 and c2 of all components, for which the weighted residuals vanish; shape (2, 3).
 
-    In a step omega is approximated by omega(0) + c1 t + c2 t**2. c1 and c2 solve the linear
-    equations with the matrix `matrix`. `right` has the right-hand sides, one row for each
-    component. `mistake` is the identifier of a programming mistake in `data/lost.toml`. `second` is
-    true for the correction, which is computed with the products of the first estimate, and false
-    for the first estimate.
+    omega is approximated by omega(0) + c1 t + c2 t**2. `right` has a row for each component;
+    `second` is true for the correction.
     """
     if mistake == "transposed":
         matrix = matrix.T
@@ -215,8 +181,7 @@ def _power(exponent: int) -> Array:
 def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
     """Return the integrals over (0, length) of a polynomial times each of the two weights.
 
-    The weights are the two weight functions of the weighted residual method `weighting`. `residual`
-    has the coefficients of the polynomial, from the constant on; `length` is in s.
+    `residual` has its coefficients, from the constant on; `length` is in s.
     """
     # Plain numbers, because NumPy's polynomials of machine words take several times as long.
     coefficients = residual.tolist()
@@ -252,12 +217,7 @@ def _factors(matrix: Array) -> Array:
 
 
 def halved(scene: Scene, weighting: str) -> float:
-    """Return the factor by which halving the step size reduces the error of a method.
-
-    `weighting` names the weighted residual method, programmed without a mistake. The error is the
-    largest error of omega over the run, against the reference solution. The end time is the same
-    with both step sizes.
-    """
+    """Return the factor by which halving the step reduces the error of a method without mistake."""
     finer = replace(scene, step_size=scene.step_size / 2.0, steps=2 * scene.steps)
     return _share(scene, weighting, "none") / _share(finer, weighting, "none")
 
@@ -271,13 +231,7 @@ _TABLE = (
 
 
 def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
-    """Return the report on the mistakes that lost programs may have had, with errors and failures.
-
-    The lost programs, which the thesis does not print, were for weighted residual methods. A method
-    that is programmed with a mistake fails in a case if its error exceeds a tenth of the largest
-    omega. `found` has the mistakes with their results, and `word` is the name of the arithmetic in
-    which they were computed.
-    """
+    """Return the report on the mistakes, with errors and failures, in the arithmetic `word`."""
     rows = [
         [
             each.mistake,

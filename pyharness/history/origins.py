@@ -1,8 +1,8 @@
 """Disagreements of the decks and the thesis, and what they suggest about the origin of faults.
 
-A deck consists of the cards (lines) of a program. The table `data/disagreements.toml` names each
-disagreement once, with the quoted cards and the formulas concerned. It keeps what the sources say
-apart from what we infer. The table `data/cards/collation.toml` has the steps to which it refers.
+The table `data/disagreements.toml` names each disagreement once, with the quoted cards and the
+formulas concerned, and keeps what the sources say apart from what we infer. The steps are those of
+`data/cards/collation.toml`.
 """
 
 from collections import Counter
@@ -23,28 +23,10 @@ CERTAINTIES = tuple(CERTAINTY)
 class Disagreement(NamedTuple):
     """A disagreement of the decks with each other or with the thesis, and its supposed origin.
 
-    Attributes
-    ----------
-    id, title : str
-        Identifier and title of the disagreement.
-    steps : tuple of str
-        The rows of the table that compares the decks, by their description.
-    equations : tuple of str
-        The numbers of the formulas of the thesis concerned.
-    where, says : str
-        The place in the thesis, and a few words from there. Both are empty if the thesis is silent.
-    cards : dict of str to dict of int to str
-        For each program, the quoted text of each card concerned.
-    differs, known, suggests : str
-        What differs, what the sources say, and what we infer from it.
-    origin : str
-        The kind of origin that is inferred.
-    certainty : str
-        The certainty of the inference, one of `CERTAINTIES`.
-    entries : tuple of str
-        The identifiers of the apparatus entries concerned.
-    unnoticed : str
-        Why the test cases of the thesis do not show the fault; empty if there is nothing to say.
+    `equations` are formulas of the thesis, `where` and `says` its place and a few words from there,
+    empty if it is silent. `cards` quotes texts by program and number. `known` is what the sources
+    say, `suggests` and `origin` what we infer, with a `certainty` of `CERTAINTIES`; `unnoticed`
+    says why the test cases do not show the fault.
     """
 
     id: str
@@ -81,9 +63,8 @@ def unexplained_defects() -> dict[str, str]:
 def shared_statements(scanned_names: bool = False) -> dict[tuple[str, str], int]:
     """Return the number of statements that two decks share, for each pair of programs.
 
-    A statement that occurs several times in both decks counts as often as in the deck that has it
-    less often. Statement numbers, blanks and comments are ignored. With `scanned_names`, names that
-    we made uniform are those of the scan.
+    A repeated statement counts as often as in the deck that has it less often. Numbers, blanks and
+    comments are ignored. With `scanned_names`, names that we made uniform are those of the scan.
     """
     found = {program: Counter(_statements(program, scanned_names)) for program in PROGRAMS}
     return {(a, b): (found[a] & found[b]).total() for a, b in combinations(PROGRAMS, 2)}
@@ -97,11 +78,9 @@ def statement_count(program: str) -> int:
 def mistakes() -> list[str]:
     """Return one sentence for each mistake in the table of disagreements.
 
-    A quoted card must have the quoted text. Steps, formulas, entries and kinds of origin must
-    exist. An entry that names cards must name a quoted card. Each defect of the apparatus must be
-    in a disagreement, or among the defects without an explanation. Each step in which decks or
-    thesis differ must be in a disagreement, or among the steps that differ as their methods
-    require.
+    Quoted cards must have the quoted text, and all references must exist. Entries that name cards
+    must name a quoted one. Each defect, and each step in which decks or thesis differ, must be in a
+    disagreement or among the exceptions.
     """
     found = disagreements()
     return [*_of_each(found), *_of_defects(found), *_of_steps(found)]

@@ -14,12 +14,7 @@ _COLUMNS = (
 
 
 def origins_report(found: Sequence[Disagreement], mistakes: Sequence[str]) -> Report:
-    """Return the report of the disagreements of the three decks and the thesis.
-
-    A deck consists of the cards of one of the three programs. Each disagreement in `found` has the
-    kind of origin that it suggests, and the certainty of this inference. `mistakes` has one
-    sentence for each mistake in the table of disagreements.
-    """
+    """Return the report of the disagreements, their supposed origins, and mistakes in the table."""
     rows = [
         [
             each.id, "".join(_SHORT[program] for program in each.cards) or "-",

@@ -1,9 +1,8 @@
 """Compare a page that a machine printed with the pages that our programs print.
 
-This module needs nothing but Python's standard library, and is also a script: the data package of
-the edition has it as `machine/judge.py`, beside the pages that our programs print. There,
-``python judge.py FILE`` compares the page in FILE with these pages. Its exit status is 0 if a
-page is equal, 1 if all pages differ, and 2 if FILE has no page of this form.
+It needs Python's standard library alone and is also a script, `machine/judge.py` in the data
+package beside the pages: ``python judge.py FILE`` compares the page in FILE. Its exit status is 0
+if a page is equal, 1 if all differ, and 2 if FILE has no page of this form.
 """
 
 import csv
@@ -26,10 +25,9 @@ SHOWN = 5
 
 @dataclass(frozen=True)
 class Difference:
-    """A printed number that differs between a page from another machine and a page of our program.
+    """A printed number that differs between a page from another machine and ours.
 
-    `row` is the row of the number, and `place` its position within the row; both count from 1.
-    `theirs` and `ours` are the numbers as printed by the other machine and by our program.
+    `row` and the `place` in it are counted from 1.
     """
 
     row: int
@@ -42,19 +40,8 @@ class Difference:
 class Fit:
     """The comparison of a page from another machine with a page that our programs print.
 
-    Attributes
-    ----------
-    program, listing, word : str
-        The program of our page, the name of its listing (``original``, ``corrected``, or
-        ``original with`` and the name of another reading of a doubtful card), and the name of the
-        arithmetic in which it ran.
-    case : int
-        The number of the case of our page in Table 1.
-    fields : int
-        How many numbers are compared. A number is also counted if the other page has none at its
-        place.
-    differences : tuple of Difference
-        The numbers that the two pages print differently.
+    `listing` is ``original``, ``corrected`` or ``original with`` a reading; `word` is the
+    arithmetic, `fields` the number of compared numbers, including those that the other page lacks.
     """
 
     program: str
@@ -66,15 +53,12 @@ class Fit:
 
     @property
     def is_whole(self) -> bool:
-        """Return whether the page of the other machine and our page print every number alike."""
+        """Return whether the two pages print every number alike."""
         return not self.differences
 
     @property
     def name(self) -> str:
-        """Return text that names our page, as in `two-term, case 2, original, in binary64`.
-
-        The text has the program, the case, the listing and the arithmetic of the page.
-        """
+        """Return text that names our page, as in `two-term, case 2, original, in binary64`."""
         return f"{self.program}, case {self.case}, {self.listing}, in {self.word}"
 
 
@@ -90,11 +74,7 @@ def has_rows(lines: Iterable[Sequence[str]]) -> bool:
 
 
 def split_page(lines: Sequence[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
-    """Return the lines of numbers in the heading of our page, and the rows of its results.
-
-    `lines` are the lines of numbers of the page, from `printed_numbers`. The heading has the
-    moments and the torques.
-    """
+    """Return the lines of numbers in the heading (moments and torques), and the rows of results."""
     begin = next((n for n, line in enumerate(lines) if len(line) >= _LEAST), len(lines))
     return [*lines[:begin]], [*lines[begin:]]
 
@@ -102,11 +82,7 @@ def split_page(lines: Sequence[list[str]]) -> tuple[list[list[str]], list[list[s
 def rows_of_form(
     lines: Sequence[Sequence[str]], head: Sequence[Sequence[str]], width: int
 ) -> list[Sequence[str]]:
-    """Return the rows with `width` numbers of a page, if the page has the heading `head`.
-
-    `lines` are the lines of numbers of the page, from `printed_numbers`, and `head` are those of
-    the heading of our page. The result is empty if the heading is missing.
-    """
+    """Return the rows with `width` numbers, or nothing if the page lacks the heading `head`."""
     wanted, size = [list(line) for line in head], len(head)
     starts = range(len(lines))
     if not any([list(line) for line in lines[at : at + size]] == wanted for at in starts):
@@ -115,11 +91,7 @@ def rows_of_form(
 
 
 def compared_steps(rows: int, steps: int, card_steps: int) -> int:
-    """Return how many steps our run needs for the comparison with a page of `rows` rows.
-
-    The number is `steps`, that of the text of the thesis. If the page has more rows, the number is
-    `card_steps`, that of the DO statement on the cards.
-    """
+    """Return how many steps our run needs: those of the text, or of the cards for a longer page."""
     return card_steps if rows > steps else steps
 
 
@@ -128,8 +100,7 @@ def compare_rows(
 ) -> tuple[int, tuple[Difference, ...]]:
     """Return how many numbers of two pages are compared, and those that differ.
 
-    `theirs` are the rows of the page of another machine, and `ours` those of our page. If only one
-    of the pages has a number at a place, the other number is shown as a dash.
+    A dash is shown for a number that one page lacks.
     """
     none: Sequence[str] = ()
     places = [
@@ -141,12 +112,7 @@ def compare_rows(
 
 
 def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
-    """Compare a page from another machine with the stored pages of the same form.
-
-    `lines` are the lines of numbers of the page, from `printed_numbers`. `folder` has the table
-    `PAGES` and the pages that the table names. Return the comparisons, sorted by the number of
-    differences, the smallest first. The list is empty if no stored page has the form of the page.
-    """
+    """Compare a page with those in `folder` of the same form, the nearest first."""
     found = []
     with open(folder / PAGES, newline="", encoding="ascii") as file:
         for each in csv.DictReader(file):
@@ -164,22 +130,14 @@ def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
 
 
 def verdict(path: str, found: Sequence[Fit]) -> list[str]:
-    """Return the lines that name our pages that are equal to the page in the file `path`.
-
-    `found` has the comparisons of this page with our pages, the page with the fewest differences
-    first. If none of our pages is equal, the only line names the first.
-    """
+    """Return the lines that name our pages equal to that in the file `path`, else the nearest."""
     whole = [each for each in found if each.is_whole]
     said = "printed so by" if whole else "by none; the nearest is"
     return [f"{path}: {said} {each.name}" for each in whole or found[:1]]
 
 
 def main(arguments: Sequence[str], folder: Path) -> int:
-    """Compare the page in a file with the pages in `folder`, print the result, and return a status.
-
-    `arguments` has the path of the file. The status is 0 if one of the pages is equal, 1 if all
-    of them differ, and 2 if the file can't be compared.
-    """
+    """Compare the page in a file with the pages in `folder`, print the result, return a status."""
     if len(arguments) != 1:
         print("usage: python judge.py FILE, a page as a program printed it", file=sys.stderr)
         return 2

@@ -19,19 +19,8 @@ CHANGES = {
 class Revision(NamedTuple):
     """A change of the edition's text, which consists of the cards and the apparatus.
 
-    Attributes
-    ----------
-    date : str
-        The date of the change, as in ``2026-11-20``.
-    what : str
-        Sentences that say what changed in our reading.
-    digest : str
-        The digest of the text after the change, or nothing if the cards were not yet data.
-    added, changed, removed : tuple of str
-        The identifiers of the apparatus entries that the revision added, altered or removed.
-    cards : mapping
-        By program, the numbers of the cards whose text or differences from the scan changed, as in
-        ``750-770, 800``.
+    `digest` is that of the text after the change, empty if the cards were not yet data; the entries
+    are identifiers of the apparatus. `cards` has, by program, changed numbers as ``750-770, 800``.
     """
 
     date: str

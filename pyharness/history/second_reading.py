@@ -1,9 +1,8 @@
 """An estimate of the transcription errors that remain, by capture and recapture.
 
-Two readings of the scan correct its misread characters. The first reading is our text of the cards.
-The second reading is a random sample of cards that were read again from the scan
-(`data/cards/second-reading.toml`). The misreadings that both readings correct, and those that only
-one of them corrects, give an estimate of the misreadings that neither of them corrects.
+The first reading of the scan is our text of the cards, the second a random sample of cards that
+were read again (`data/cards/second-reading.toml`). The misreadings that both correct, and those
+that only one corrects, give an estimate of those that neither does.
 """
 
 import random
@@ -27,10 +26,9 @@ _COLUMNS = (
 
 
 class ReadCard(NamedTuple):
-    """A card of the sample as the scan, the first reading and the second reading have it.
+    """A card of the sample as the scan, the first and the second reading have it, without blanks.
 
-    The texts are without blanks and without the card number. The first reading keeps the names that
-    our text of the cards makes uniform.
+    The first keeps the names that our text makes uniform.
     """
 
     card: Card
@@ -42,16 +40,8 @@ class ReadCard(NamedTuple):
 class Recapture(NamedTuple):
     """The estimated number of misreadings in the sample, from two readings.
 
-    Attributes
-    ----------
-    unit : str
-        The unit of the counts: ``places`` (characters of the scan) or ``cards``.
-    first, second, both : int
-        Numbers of misreadings that the first, the second, and both readings correct.
-    estimate : float
-        Chapman's estimate of the number of all misreadings.
-    lower, upper : int
-        Limits of the 95 % confidence interval of the number of all misreadings.
+    `unit` is ``places`` (characters) or ``cards``. `first`, `second` and `both` are corrected by
+    these readings; `estimate` is Chapman's, `lower` and `upper` its 95 % interval.
     """
 
     unit: str
@@ -69,11 +59,9 @@ class Recapture(NamedTuple):
 
 
 def chapman(first: int, second: int, both: int) -> float:
-    """Return Chapman's estimate of the size of a population.
+    """Return Chapman's estimate of the size of a population from two samples.
 
-    It is the estimate of Lincoln and Petersen, ``first * second / both``, with a correction for
-    small samples. A first sample has `first` members of the population, a second sample has
-    `second`, and `both` members are in both samples.
+    It is that of Lincoln and Petersen, ``first * second / both``, corrected for small samples.
     """
     return (first + 1) * (second + 1) / (both + 1) - 1
 
@@ -81,10 +69,9 @@ def chapman(first: int, second: int, both: int) -> float:
 def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
     """Return the limits of the 95 % confidence interval of the size of a population.
 
-    The arguments are those of `chapman`. If two samples are independent, the number of members in
-    both has a hypergeometric distribution. A size is in the interval if neither tail of this
-    distribution from `both` on has a probability below 0.025. `both` must be positive, because
-    otherwise the interval has no upper limit.
+    With independent samples, the number in both is hypergeometric. A size is in the interval if
+    neither tail from `both` on is below 0.025. `both` must be positive, else there is no upper
+    limit.
     """
     if both < 1:
         raise ValueError("both must be positive")
@@ -108,10 +95,7 @@ def _probability(size: int, first: int, second: int, begin: int, end: int) -> fl
 
 
 def sample() -> list[Card]:
-    """Return the cards that the second reading must contain, in the order of the decks.
-
-    They are drawn at random from all cards of the scan, in the order of the scan.
-    """
+    """Return the cards that the second reading must contain, in the order of the decks."""
     given = facts("cards/second-reading")
     size = sum(len(given[program]) for program in PROGRAMS)
     drawn = set(random.Random(given["seed"]).sample([*witness_lines()], size))
@@ -131,11 +115,9 @@ def read_cards() -> Iterator[ReadCard]:
 
 
 def misread_places(scan: str, reading: str) -> dict[int, str]:
-    """Return the places of a scan's line at which a reading differs from the line.
+    """Return the text of a reading at each place of a scan's line that differs, by index.
 
-    The keys are indices of characters in the line. Each value is the text of the reading at this
-    place, which is empty if the reading deletes the character. Inserted characters belong to the
-    character before them, or to the place -1.
+    It is empty for a deleted character; inserted ones belong to the character before, or to -1.
     """
     found: dict[int, str] = {}
     matcher = SequenceMatcher(None, scan, reading, autojunk=False)
@@ -153,8 +135,7 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
 def recaptures() -> list[Recapture]:
     """Return the estimates from the two readings, with places and with whole cards as units.
 
-    The misreadings of one card are not independent, because the machine tends to misread a letter
-    in the same way several times. The estimate with whole cards avoids this dependence.
+    A machine misreads a letter in the same way several times; whole cards avoid this dependence.
     """
     places: tuple[set[tuple[str, int]], ...] = (set(), set())
     for each in read_cards():

@@ -1,9 +1,8 @@
 """TAPE5, the file of unformatted sequential records that each program writes.
 
-The file is written here from a trajectory. Each WRITE(5)TIME,U1,U2,U3,V1,V2,V3 is one record: its
-length in bytes, seven binary64 numbers, and the length again, all little-endian. Today's Fortran
-compilers and `scipy.io.FortranFile` read it. The author's tape had other record marks and, as we
-infer, words of 60 bits.
+Each WRITE(5)TIME,U1,U2,U3,V1,V2,V3 is one record: its length in bytes, seven binary64 numbers, and
+the length again, all little-endian, as today's Fortran compilers and `scipy.io.FortranFile` read
+it. The author's tape had other record marks and, as we infer, words of 60 bits.
 """
 
 import numpy as np
@@ -14,12 +13,7 @@ _RECORD = np.dtype([("head", "<i4"), ("items", "<f8", (7,)), ("tail", "<i4")])
 
 
 def records(trajectory: Trajectory) -> bytes:
-    """Return the bytes of a program's file TAPE5, with one record for each row of its trajectory.
-
-    TAPE5 is the file of unformatted records that a program of the thesis writes. The trajectory
-    must have translational velocities. A record has the recorded time (s), omega (rad/s) and the
-    translational velocity (m/s).
-    """
+    """Return the bytes of TAPE5 for a trajectory with translational velocities."""
     assert trajectory.velocity is not None
     result = np.empty(len(trajectory.time), dtype=_RECORD)
     result["head"] = result["tail"] = _RECORD["items"].itemsize

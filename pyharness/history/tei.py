@@ -1,11 +1,10 @@
 """The edition as a TEI P5 document: every card, the scan's variants, and the apparatus.
 
 Each deck is in the order of its cards. A `pb` element marks the beginning of a page of the scan;
-its `n` is the position of the page in the scan. An `app` element marks each place where the scan
-differs from our text: `lem` is our reading, and `rdg` is the reading of the scan. To restore the
-scan, take the pages in the order of `n` and each `rdg` instead of its `lem`. The lines of the scan
-are then the cards, the `fw` elements and the `surplus` elements. An `fw` element is a heading added
-by an editor, and a `surplus` element is text that belongs to no card at its place in the scan.
+its `n` is the position of the page in the scan. An `app` element marks a difference: `lem` is our
+reading, `rdg` the scan's. An `fw` element is a heading added by an editor, a `surplus` text that
+belongs to no card at its place. To restore the scan, take the pages in the order of `n`, each `rdg`
+instead of its `lem`, and the lines of cards, `fw` and `surplus`.
 """
 
 from collections.abc import Iterator
@@ -41,11 +40,9 @@ _TOLD = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why
 
 
 class _Page(NamedTuple):
-    """A page of the scan of the thesis, with its lines.
+    """A page of the scan with its position, from 1, and its lines.
 
-    `number` is the position of the page in the scan, from 1. `moved` is None if the page is in its
-    proper place. Otherwise it is the identifier of the note in the critical apparatus that explains
-    why the page is elsewhere.
+    `moved` is the note in the apparatus that explains why the page is elsewhere, if it is.
     """
 
     number: int
@@ -58,11 +55,7 @@ class _Page(NamedTuple):
 
 
 def tei_document() -> bytes:
-    """Return the cards of the programs and the critical apparatus as a TEI document, in UTF-8.
-
-    TEI is an XML format for editions of texts. The critical apparatus describes, for example, the
-    mistakes and the doubtful statements of the programs.
-    """
+    """Return the cards of the programs and the apparatus as a TEI document, in UTF-8."""
     root = xml.Element("TEI", xmlns="http://www.tei-c.org/ns/1.0")
     root.set(XML + "lang", "en")
     add_header(root)
@@ -81,11 +74,7 @@ def tei_document() -> bytes:
 
 
 def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]:
-    """Append the cards of a program to `body`, and yield a pair for each card.
-
-    A pair consists of the XML element of the card, which does not yet contain the card's text, and
-    the card itself. The pairs are yielded in the order of the cards.
-    """
+    """Append the cards of a program to `body`; yield each empty element with its card."""
     div = named(body, "div", program, type="deck")
     with_text(div, "head", f"The {program} program")
     cards = deck(program).cards
@@ -179,11 +168,7 @@ def _apparatus(div: xml.Element) -> None:
 
 
 def _targets(entry: dict[str, Any]) -> Iterator[str]:
-    """Yield the XML identifiers of the cards that an entry of the critical apparatus names.
-
-    An entry describes, for example, a defect of the printed programs. For a program of which the
-    entry names no card, yield the identifier of the program's whole deck of cards.
-    """
+    """Yield the XML identifiers of the cards that an entry names, or of the whole deck if none."""
     for program in entry["programs"]:
         cards = deck(program).cards
         named = numbers(entry["cards"].get(program, ""))
@@ -222,11 +207,7 @@ def _bibliography(div: xml.Element) -> None:
 
 
 def _id(card: Card) -> str:
-    """Return a card's XML identifier, as in ``two-term.1660``.
-
-    Here 1660 is the number on the card. Unlike the name of a card, the identifier may not contain a
-    colon.
-    """
+    """Return a card's XML identifier, as in ``two-term.1660``; it may not contain a colon."""
     return f"{card.program}.{card.number}"
 
 

@@ -1,7 +1,7 @@
 """The header of the TEI document, and the elements that all its parts use.
 
-The header describes the edition and its witness, the scan. It also lists the revisions of the text,
-and the kinds, the degrees of certainty and the grounds of the entries of the critical apparatus.
+It describes the edition, its witness (the scan) and the revisions, and lists the kinds, degrees of
+certainty and grounds of the apparatus.
 """
 
 from collections.abc import Iterable, Iterator
@@ -76,8 +76,8 @@ def add_header(root: xml.Element) -> None:
 def sources(entry: dict[str, Any]) -> str:
     """Return the pointers to the parts of the scan from which an apparatus entry is known.
 
-    An entry that names cards is known from the appendix. An entry that rests on the text or on the
-    reported results, or that names no card, is known from the text of the thesis.
+    Entries on cards are from the appendix; those that rest on the text or on results, or name no
+    card, are from the text.
     """
     parts = ["appendix"] if entry["cards"] else []
     if not parts or {"T", "R"} & set(entry["grounds"]):
@@ -86,10 +86,7 @@ def sources(entry: dict[str, Any]) -> str:
 
 
 def named(parent: xml.Element, tag: str, id: str | None = None, **more: str) -> xml.Element:
-    """Append an element with the XML identifier `id` to a parent, and return the element.
-
-    `more` has further attributes of the element.
-    """
+    """Append an element with identifier and further attributes to a parent, and return it."""
     attributes = {} if id is None else {XML + "id": id}
     return xml.SubElement(parent, tag, {**attributes, **more})
 
@@ -97,10 +94,7 @@ def named(parent: xml.Element, tag: str, id: str | None = None, **more: str) -> 
 def with_text(
     parent: xml.Element, tag: str, text: str, id: str | None = None, **more: str
 ) -> xml.Element:
-    """Append an element that contains a text to a parent, and return the element.
-
-    `id` is the XML identifier of the element, and `more` has further attributes.
-    """
+    """Append an element that contains a text to a parent, and return it."""
     element = named(parent, tag, id, **more)
     element.text = text
     return element
@@ -185,10 +179,9 @@ def _revisions(described: xml.Element) -> None:
 
 
 def _targets(revision: Revision) -> Iterator[str]:
-    """Yield pointers to the entries and cards that a revision added or changed.
+    """Yield pointers to the entries and cards, or whole decks, that a revision added or changed.
 
-    Removed entries are no longer in the document. A deck of which all cards changed has one pointer
-    to the whole deck.
+    Removed entries are no longer in the document.
     """
     present = {entry["id"] for entry in facts("apparatus")["entry"]}
     yield from (f"#{id}" for id in (*revision.added, *revision.changed) if id in present)

@@ -18,17 +18,8 @@ They are the cards of each program with the scan's variants, and the apparatus.
 def text_digest(table: Callable[[str], Mapping[str, Any]] = facts) -> str:
     """Return the first 12 hexadecimal digits of the SHA-256 of our edition of the programs.
 
-    The edition is the content of the files `TABLES`. These have the cards of the printed programs,
-    the places where the scan of the thesis differs from the cards, and the critical apparatus. The
-    apparatus is the list of the programs' mistakes and doubtful statements. The digest does not
-    depend on the Fortran and Python versions of the programs, on the project's version number, or
-    on comments in the tables.
-
-    Parameters
-    ----------
-    table : callable, optional
-        Function that returns the content of each of `TABLES` by its name. The default is `facts`,
-        which reads the tables that are shipped with the package.
+    It is of the content of `TABLES`: cards, differences from the scan, and apparatus. It does not
+    depend on Fortran, Python, version or comments.
     """
     told = {name: table(name) for name in TABLES}
     text = json.dumps(told, ensure_ascii=False, sort_keys=True, separators=(",", ":"))

@@ -22,23 +22,8 @@ _MONTHS = (
 class Event(NamedTuple):
     """An event in the history of the thesis, with its date and source.
 
-    Attributes
-    ----------
-    id : str
-        The identifier of the event.
-    what : str
-        The event, as a sentence in Markdown.
-    where : str
-        The place in the thesis that reports the event.
-    certainty : str
-        The certainty of the date, a key of `CERTAINTIES`.
-    first, last : str
-        The first and the last month in which the event may have happened, as in ``1979-01``. Both
-        are empty if no source dates the event.
-    quote : str
-        A few words of the place, or nothing.
-    why : str
-        For a date that is not certain, how it was found.
+    `first` and `last` are months, as in ``1979-01``, empty if no source dates it; `certainty` is a
+    key of `CERTAINTIES`, and `why` says how an uncertain date was found.
     """
 
     id: str
@@ -64,10 +49,7 @@ class Event(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """A question about the history of the thesis that its text does not answer.
-
-    `answer` says what the text lacks.
-    """
+    """A question about the history of the thesis, and what its text lacks to answer it."""
 
     question: str
     answer: str

@@ -1,7 +1,7 @@
 """The effect of the word length: runs in emulated arithmetics of p bits, compared with binary64.
 
-Every program runs on a case of Table 1 with p bits of significand and a rounding rule. Its printed
-page is compared with the page of the run in binary64, and its omega with the reference solution.
+An arithmetic is a number p of significand bits and a rounding rule. A run's printed page is
+compared with that in binary64, and its omega with the reference solution.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -27,31 +27,12 @@ DOUBLE, WIDEST = Word(53), Word(113)
 
 @dataclass(frozen=True)
 class WordRun:
-    """A run of a program in an arithmetic with p bits of significand, compared with binary64.
+    """A run of a program in one arithmetic, compared with binary64.
 
-    Attributes
-    ----------
-    case : int
-        The number of the case in Table 1 of the thesis.
-    program, listing : str
-        The name of the program, and the form in which it ran: ``original`` or ``corrected``.
-    p : int
-        Bits of the significand.
-    rule : str
-        The rounding rule: ``nearest-even``, ``chop`` (towards zero), or ``FX`` and ``RX``, the
-        unrounded and the rounded operations of the CDC 6600.
-    stop : str
-        Why and at which step the run ended early: ``V2 at 25`` if the stop test of the Runge-Kutta
-        program failed for the variable V2, or ``overflow at 50``. Empty if the run is complete.
-    fields : int
-        How many numbers the rows of the printed page have, in this arithmetic or in binary64,
-        whichever prints more.
-    different : int
-        How many of these numbers are printed differently in this arithmetic and in binary64.
-    error : float
-        Largest error of any omega component against the reference solution (rad/s).
-    singular : int
-        Number of rows in which the linear solver LEQT1F reports a singular matrix (IER = 129).
+    `rule` is ``nearest-even``, ``chop`` (towards zero), or ``FX`` and ``RX``, the unrounded and the
+    rounded operations of the CDC 6600. `stop` says why and where the run ended early, as in ``V2 at
+    25``. Of the `fields` numbers on the longer page, `different` differ. `error` is the largest of
+    omega (rad/s), and `singular` the number of rows with IER = 129 of LEQT1F.
     """
 
     case: int
@@ -68,30 +49,18 @@ class WordRun:
 
 @dataclass(frozen=True)
 class WordCell:
-    """The runs of one program on one case of the thesis, in several arithmetics.
-
-    The program is either original or corrected. `double` is the run in binary64, and `widest` the
-    run with 113 bits of significand. `runs` has one run for each pair of a chosen number of bits
-    and a rounding rule.
-    """
+    """The runs of one program on one case: in binary64, with 113 bits, and others."""
 
     double: WordRun
     widest: WordRun
     runs: tuple[WordRun, ...]
 
     def of(self, p: int, rule: str) -> WordRun | None:
-        """Return the run with p bits and the rounding rule `rule`, or None if there is none.
-
-        The bits are those of the significand.
-        """
+        """Return the run with p bits and a rounding rule, if there is one."""
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
     def settled(self, rule: str, same: Callable[[WordRun], bool]) -> int | None:
-        """Return the least number p of significand bits from which on `same` holds for every run.
-
-        `same` is a predicate of one run. It must hold for all runs with at least p bits. Only runs
-        with the rounding rule `rule` count. Return None if there is no such p.
-        """
+        """Return the least p from which on `same` is true of every run with the rule, or None."""
         least = None
         for run in sorted((r for r in self.runs if r.rule == rule), key=lambda run: -run.p):
             if not same(run):
@@ -108,10 +77,7 @@ def cells(
 ) -> Iterator[WordCell]:
     """Run the programs, original and corrected, on the cases in every arithmetic.
 
-    An arithmetic is a pair of a number of bits of significand, from `lengths`, and a rounding rule
-    in `RULES`; binary64 and 113 bits are always added. Yield a `WordCell`, which has the runs, for
-    each program, form (original or corrected) and case. `progress` is called with the number of
-    finished runs and the number of all runs.
+    Its bits are those of `lengths`, with each rule of `RULES`; binary64 and 113 bits are added.
     """
     words = [Word(p, rule) for rule in RULES for p in lengths]
     chosen = [
@@ -132,12 +98,7 @@ def cells(
 
 
 class _Judge:
-    """The comparison of a program's runs on a scene with its run in binary64 and the reference.
-
-    `listing` is the program, original or corrected. The constructor computes the page that it
-    prints in binary64, and the reference solution. `run` compares a run in another arithmetic with
-    both.
-    """
+    """The comparison of a program's runs on a scene with its run in binary64 and the reference."""
 
     def __init__(self, scene: Scene, listing: Listing) -> None:
         self.scene, self.listing = scene, listing

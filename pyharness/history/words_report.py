@@ -26,11 +26,7 @@ _STYLES: dict[str, dict[str, Any]] = {
 
 
 def words_report(cells: Sequence[WordCell]) -> Report:
-    """Return the report of `pyharness words`: how the arithmetic changes printed pages and errors.
-
-    Each of the `cells` has the runs of one program, original or corrected, on one case, in several
-    arithmetics. All cells must have runs with the same numbers of significand bits.
-    """
+    """Return the report of `pyharness words`; all cells have the same numbers of bits."""
     runs = [run for cell in cells for run in cell.runs]
     data = numbers(_FIELDS, [list(asdict(run).values()) for run in runs])
     tables: list[Section] = [
@@ -95,11 +91,7 @@ def _machine(cells: Sequence[WordCell]) -> Table:
 
 
 def _changes(cells: Sequence[WordCell]) -> list[str]:
-    """Return, for both arithmetics of the CDC 6600, how the runs differ from those in binary64.
-
-    The result has one sentence for each arithmetic. `cells` have the runs. The two arithmetics have
-    48 bits of significand. One has unrounded operations, and the other rounded operations.
-    """
+    """Return a sentence on each arithmetic of the CDC 6600: how runs differ from binary64."""
     told = []
     for name, p, rule in _MACHINE:
         found = [(cell.double, run) for cell in cells if (run := cell.of(p, rule))]
@@ -148,11 +140,9 @@ def _errors(cells: Sequence[WordCell]) -> Table:
 
 
 def _picture(cells: Sequence[WordCell]) -> Picture:
-    """Draw the largest error of omega (rad/s) against the number p of significand bits.
+    """Draw the largest error of omega (rad/s) against p for each program.
 
-    `cells` have the runs with their errors. There is a plot for each program, original and
-    corrected. A dashed line shows the truncation error of the method, which is the error with 113
-    bits.
+    A dashed line is the truncation error, that with 113 bits.
     """
     from matplotlib.figure import Figure
 

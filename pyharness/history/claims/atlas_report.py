@@ -30,12 +30,7 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 
 
 def atlas_report(atlas: Atlas) -> Report:
-    """Return the report of the command `pyharness claims --atlas`.
-
-    The report shows how the verdicts on the claims of the thesis depend on the initial omega. The
-    tables are for the first interpretation of the doubtful cards and the first number of steps.
-    Some tables compare interpretations and numbers of steps.
-    """
+    """Return the report of `claims --atlas`, for the first reading and number of steps."""
     claims = _claims(atlas)
     score = atlas.score()
     first = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
@@ -161,9 +156,7 @@ def _by_choice(atlas: Atlas) -> Table:
 def _turned(atlas: Atlas) -> Table:
     """Return a table of the percentage of starts from which another choice changes a verdict.
 
-    A start is an initial omega, and a row of the table is about one claim of the thesis. The other
-    choice is a reading (interpretation of doubtful cards) or a number of steps other than the
-    first. Only one of the two is changed at a time.
+    Only the reading or the number of steps is changed at a time.
     """
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]
@@ -177,11 +170,9 @@ def _turned(atlas: Atlas) -> Table:
 
 
 def atlas_picture(atlas: Atlas) -> Picture:
-    """Draw maps of the sum of the claims' points over the sphere of directions of omega(0).
+    """Draw maps of the points over the sphere of directions, one for each magnitude of omega(0).
 
-    A claim of the thesis has 1 point if it is reproduced, and 1/2 if in part. Each map is for one
-    magnitude of omega(0). Beside the maps, a diagram shows the mean points of each claim at every
-    magnitude.
+    Beside them are the mean points of each claim at every magnitude.
     """
     from matplotlib.figure import Figure
 
@@ -275,10 +266,7 @@ def _draw_claims(figure: "Figure", atlas: Atlas, names: Sequence[str], means: An
 
 
 def _edges(values: Array) -> Array:
-    """Return the edges of a picture's cells, whose centres on a logarithmic axis are `values`.
-
-    An inner edge is the geometric mean of two neighbouring centres.
-    """
+    """Return the edges of a picture's cells, geometric means of the centres `values`."""
     if len(values) < 2:
         return np.array([values[0] / 2.0, values[0] * 2.0])
     middles = np.sqrt(values[1:] * values[:-1])

@@ -2,9 +2,9 @@
 
 A combination fixes omega(0), the readings, the conjectures and the number of steps. Its omega(0) is
 either one value for all cases in which the thesis gives none, or for each case the value that we
-adopt. The score is the sum of the points of the claims about the original programs. A claim has one
-point if it is reproduced, half a point if it is reproduced in part, and otherwise none. Claims that
-are not testable do not count. There are no weights and no tuned parameters.
+adopt. The score is the number of claims about the original programs that are reproduced; in part
+counts one half, and claims that are not testable do not count. There are no weights and no tuned
+parameters.
 """
 
 from collections.abc import Iterator
@@ -26,34 +26,23 @@ KINDS = ("result", "design")
 
 @dataclass(frozen=True)
 class Combination:
-    """One combination of the choices that the thesis leaves open, with the verdicts under it.
-
-    `verdicts` maps the identifier of each testable claim of the thesis about the programs to the
-    verdict on it, for the original programs.
-    """
+    """One combination of choices, with the verdict on each testable claim by identifier."""
 
     assumptions: Assumptions
     verdicts: dict[str, str]
 
     @property
     def score(self) -> float:
-        """Return the sum of the points of all claims under this combination of choices.
-
-        A claim has 1 point if it is reproduced, 1/2 if it is reproduced in part, and otherwise 0.
-        """
+        """Return the score."""
         return sum(POINTS.get(each, 0.0) for each in self.verdicts.values())
 
     @property
     def holding(self) -> int:
-        """Return how many claims of the thesis are reproduced, at least in part."""
+        """Return how many claims are reproduced, at least in part."""
         return sum(each in POINTS for each in self.verdicts.values())
 
     def choices(self) -> dict[str, str]:
-        """Return, by name of the choice, the value that this combination takes, as text.
-
-        The choices are omega(0), each reading (interpretation of doubtful cards), each conjecture
-        (assumption where no card exists), and the number of steps.
-        """
+        """Return, by name of the choice, the value that this combination takes, as text."""
         given = self.assumptions
         start = given.start or ()
         return {
@@ -68,12 +57,7 @@ class Combination:
 
 
 def evidence() -> Iterator[Combination]:
-    """Yield every combination of the open choices, with its verdicts on the thesis's claims.
-
-    The open choices are omega(0), the readings (interpretations of doubtful cards), the conjectures
-    (assumptions where no card exists) and the number of steps. The verdicts of a combination are
-    computed just before it is yielded.
-    """
+    """Yield every combination with its verdicts, computed just before."""
     for assumptions in combinations():
         verdicts = {}
         for entry in claims():
@@ -86,11 +70,7 @@ def evidence() -> Iterator[Combination]:
 
 
 def evidence_rule() -> str:
-    """Return the text in the report that explains the score of a combination of choices.
-
-    The choices are values that the thesis does not state, for example omega(0). The score is the
-    number of claims that are reproduced with these values; one reproduced in part counts 1/2.
-    """
+    """Return the text in the report that explains the score."""
     return (
         "Every combination of starts (one for all cases in which none is given, or those adopted), "
         "readings, conjectures and steps, scored by the claims about results and design of the "
@@ -100,12 +80,7 @@ def evidence_rule() -> str:
 
 
 def combinations() -> list[Assumptions]:
-    """Return every combination of the choices that the thesis leaves open.
-
-    The choices are the start (omega(0)), the readings (interpretations of doubtful cards), the
-    conjectures (assumptions where no card exists) and the number of steps. The start None takes the
-    adopted omega(0) of each case.
-    """
+    """Return every combination; the start None takes the adopted omega(0) of each case."""
     return [
         Assumptions(start, frozenset(readings), steps, frozenset(conjectures))
         for start, readings, conjectures, steps in product(
@@ -115,10 +90,7 @@ def combinations() -> list[Assumptions]:
 
 
 def discriminating(found: list[Combination]) -> list[str]:
-    """Return the identifiers of the claims whose verdict differs between combinations.
-
-    `found` has combinations of the choices that the thesis leaves open, each with its verdicts.
-    """
+    """Return the identifiers of the claims whose verdict differs between combinations."""
     every = dict.fromkeys(name for each in found for name in each.verdicts)
     return [
         name for name in every if len({each.verdicts.get(name, NOT_TESTABLE) for each in found}) > 1
@@ -126,12 +98,7 @@ def discriminating(found: list[Combination]) -> list[str]:
 
 
 def undecided(found: list[Combination]) -> dict[str, list[str]]:
-    """Return the values of each choice that occur among the combinations with the highest score.
-
-    `found` has combinations of the choices that the thesis leaves open. The choices are omega(0),
-    each reading (interpretation of doubtful cards), each conjecture (assumption where no card
-    exists), and the number of steps. The score is the sum of the claims' points.
-    """
+    """Return the values of each choice that occur among the combinations with the highest score."""
     best = max(each.score for each in found)
     choices = [each.choices() for each in found if each.score == best]
     return {axis: sorted({each[axis] for each in choices}) for axis in choices[0]}
@@ -140,10 +107,7 @@ def undecided(found: list[Combination]) -> dict[str, list[str]]:
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
     """Return `chosen`, but with adopted values for the assumptions that do not affect a claim.
 
-    `chosen` has a value for each assumption about what the thesis does not state. `entry` is the
-    claim, as in `data/claims.toml`, which lists the assumptions that affect it. Two combinations of
-    assumptions that differ only in others then have equal results, so that the claim's test runs
-    once for both.
+    The test of the claim then runs once for combinations that differ only in those.
     """
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)

@@ -34,12 +34,10 @@ _SHORT = {
 
 
 def evidence_report(found: Sequence[Combination]) -> Report:
-    """Return the report on how well the claims agree with each combination of open choices.
+    """Return the report on how well the claims agree with each combination.
 
-    The open choices are values that the thesis does not state, such as omega(0). A combination's
-    score is the sum of the claims' points. The report shows the combinations with the highest and
-    lowest scores, and the claims whose verdict differs between combinations. The report also shows
-    the values of each choice that occur with the highest score.
+    It has the highest and lowest scores, the claims whose verdict differs, and the values of each
+    choice with the highest score.
     """
     ordered = sorted(found, key=lambda each: -each.score)
     axes = list(ordered[0].choices())

@@ -24,12 +24,9 @@ from pyharness.truth.reference import Reference, reference
 class Assumptions:
     """One value for each choice that the thesis leaves open.
 
-    `start` is omega(0) (rad/s) of the cases in which the thesis gives none; None takes the values
-    in `cases.toml`. `readings` are the names of interpretations of doubtful cards that this edition
-    does not adopt, but that are used here. `steps` is the number of steps of every run.
-    `conjectures` are the names of assumptions about statements for which no card exists; None takes
-    those of the original listing. `word` is the name of the floating-point arithmetic of the
-    programs.
+    `start` is omega(0) (rad/s) of the cases in which the thesis gives none; None takes those of
+    `cases.toml`. `readings` are used although this edition does not adopt them; `conjectures` None
+    takes those of the original listing. `word` is the arithmetic.
     """
 
     start: Triple | None = None
@@ -43,8 +40,9 @@ class Assumptions:
 class Laboratory:
     """The three programs, original or corrected, which run the cases under given assumptions.
 
-    A laboratory serves to test claims of the thesis. The original programs have all their defects
-    except those named in `fixed`.
+    The original programs have all their defects except those `fixed`. `parts` divides the step size
+    of a run and multiplies its steps; results are at the steps of the case. Without `may_stop` the
+    stop test of the Runge-Kutta program is skipped. Errors are against the reference solution.
     """
 
     is_original: bool
@@ -52,12 +50,7 @@ class Laboratory:
     fixed: frozenset[str] = frozenset()
 
     def listing(self, program: str) -> Listing:
-        """Return the listing of a program: the program with a choice of its defects.
-
-        The original listing has the assumed readings (interpretations of doubtful cards) and
-        conjectures (assumptions where no card exists). The corrected listing depends on no
-        assumption.
-        """
+        """Return the listing of a program; the corrected one depends on no assumption."""
         if not self.is_original:
             return Listing.corrected(program)
         readings = self.assumptions.readings & set(names_of("reading", program))
@@ -66,46 +59,26 @@ class Laboratory:
         return subset(program, "original", fixed, readings=readings, conjectures=assumed)
 
     def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return the scene of a case under the assumptions, its step size divided by `parts`.
-
-        A scene is a body with its initial omega, torque, step size and number of steps. The number
-        of steps is multiplied by `parts`, so that the end time does not depend on `parts`.
-        """
+        """Return the scene of a case under the assumptions."""
         scene = _scene(case, self.assumptions.start, self.assumptions.steps)
         return replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
 
     def run(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Trajectory:
-        """Run a program on a case of the thesis, with the case's step size divided by `parts`.
-
-        Without `may_stop` the stop test of the Runge-Kutta program is skipped.
-        """
+        """Run a program on a case."""
         return self.run_on(self.scene(case, parts), self.listing(program), may_stop)
 
     def run_on(
         self, scene: Scene, listing: Listing, may_stop: bool = True, lipschitz: float = 500.0
     ) -> Trajectory:
-        """Run a listing (a program with a choice of its defects) on a scene.
-
-        The floating-point arithmetic is the one that the laboratory's assumptions name. `lipschitz`
-        is the limit (1/s) of the stop test of the Runge-Kutta program; without `may_stop` the test
-        is skipped.
-        """
+        """Run a listing on a scene in the assumed arithmetic; `lipschitz` is in 1/s."""
         return _run(listing, scene, may_stop, lipschitz, self.assumptions.word)
 
     def truth(self, case: int) -> Reference:
-        """Return the reference solution of a case at the end of each of its steps.
-
-        The laboratory's assumptions determine the number of steps of the case. They also determine
-        the initial omega if the thesis gives none.
-        """
+        """Return the reference solution of a case at the end of each of its steps."""
         return _truth(self.scene(case))
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program as the method `run` does, and return omega with the outcome of the run.
-
-        Omega has the rows at the steps of the case only, even if `parts` divides the step size.
-        Omega is NaN after the end of the run.
-        """
+        """Run a program and return omega, NaN after the end of the run, with the outcome."""
         run = self.run(program, case, may_stop, parts)
         reached = run.omega[parts - 1 :: parts]
         omega = np.full((self.assumptions.steps, 3), np.nan)
@@ -114,27 +87,19 @@ class Laboratory:
         return Runs(omega, np.asarray(len(reached)), complete, overflow)
 
     def solution(self, case: int) -> Array:
-        """Return the reference omega (rad/s) of a case at its steps, shape (steps, 3).
-
-        The row of a step is omega at the end of the step.
-        """
+        """Return the reference omega (rad/s) of a case at its steps, shape (steps, 3)."""
         return self.truth(case).omega
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> float:
-        """Return the largest error of any omega component (rad/s) when a program runs a case.
-
-        The errors are against the reference solution, at the steps of the case that the program
-        ran. The result is infinite after an overflow. `parts` divides the step size. Without
-        `may_stop` the stop test of the Runge-Kutta program is skipped.
-        """
+        """Return the largest error of any omega component (rad/s), infinite after an overflow."""
         return float(largest_error(self, program, case, may_stop, parts))
 
     def models(self, case: int, terms: int) -> Array:
         """Return omega (rad/s) of the collocation model with n = `terms` terms, shape (steps, 3).
 
-        The model's collocation points are at k/(n+1) of the interval length DT, k = 1 ... n. In the
-        corrected programs DT is the step size. In the original programs DT grows by the step size
-        in every step, so that the points move out of the step. The torque must then be constant.
+        Its points are at k/(n+1) of the interval length DT, k = 1 ... n. DT is the step size; in
+        the original programs it grows by the step size in every step, so that the points move out
+        of the step, and the torque must be constant.
         """
         accumulates = self.is_original and "dt-accumulates" not in self.fixed
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
@@ -142,9 +107,7 @@ class Laboratory:
     def required_constant(self, case: int) -> float:
         """Return the least Lipschitz constant (1/s) with which every step passes the stop test.
 
-        The stop test of the Runge-Kutta program ends a run if a Lipschitz quotient exceeds the
-        constant. The program runs the case `case`. The result is infinite if no constant is large
-        enough.
+        It is infinite if no constant is large enough.
         """
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
@@ -159,31 +122,21 @@ class Laboratory:
 
 
 def starts() -> list[Triple]:
-    """Return all initial omegas (rad/s) that the thesis shows, and one of our own.
-
-    These initial omegas are tried in the cases for which the thesis gives no initial omega.
-    """
+    """Return all initial omegas (rad/s) that the thesis shows, and one of our own."""
     return [
         (float(a), float(b), float(c)) for a, b, c in (s["omega"] for s in facts("claims")["start"])
     ]
 
 
 def distance(first: Array, second: Array) -> float:
-    """Return the largest difference (rad/s) of any omega component between two solutions.
-
-    The arrays `first` and `second` have the shape (rows, 3). If one of them is longer, its
-    additional rows do not count.
-    """
+    """Return the largest difference (rad/s) of any omega component in the rows that both have."""
     n = min(len(first), len(second))
     with np.errstate(all="ignore"):
         return float(np.abs(first[:n] - second[:n]).max(initial=0.0))
 
 
 def ranges(truth: Reference) -> Array:
-    """Return the range of each omega component of a reference solution (rad/s), shape (3,).
-
-    A range is the largest minus the smallest value.
-    """
+    """Return the range, largest minus smallest, of each reference omega (rad/s), shape (3,)."""
     return spread_of(truth.omega)
 
 
@@ -248,12 +201,10 @@ def by_literals(
 ) -> Array:
     """Return omega as an original collocation program with changed step literals computes it.
 
-    A step literal is a place on the program's cards where the step size is a literal number.
-    `changed` has the names, from `LITERALS`, of the literals that are divided by `parts`. `terms`
-    is 2 for the two-term program and 4 for the four-term program. The cards themselves do not run:
-    an equivalent model, which differs only in rounding errors, integrates all scenes at once. The
-    scenes must have constant torque. The result (rad/s) has every scene at the steps of the
-    unchanged program, shape (scenes, steps, 3), and is NaN from an overflow on.
+    The step size is a literal in several places of the cards; `changed` has those, from `LITERALS`,
+    that are divided by `parts`. An equivalent model, which differs in rounding errors, integrates
+    all scenes at once under constant torque. The result (rad/s) is at the steps of the unchanged
+    program, shape (scenes, steps, 3), NaN from an overflow on.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
@@ -271,12 +222,10 @@ def integrate_models(
 ) -> Array:  # fmt: skip
     """Integrate the collocation model of bodies with constant torque from n initial omegas at once.
 
-    `omega`, shape (n, 3), has the initial omegas (rad/s). `coefficients` has A, B and C of Euler's
-    equations in its last axis, and `torque` is the constant torque divided by the moments (rad/s2).
-    `terms` is the number of terms of the trial functions. The collocation points divide the
-    interval (0, dt) evenly, where dt (s) grows by `growth` (s) with every step. Each of the `steps`
-    steps is `end` (s) long. Return omega (rad/s), shape (n, steps, 3), which equals the omega of
-    the programs but for rounding error. From an overflow on, omega is NaN.
+    `omega` (rad/s) has shape (n, 3), `coefficients` A, B and C in its last axis; `torque` is
+    divided by the moments (rad/s2). The points divide the interval (0, dt) evenly, where dt (s)
+    grows by `growth` (s) with every step of length `end` (s). Return omega (rad/s), shape (n,
+    steps, 3), which equals that of the programs but for rounding, and is NaN from an overflow on.
     """
     a, b, c = coefficients.T
 

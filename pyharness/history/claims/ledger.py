@@ -1,4 +1,7 @@
-"""The claims of the thesis, and the verdicts computed for the original and corrected programs."""
+"""The claims of the thesis, and the verdicts computed for the original and corrected programs.
+
+A claim is an entry of `data/claims.toml`.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -19,12 +22,7 @@ _ROOMS = (verdicts, methods, theory)
 
 @dataclass(frozen=True)
 class Survival:
-    """The verdicts on one claim of the thesis, with one assumption changed.
-
-    `assumption` describes the change, for example another initial omega. `original` and `corrected`
-    are the verdicts for the original and for the corrected programs. `survives` is true if both
-    verdicts are the same as with the adopted assumptions.
-    """
+    """The verdicts on one claim with one assumption changed; `survives` if both are the same."""
 
     assumption: str
     original: str
@@ -34,11 +32,7 @@ class Survival:
 
 @dataclass(frozen=True)
 class Judgement:
-    """A claim of the thesis with its verdicts for the original and corrected programs.
-
-    `claim` is an entry of `data/claims.toml`. `survivals` has the verdicts with each assumption
-    changed, one at a time.
-    """
+    """A claim with its verdicts, and those with each assumption changed, one at a time."""
 
     claim: dict[str, Any]
     original: Judged
@@ -48,11 +42,10 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Assignment:
-    """An initial omega for a case in which the thesis gives none, and the verdicts on its claims.
+    """An initial omega (rad/s) for a case in which the thesis gives none, and its claims' verdicts.
 
-    `start` is the initial omega (rad/s). `verdicts` maps each claim about the case to the verdict
-    for the original programs. `holds` is true if all claims about the case are reproduced, at least
-    in part. Claims that fail with every start do not count.
+    It `holds` if all claims about the case are reproduced by the original programs, at least in
+    part; those that fail with every start do not count.
     """
 
     case: int
@@ -62,16 +55,13 @@ class Assignment:
 
 
 def claims() -> list[dict[str, Any]]:
-    """Return all claims of the thesis on which we give a verdict, as in `data/claims.toml`."""
+    """Return all claims of the thesis on which we give a verdict."""
     entries: list[dict[str, Any]] = facts("claims")["claim"]
     return entries
 
 
 def claim(identity: str) -> dict[str, Any]:
-    """Return the claim of the thesis with the identifier `identity`, as in `data/claims.toml`.
-
-    Raise InputError if no claim has this identifier.
-    """
+    """Return the claim `identity`; raise InputError if there is none."""
     by_name = {each["id"]: each for each in claims()}
     if identity not in by_name:
         raise unknown("claim", identity, list(by_name))
@@ -79,12 +69,7 @@ def claim(identity: str) -> dict[str, Any]:
 
 
 def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
-    """Test one claim under the adopted assumptions, and again with each assumption changed.
-
-    The result has the verdicts for the original and the corrected programs. `entry` is the claim,
-    as in `data/claims.toml`. `word` is the name of the floating-point arithmetic in which the
-    programs run.
-    """
+    """Test one claim under the adopted assumptions, and again with each assumption changed."""
 
     def verdicts(entry: dict[str, Any], assumptions: Assumptions) -> tuple[Judged, Judged]:
         programs = outcome(entry, Laboratory(True, assumptions))
@@ -107,28 +92,17 @@ def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
 
 @cache
 def judgement(identity: str, word: str = BINARY64) -> Judgement:
-    """Return the verdicts on the claim with the identifier `identity`, as `judge` gives them.
-
-    The verdicts are for the original and the corrected programs, under several assumptions. The
-    result is cached. `word` is the name of the floating-point arithmetic in which the programs run.
-    """
+    """Return the verdicts on the claim `identity`, as `judge` gives them; cached."""
     return judge(claim(identity), word)
 
 
 def judgements() -> list[Judgement]:
-    """Return our verdicts on every claim of the thesis, for the original and corrected programs.
-
-    A `Judgement` has the verdicts on one claim.
-    """
+    """Return our verdicts on every claim."""
     return [judgement(entry["id"]) for entry in claims()]
 
 
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
-    """Return the verdict on one claim, for the programs that the laboratory runs.
-
-    `laboratory` runs the original or the corrected programs under given assumptions. `entry` is the
-    claim, as in `data/claims.toml`; the entry names the test function that gives the verdict.
-    """
+    """Return the verdict of a claim's test for the programs that the laboratory runs."""
     (test,) = (vars(room)[entry["test"]] for room in _ROOMS if entry["test"] in vars(room))
     judged: Judged = test(laboratory, **entry.get("parameters", {}))
     return judged
@@ -157,10 +131,8 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 def assignments() -> list[Assignment]:
     """Return one assignment for each start and each case in which the thesis gives no omega(0).
 
-    An assignment has the verdicts on the claims about the case. The starts are the initial omegas
-    from the function `starts`. The claims about a case do not depend on the start of another case.
-    All claims therefore hold at once if every case has a start with which its own claims hold.
-    Claims that fail with every start do not count.
+    The claims about a case do not depend on the start of another, so that all hold at once if every
+    case has a start with which its own do.
     """
     found = []
     for case in facts("claims")["assumed"]["cases"]:

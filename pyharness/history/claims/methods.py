@@ -1,10 +1,8 @@
 """Tests of the thesis's claims about programs and methods over several cases.
 
-Each function is the `test` of one or more claims in `data/claims.toml`, with arguments, errors and
-verdicts as in `verdicts`. `lab` is a laboratory, which runs the programs under the chosen
-assumptions, and `cases` are numbers of cases of Table 1. The thesis lists no programs for some
-weighted residual methods. A test of these methods has the verdict "not testable" for the original
-programs.
+Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` says how it
+decides, with arguments, errors and verdicts as in `verdicts`. The thesis lists no programs for the
+weightings other than collocation; a test of these is "not testable" for the original programs.
 """
 
 import math
@@ -43,14 +41,10 @@ _OTHERS = WEIGHTINGS[1:]
 
 
 def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
-    """Judge the claim of the thesis that collocation is superior to Runge-Kutta.
+    """Judge the claim that collocation is superior to Runge-Kutta.
 
-    `lab` runs the programs; only the steps that all three programs ran are compared. A case counts
-    if the errors of both collocation programs are below the error of the Runge-Kutta program. The
-    verdict is "reproduced" if all `cases` count, "reproduced in part" if some do, otherwise
-    "false". The ratios of the larger collocation error to that of Runge-Kutta are reported, also
-    for the cases in `shown`, which do not affect the verdict. An error is the largest error of any
-    omega component against the reference solution.
+    Only the steps that all three programs ran are compared, and both collocation errors must be
+    below that of Runge-Kutta. The cases in `shown` do not affect the verdict.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):
@@ -68,13 +62,10 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge the claim that eq. 19 of the thesis, the Lipschitz condition, ends unbounded runs.
 
-    The Runge-Kutta program in `lab` ends a run if a quotient is too large: the change of a
-    derivative between two stages of a step, divided by the change of its variable. This test
-    applies eq. 19 only if its quotients are Lipschitz quotients of the differential equations.
-    These are at most the norm of the equations' Jacobian. In each of the `cases` the largest
-    quotient of the test is divided by the largest norm along the reference solution and the run.
-    The verdict is "reproduced" if no such ratio exceeds 1.05, "reproduced in part" if none exceeds
-    2, otherwise "false".
+    The test applies eq. 19 only if its quotients, changes of a derivative between two stages over
+    changes of its variable, are Lipschitz quotients of the differential equations. These are at
+    most the norm of the Jacobian, here the largest along the reference and the run. The largest
+    ratio of quotient to norm decides: at most 1.05, or 2 in part.
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -99,10 +90,7 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
 def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
     """Judge the claim that more than four terms hardly reduce the error of a collocation model.
 
-    `lab` computes the models in each of the `cases`, and `terms` are their numbers of terms above
-    four. The error of the model of four terms is divided by the error of each model of more terms.
-    The verdict is "reproduced" if no ratio exceeds 2, and "reproduced in part" if none exceeds 10.
-    An error is the largest error of any omega component against the reference solution.
+    No error of four terms may be more than 2 times (in part: 10) that of more `terms`.
     """
     numbers = {}
     for case in cases:
@@ -117,13 +105,7 @@ def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
 
 
 def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Judge the claim that some case needs a Lipschitz constant above the one on the cards.
-
-    The stop test of the Runge-Kutta program ends a run if the change of a derivative, divided by
-    the change of its variable, exceeds this constant. `lab` computes, for each of the `cases`, the
-    smallest constant (1/s) with which every step passes the test. The verdict is "reproduced" if
-    one of them exceeds the constant on the program's cards.
-    """
+    """Judge the claim that some case needs a Lipschitz constant above the one on the cards."""
     numbers = {f"case {n}: constant needed (1/s)": lab.required_constant(n) for n in cases}
     return graded(numbers, max(numbers.values()) > facts("cases")["deck"]["lipschitz"])
 
@@ -131,11 +113,8 @@ def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
 def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
     """Judge the claim that the stop test ends the runs that are unbounded, and no others.
 
-    `lab` runs the Runge-Kutta program with and without the test. A run without the test counts as
-    unbounded if omega overflows, or exceeds `bounded` times the largest omega of the reference
-    solution. The verdict is "reproduced" if the test ends all unbounded runs and no bounded run.
-    The verdict is "reproduced in part" if the test ends some unbounded run, otherwise "false". The
-    verdict is "not testable" if no run is unbounded, and the test ends no bounded run.
+    A run is unbounded if it overflows without the test, or exceeds `bounded` times the largest
+    reference omega. Without such runs and false alarms, the claim is not testable.
     """
     alarms = unbounded = caught = 0
     for case in cases:
@@ -165,12 +144,8 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge the claim that collocation improves if the step size is divided by ten.
 
-    The claim excepts the two-term program in the case `exception`. `lab` runs both collocation
-    programs in all `cases`. A pair of program and case improves if the error falls at least to
-    half. The verdict is "reproduced" if at least four fifths of the other pairs improve, but not
-    the exception; "reproduced in part" if at least half of the others do. The original cards have
-    the step size as several literals. For the original programs the result therefore also counts
-    the cases of constant torque that improve when only some of these literals are changed.
+    The rule is `rules.small_step`. The original cards have the step size as several literals; the
+    result also counts the cases of constant torque that improve when only some are changed.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
@@ -180,12 +155,9 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
 
 
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
-    """Count the cases whose error falls to half when literals of the step are divided by ten.
+    """Count the cases whose error falls to half when some of `LITERALS` are divided by ten.
 
-    The cards have the step size as several literals, `LITERALS`. Return, by description, the counts
-    for each original collocation program and each subset of the literals. The error is the largest
-    error of any omega component. A case also counts if the run overflows only with the original
-    literals.
+    A case also counts if the run overflows only with the original literals.
     """
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
@@ -203,12 +175,7 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
 
 
 def small_step_runge_kutta(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Judge the claim that Runge-Kutta does not improve if the step size is divided by ten.
-
-    A case improves if the largest error of omega falls at least to half. The verdict is
-    "reproduced" if none of the `cases` improves, "reproduced in part" if at most a third of them
-    do, otherwise "not reproduced". `lab` runs the program without the stop test.
-    """
+    """Judge the claim that Runge-Kutta does not improve if the step size is divided by ten."""
     return judged(rules.small_step_runge_kutta(lab, cases))
 
 
@@ -217,11 +184,9 @@ def suffices(
 ) -> Judged:
     """Judge the claim that a three- or four-term model suffices for most problems.
 
-    A case counts if two errors are at most the fraction `share` of the largest omega. The first is
-    the error of the four-term program in `lab`. The second is the error of the collocation model
-    with `terms[0]` terms, which is left out for the original programs if the torque varies. The
-    verdict is "reproduced" if at least `enough` cases count, and "reproduced in part" if at least
-    three do. An error is the largest error of any omega component against the reference solution.
+    The errors of the four-term program and of the model with `terms[0]` terms must be at most
+    `share` of the largest omega in `enough` cases (in part: three). The model is left out for the
+    original programs if the torque varies.
     """
     numbers, good = {}, 0
     for case in cases:
@@ -241,12 +206,9 @@ def execution_time(
 ) -> Judged:
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
-    The floating-point operations of one step are counted on the cards of the programs in `lab` and
-    in our version of the linear solver LEQT1F. One count has all operations as written, and the
-    other counts a term that occurs several times only once. The time of a step is the sum of the
-    `unit_times` of its operations. The time of a collocation program is divided by that of
-    Runge-Kutta, which gives four ratios for two programs and two counts. The verdict is
-    "reproduced" if all ratios are from `low` to `high`, and "reproduced in part" if some are.
+    Floating-point operations of a step, weighted by `unit_times`, are counted on the cards and in
+    our LEQT1F: as written, and a repeated term only once. The four ratios must be from `low` to
+    `high`, or some of them in part.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -267,10 +229,9 @@ def execution_time(
 
 
 def seconds(lab: Laboratory) -> Judged:
-    """Count the floating-point operations of 100 steps of each program that `lab` runs.
+    """Count the floating-point operations of 100 steps of each program.
 
-    The claim of the thesis is about run times in seconds, and run times today say nothing about the
-    original machine. The verdict on the claim is therefore always "not testable".
+    Run times today say nothing about the original machine, so that the claim is not testable.
     """
     counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
     numbers = {
@@ -283,11 +244,9 @@ def seconds(lab: Laboratory) -> Judged:
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Judge the claim that the three programs have about the same number of cards.
 
-    The number of cards of each collocation deck is divided by that of the Runge-Kutta deck. This is
-    done twice: without and with the cards of our version of the linear solver LEQT1F. The decks are
-    those of the programs in `lab`. `factors` are two thresholds. The verdict is "reproduced" if
-    every ratio is at most the lower threshold. It is "not reproduced" if every ratio exceeds the
-    lower threshold, and the largest ratio exceeds the higher one. Otherwise it is "undecided".
+    The ratio of each collocation deck to the Runge-Kutta deck is taken without and with our LEQT1F.
+    The claim is undecided if the two thresholds in `factors` give different verdicts, or some ratio
+    is at most the lower one.
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -308,12 +267,7 @@ def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
 def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
     """Judge the claim that the weightings other than collocation failed, in `cases`.
 
-    The other weightings are subdomain, Galerkin and least squares; the exact solution of these
-    cases is known. `terms` are the numbers of terms that are tried. The verdict is "reproduced" if
-    some error exceeds the largest omega, and "reproduced in part" if some error exceeds ten times
-    the error of collocation. An error is the largest error of any omega component against the
-    reference solution of `lab`. For the original programs, which lack these methods, the verdict is
-    "not testable".
+    An error must exceed the largest omega or, in part, ten times that of collocation.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -336,12 +290,9 @@ def computer_error(
 ) -> Judged:
     """Judge the claim that rounding error makes the weightings other than collocation fail.
 
-    Two sets of differences of omega (rad/s) are computed. The first set has the errors in Case 1,
-    which every method solves exactly but for rounding, with smaller and smaller steps. The second
-    set has the differences between runs in binary64 and in the arithmetics named in `words`, in
-    `cases`. These runs use the methods as section IV.2 of the thesis describes them. The verdict is
-    "reproduced" if the largest number of both sets reaches `limit` (rad/s), otherwise "false". For
-    the original programs, which lack these methods, the verdict is "not testable".
+    Two sets of differences of omega must reach `limit` (rad/s): the errors in Case 1, which every
+    method solves exactly but for rounding, with smaller and smaller steps; and runs as in section
+    IV.2 in binary64 against those in `words`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -366,12 +317,8 @@ def computer_error(
 def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
     """Judge the claim that of the four weightings only collocation succeeds.
 
-    The error of each other weighting is divided by the error of collocation with the same number of
-    terms. For each weighting the largest ratio over all `cases` and all numbers in `terms` counts.
-    The verdict is "reproduced" if this ratio exceeds 10 for every weighting, "reproduced in part"
-    if for some, otherwise "false". An error is the largest error of any omega component against the
-    reference solution of `lab`. For the original programs, which lack the other weightings, the
-    verdict is "not testable".
+    Each other weighting must have an error over 10 times that of collocation with the same terms;
+    in part, some must.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -391,12 +338,8 @@ def all_succeed(
 ) -> Judged:
     """Judge the claim that the weighted residual methods integrate the rigid body problem.
 
-    A weighting, for example collocation or Galerkin, succeeds if its error is at most the fraction
-    `share` of the largest omega. To succeed, a weighting must have such errors in all `cases` and
-    with all numbers of terms in `terms`. The verdict is "reproduced" if every weighting succeeds,
-    "reproduced in part" if some do, otherwise "false". An error is the largest error of any omega
-    component against the reference solution of `lab`. For the original programs, which lack the
-    other weightings, the verdict is "not testable".
+    A weighting succeeds if its errors are at most `share` of the largest omega in all cases and
+    with all `terms`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -415,12 +358,9 @@ def all_succeed(
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Compare the corrected programs with collocation that corrects a first estimate once per step.
 
-    A correction solves for the coefficients of the trial functions, with the right-hand sides along
-    the previous estimate. The numbers of the result are the largest differences (rad/s) between the
-    omegas of programs and collocation in `cases`, under the assumptions of `lab`. Further numbers
-    are the errors of four-term collocation with zero to three corrections. The thesis recommends to
-    try a predict-correct technique. A recommendation is neither true nor false, so the verdict is
-    always "not testable".
+    A correction solves for the coefficients with the right-hand sides along the previous estimate.
+    The thesis recommends to try a predict-correct technique, which is neither true nor false: "not
+    testable". The numbers are distances (rad/s), and errors with zero to three corrections.
     """
     best = Laboratory(False, lab.assumptions)
     numbers = {}

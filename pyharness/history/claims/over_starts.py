@@ -35,19 +35,15 @@ _EFFORT = 1e9  # in effect no work limit, because a sweep reports its expected t
 
 
 class Starts:
-    """The runs of the programs from n starts, for the cases in which the thesis gives no omega(0).
+    """The runs from n starts, a `rules.Bench`, for the cases in which the thesis gives no omega(0).
 
-    A start is an initial omega. The class is a `rules.Bench`, from which the tests of claims obtain
-    runs and reference solutions. The laboratory `one` has the programs, the cases and the
-    assumptions, for example about doubtful cards. The reference solution is integrated by Taylor
-    series from each step of the case to the next, to a relative tolerance of 1e-12.
+    The laboratory `one` has programs, cases and assumptions. The reference is integrated by Taylor
+    series from step to step, to a relative tolerance of 1e-12. Arrays have the shape (n, steps, 3),
+    or (steps, 3) if the thesis gives omega(0).
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
-        """Store the laboratory `one`, which runs the programs, and the starts `omega0`.
-
-        The starts are initial omegas (rad/s), shape (n, 3). No program runs yet.
-        """
+        """Store the laboratory and the starts (rad/s), shape (n, 3); no program runs yet."""
         self._one, self._omega0 = one, omega0
         self._solution = cache(self._integrated)
         self._error = cache(partial(rules.largest_error, self))
@@ -55,49 +51,25 @@ class Starts:
         self._models = cache(self._modelled)
 
     def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return the scene of a case, its step size divided by `parts`.
-
-        A scene is a body with its initial omega, torque, step size and number of steps. If the
-        thesis gives no omega(0) for the case, the scene has the omega(0) of the underlying
-        assumptions, not one of the n starts.
-        """
+        """Return the scene of a case, not with the n starts but with the laboratory's."""
         return self._one.scene(case, parts)
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program on a case from every start (initial omega), its step divided by `parts`.
-
-        Without `may_stop` the stop test of the Runge-Kutta program is skipped. The resulting omega
-        (rad/s) is at the steps of the case, and has the shape (n, steps, 3), or (steps, 3) if the
-        thesis gives the case's omega(0).
-        """
+        """Run a program on a case from every start."""
         # Only runs with the full step size are cached. Others are requested once, for their error,
         # which is itself cached.
         return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
 
     def solution(self, case: int) -> Array:
-        """Return the reference omega (rad/s) of a case at its steps, for each start.
-
-        A start is an initial omega. The shape is (n, steps, 3) for n starts, or (steps, 3) if the
-        thesis gives the case's omega(0).
-        """
+        """Return the reference omega (rad/s) of a case at its steps, for each start."""
         return self._solution(case)
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Any:
-        """Return the largest error of any omega component (rad/s) in a case, for each start.
-
-        A start is an initial omega. Only the steps of the case count; the error is infinite after
-        an overflow. `parts` divides the step size. Without `may_stop` the stop test of the
-        Runge-Kutta program is skipped.
-        """
+        """Return the largest error of any omega component (rad/s) in a case, for each start."""
         return self._error(program, case, may_stop, parts)
 
     def models(self, case: int, terms: int) -> Array:
-        """Return omega (rad/s) of the collocation models whose trial functions have `terms` terms.
-
-        There is a model for each start (initial omega). The shape is (n, steps, 3) for n starts, or
-        (steps, 3) if the thesis gives the case's omega(0). Apart from rounding errors, each model
-        equals the result of `Laboratory.models` from the same start.
-        """
+        """Return omega (rad/s) of the models, as `Laboratory.models` but for rounding."""
         return self._models(case, terms)
 
     def _starts(self, case: int) -> Array:
@@ -156,13 +128,10 @@ def __getattr__(name: str) -> Callable[[Batch], NDArray[np.int8]]:
 
 
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
-    """Return the verdict code of a claim about the programs for each start in a batch of a sweep.
+    """Return the code of a claim for each start in a batch of a sweep, shape (n,).
 
-    A batch is a set of scenes that are solved in one call; a start is the initial omega of one of
-    them. `identity` is the claim's identifier. The code is FAILS, HOLDS, IN_PART or SILENT, shape
-    (n,). It is SILENT if the sweep's scene is no case of the thesis, or if the sweep varies more
-    than starts, readings (of doubtful cards) and steps. The claim itself determines which cases are
-    run, and these may be other cases than that of the sweep.
+    It is SILENT if the claims do not apply to the sweep (`_laboratory`). The claim itself
+    determines which cases are run, whatever the sweep's.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
@@ -175,11 +144,7 @@ def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
 
 
 def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
-    """Return the verdict codes of a claim of the thesis from n starts (initial omegas), shape (n,).
-
-    `bench` runs the programs from these starts. `entry` is the claim, as in `data/claims.toml`. A
-    code is FAILS, HOLDS or IN_PART.
-    """
+    """Return the codes FAILS, HOLDS or IN_PART of a claim from n starts, shape (n,)."""
     grade = vars(rules)[entry["test"]](bench, **entry["parameters"])
     found = np.where(grade.whole, HOLDS, np.where(grade.part, IN_PART, FAILS))
     return np.broadcast_to(found, (n,)).astype(np.int8)
@@ -193,12 +158,10 @@ def _bench(one: Laboratory, batch: Batch) -> Starts:
 
 
 def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
-    """Return the laboratory that runs the programs of a sweep under the assumptions, or None.
+    """Return the laboratory of a sweep, or None if the claims do not apply to it.
 
-    `batch` has the scenes and the program of the sweep. None means that the claims of the thesis do
-    not apply to the sweep, for one of four reasons. Its program is neither the original nor the
-    corrected one. Its scene is none of the seven cases of the thesis. It varies body or torque. Its
-    stop test is not that of the program's cards.
+    They do not if the program is neither original nor corrected, the scene is no case of the
+    thesis, body or torque vary, or the stop test is not that of the cards.
     """
     if batch.listing is None or batch.arrays.keys() & _OF_CASES:
         return None

@@ -40,10 +40,7 @@ KINDS = {
 
 
 def claims_report(judgements: Sequence[Judgement]) -> Report:
-    """Return the report of the claims of the thesis and our verdicts, one line for each claim.
-
-    `judgements` has the claims, each with its verdicts for the original and corrected programs.
-    """
+    """Return the report of the claims and our verdicts, one line for each claim."""
     rows = [
         [
             each.claim["id"], each.claim["kind"], each.claim["where"], each.original.verdict,
@@ -69,12 +66,7 @@ def claims_report(judgements: Sequence[Judgement]) -> Report:
 
 
 def kinds_table(judgements: Sequence[Judgement]) -> Table:
-    """Return a table of the number of claims with each verdict, one row for each kind of claim.
-
-    `judgements` has the claims of the thesis, each with its verdicts. There is a column for each
-    verdict. An element of it has two numbers: for the original programs and, after a slash, for the
-    corrected programs.
-    """
+    """Return a table of the number of claims by kind and verdict, original / corrected."""
     columns = [*words("kind"), Column("claims"), *map(Column, _VERDICTS)]
     rows = []
     for kind in KINDS:
@@ -90,11 +82,7 @@ def kinds_table(judgements: Sequence[Judgement]) -> Table:
 
 
 def explanation(judgement: Judgement) -> Report:
-    """Return the report of one claim of the thesis, with the numbers behind its verdicts.
-
-    The report has the quotation, the rule by which the claim is tested, and the verdicts.
-    `judgement` is the claim with its verdicts.
-    """
+    """Return the report of one claim: quotation, rule, verdicts and the numbers behind them."""
     entry = judgement.claim
     text: list[Section] = [
         [f'{entry["id"]} ({entry["where"]}): "{entry["quote"]}"'],
@@ -120,12 +108,7 @@ def explanation(judgement: Judgement) -> Report:
 
 
 def assignments_report(assignments: Sequence[Assignment]) -> Report:
-    """Return the report on the initial omegas with which the claims about each case hold.
-
-    Each of the `assignments` is one initial omega for one case in which the thesis gives none, with
-    the verdicts on the claims about this case. The verdicts on the claims of the thesis are for the
-    original programs.
-    """
+    """Return the report on the initial omegas with which the claims about each case hold."""
     text: list[Section] = [
         [
             "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis "
@@ -168,10 +151,7 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def _hangs_on(judgement: Judgement) -> list[str]:
-    """Return the names of the assumptions whose change alters a verdict on a claim of the thesis.
-
-    `judgement` is the claim with its verdicts. Each name occurs only once.
-    """
+    """Return the names of the assumptions whose change alters a verdict."""
     turning = (
         each.assumption.replace("conjecture ", "").replace("reading ", "")
         for each in judgement.survivals
@@ -183,10 +163,7 @@ def _hangs_on(judgement: Judgement) -> list[str]:
 
 
 def written(x: float) -> str:
-    """Return a number that supports a verdict on a claim as text.
-
-    A whole number below a million has all its digits, any other number three significant digits.
-    """
+    """Return a number as text: a whole one below a million with all digits, else three."""
     if not math.isfinite(x):
         return short(x)
     return f"{x:.0f}" if x == int(x) and abs(x) < 1e6 else f"{x:.3g}"

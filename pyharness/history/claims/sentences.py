@@ -11,25 +11,10 @@ from pyharness.model.facts import facts
 class Sentence(NamedTuple):
     """A sentence of the thesis with the claims that it makes; fields that do not apply are empty.
 
-    Attributes
-    ----------
-    where : str
-        The section, with the paragraph, the case or the recommendation.
-    quote : str
-        A few words of the sentence.
-    text : str
-        The whole sentence in our reading, with formulas in LaTeX. It has a line for each line of
-        the thesis that a formula or a table has of its own.
-    claims : tuple of str
-        The identifiers of the claims that the sentence makes.
-    why : str
-        For a sentence without claims, its function in the text of the thesis.
-    laboratory : str
-        The run that shows best what the sentence says, as options of the command `pyharness run`:
-        ``case=2&program=two-term``.
-    command : str
-        A command, without ``pyharness``, that shows more about the sentence's claims than the
-        command `pyharness claims --explain` does.
+    `text` is our reading, with formulas in LaTeX and a line for each that a formula or table has of
+    its own, `quote` a few words of it. `why` is the function of a sentence without claims.
+    `laboratory` is the run that shows it best, as in ``case=2&program=two-term``; `command`,
+    without ``pyharness``, shows more than `claims --explain`.
     """
 
     where: str

@@ -1,7 +1,7 @@
 """Each claim of the thesis as a story of three sentences, with the computed numbers in them.
 
-The sentences are in `data/claims.toml`. In place of a number they have a field, which names a
-number of our verdict on the claim, so that no number of a story is written by hand.
+In the sentences of `data/claims.toml` a field names a number of our verdict, so that no number of a
+story is written by hand.
 """
 
 import re
@@ -21,10 +21,9 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Story(NamedTuple):
-    """A claim of the thesis told in three sentences.
+    """A claim told in three sentences: what the thesis reports, why, and what is true of it.
 
-    `saw` says what the thesis reports or states, `why` how this came about, and `truth` what is
-    true of it. Formulas are LaTeX between dollar signs.
+    Formulas are LaTeX between dollar signs.
     """
 
     saw: str
@@ -33,11 +32,7 @@ class Story(NamedTuple):
 
 
 def story(judgement: Judgement) -> Story:
-    """Return the story of a claim of the thesis, with the numbers of our verdicts on it.
-
-    `judgement` is the claim with its verdicts for the original and the corrected programs. Raise
-    ValueError if a field of a sentence fits no number of these verdicts.
-    """
+    """Return the story of a claim; raise ValueError if a field fits no number of its verdicts."""
     outcomes = {"original": judgement.original, "corrected": judgement.corrected}
 
     def number(field: re.Match[str]) -> str:
@@ -55,9 +50,8 @@ def story(judgement: Judgement) -> Story:
 
 
 def prose(x: float, digits: int = 3) -> str:
-    """Return a number as text for a sentence, with some significant digits.
+    """Return a number as text for a sentence, with commas or a power of ten if necessary.
 
-    A large number has commas, and a very large or very small one has a power of ten.
     web/story/numbers.js writes the same text.
     """
     if x == 0 or 1e-3 <= abs(x) < 1e6:

@@ -1,9 +1,8 @@
 """Tests of the thesis's claims about history, theory and orders, most of them in sections I to IV.
 
-Each function is the `test` of one or more claims in `data/claims.toml`, with arguments, errors and
-verdicts as in `verdicts`. `lab` is a laboratory, which supplies scenes, runs and reference
-solutions, and `cases` are numbers of cases of Table 1. A `limit` is on the largest error of any
-omega component, as a fraction of the largest omega.
+Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` says how it
+decides, with arguments and verdicts as in `verdicts`. An error is the largest of any omega
+component against the reference solution, and `limit` bounds it as a fraction of the largest omega.
 """
 
 import math
@@ -31,9 +30,7 @@ Weights = Sequence[Callable[[Array], Any]]
 def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge the claim that the solutions of some cases are not known.
 
-    The verdict is "false" if Jacobi's elliptic functions solve all `cases` with an error of at most
-    `limit`, otherwise "reproduced". The error is the largest one of any omega component against the
-    reference solution of `lab`, relative to the largest omega.
+    It is false if Jacobi's elliptic functions solve all `cases` within `limit`.
     """
     numbers = {}
     for case in cases:
@@ -46,21 +43,15 @@ def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Jud
 
 
 def by_sources(lab: Laboratory, holds: bool) -> Judged:
-    """Return the verdict on a statement of history, which only historical sources can test.
-
-    The verdict is "reproduced" if the statement `holds` according to the sources, otherwise
-    "false". `lab` is not used.
-    """
+    """Return the verdict on a statement of history, which `holds` by the sources or not."""
     return Judged(REPRODUCED if holds else FALSE, {})
 
 
 def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge the claim that Hamilton's equations of a rigid body are partial differential equations.
 
-    `cases` has one case. The verdict is "false" if six ordinary differential equations, in Euler
-    angles and their momenta, solve this case with an error of at most `limit`. The error is the
-    largest one of any omega component against the reference solution of `lab`, relative to the
-    largest omega.
+    It is false if six ordinary ones, in Euler angles and their momenta, solve the case within
+    `limit`.
     """
     from scipy.integrate import solve_ivp
 
@@ -82,10 +73,7 @@ def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
 
 def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
-    """Return the matrix that maps the rates of the 3-1-3 angles (rad/s) to omega in body axes.
-
-    `angles` are the three angles (rad). The shape is (3, 3).
-    """
+    """Return the 3 x 3 matrix from the rates of the 3-1-3 angles (rad/s) to omega in body axes."""
     _, theta, psi = angles
     return np.array(
         [
@@ -97,11 +85,7 @@ def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
 
 
 def _omega(moments: Triple, state: Array) -> Array:
-    """Return omega (rad/s) from the 3-1-3 angles (rad) and their conjugate momenta.
-
-    `state` has the three angles, then the three momenta. `moments` are the principal moments of the
-    body (kg m2).
-    """
+    """Return omega (rad/s) from the 3-1-3 angles (rad), then their conjugate momenta."""
     momentum = np.linalg.solve(_angle_rates_to_omega(state[:3]).T, np.asarray(state[3:]))
     rates: Array = momentum / np.array(moments)
     return rates
@@ -110,8 +94,8 @@ def _omega(moments: Triple, state: Array) -> Array:
 def _hamilton(moments: Triple, state: Array) -> Array:
     """Return dH/dp and -dH/dq, the time derivatives of `state`, as one array.
 
-    `state` has the three 3-1-3 angles q (rad) and their conjugate momenta p. The Hamiltonian is H =
-    sum I omega**2 / 2, with the principal `moments` I (kg m2).
+    `state` has the 3-1-3 angles q (rad) and their momenta p; H = sum I omega**2 / 2, with the
+    `moments` I (kg m2).
     """
     theta, psi = float(state[1]), float(state[2])
     omega = _omega(moments, state)
@@ -140,9 +124,8 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
     """Judge the claim that a bounded function satisfies a Lipschitz condition.
 
-    The function f is the square root, which is bounded on (0, 1). The quotients (f(y) - f(x)) / (y
-    - x) are computed for x from 1e-2 to 10**-decades and y = 2 x. The verdict is "false" if a
-    quotient exceeds `above`, otherwise "reproduced". `lab` is not used.
+    It is false if a quotient of the square root, bounded on (0, 1), exceeds `above`, for x from
+    1e-2 to 10**-decades and y = 2 x.
     """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
@@ -155,10 +138,7 @@ def local_error(
 ) -> Judged:
     """Judge the claim that the error of one step of a method falls with a power of the step size.
 
-    `method` is the name of the method, and `power` the power that the thesis states. In each of the
-    `cases` in `lab`, the power p is measured with which the error of one step of size h decreases
-    as h**p. The verdict is "reproduced" if every p differs from `power` by at most `within`, and
-    "reproduced in part" if some p does.
+    The measured power must be within `within` of `power` in all cases; in part, in some.
     """
     numbers = {}
     for case in cases:
@@ -172,9 +152,8 @@ def local_error(
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that Runge-Kutta and the Taylor series up to h**4 are the same method.
 
-    The verdict is "reproduced" if one step of size h has the same result with both, to 1e-14 of the
-    largest omega, in all `cases` of `lab`. It is "reproduced in part" if the difference is O(h**p)
-    with a measured p that differs from 5 by at most `within`.
+    One step of both must agree to 1e-14 of the largest omega; in part, up to O(h**p) with a
+    measured p within `within` of 5.
     """
     numbers, same, near = {}, True, True
     for case in cases:
@@ -193,10 +172,7 @@ def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
 
 
 def _stepped(scene: Scene, method: str) -> Array:
-    """Return omega (rad/s) at the end of a scene, computed by a fixed-step method.
-
-    `method` is the name of the method, which has no tolerance. The scene has the step size.
-    """
+    """Return omega (rad/s) at the end of a scene by a fixed-step method."""
     omega: Array = solve(scene, scene.times(), method).omega[-1]
     return omega
 
@@ -208,9 +184,7 @@ def _power(
 ) -> float:
     """Return p, the power with which a method's error in one step of size h falls as O(h**p).
 
-    The power is measured by halving the step size of `scene`. `method` and `truth` are functions
-    that return omega at the end of a scene of one step; the default of `truth` is the reference
-    solution.
+    It is measured by halving the step. `truth` is by default the reference solution.
     """
     apart = []
     for step_size in (scene.step_size, scene.step_size / 2.0):
@@ -221,10 +195,7 @@ def _power(
 
 
 def _taylor_step(scene: Scene, order: int) -> Array:
-    """Return omega after one step of its Taylor series up to h**order, where h is the step size.
-
-    The torque of the scene must be constant. The shape is (3,), and the unit rad/s.
-    """
+    """Return omega (rad/s) after one step of its Taylor series up to h**order, constant torque."""
     coefficients = np.array(scene.euler_coefficients)
     torque = np.array(scene.normalized_torque(0.0))
     terms = [np.array(scene.omega)]
@@ -242,11 +213,9 @@ def _taylor_step(scene: Scene, order: int) -> Array:
 def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
     """Judge the claim that in Crandall's example four weightings are better than the Taylor series.
 
-    The weightings are collocation, subdomain, Galerkin and least squares. The example is dx/dt =
-    `rate` x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2. The verdict is at
-    least "reproduced in part" if the largest error of each weighting is below half the error of the
-    series. It is "reproduced" if also the two weightings in `best` have the smallest errors. `lab`
-    is not used.
+    The example is dx/dt = `rate` x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2.
+    In part: each weighting has less than half the error of the series; as a whole: those in `best`
+    also have the smallest errors.
     """
     t, weight = np.polynomial.legendre.leggauss(12)
     t, weight = (t + 1.0) / 2.0, weight / 2.0
@@ -278,9 +247,8 @@ def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
 def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weights) -> Array:
     """Return the linear equations for c1 and c2 of Crandall's example, a row for each weight.
 
-    `by` has the weight functions. A row has three weighted integrals over (0, 1): of the two
-    `factors` of c1 and c2 in the residual, and of `rate`. `t` and `weight` are the nodes and
-    weights of a quadrature on (0, 1), which is applied to each half of the interval.
+    A row has the weighted integrals over (0, 1) of the two `factors` in the residual, and of
+    `rate`. The quadrature `t`, `weight` on (0, 1) is applied to each half.
     """
     halves = [(t / 2.0, weight / 2.0), ((t + 1.0) / 2.0, weight / 2.0)]
     rows = []
@@ -296,11 +264,9 @@ def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weight
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that the rates Q of eq. 32 of the thesis tell if a steady rotation is stable.
 
-    By this equation a small perturbation of a steady rotation changes as exp(Q t). Each steady
-    rotation of the `cases` in `lab` is perturbed by 1e-8 of its size. If Re Q (1/s) is above 0, the
-    perturbation must grow at the rate Re Q, within the fraction `within`. If not, the perturbation
-    must stay within ten times its initial size for ten periods. The verdict is "reproduced" if all
-    perturbations meet this condition, otherwise "false".
+    A small perturbation should change as exp(Q t). It is 1e-8 of the rotation; if Re Q (1/s) is
+    above 0, it must grow at this rate within `within`, else stay within ten times its size for ten
+    periods.
     """
     numbers, told = {}, True
     for case in cases:
@@ -330,10 +296,8 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
 def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge the claim that a trial solution of eq. 32 of the thesis solves some cases exactly.
 
-    The trial solution is a steady rotation about axis 3, with the initial omega3, plus exponential
-    functions of time. The verdict is "reproduced" if its error is at most `limit` in at least one
-    of the `cases`. The error is the largest one of any omega component against the reference
-    solution of `lab`, relative to the largest omega.
+    It is a steady rotation about axis 3, with the initial omega3, plus exponential functions of
+    time.
     """
     numbers = {}
     for case in cases:
@@ -351,10 +315,7 @@ def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged
 def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that one-term collocation suffices for a linear top, here a sphere (Case 1).
 
-    A linear top is a body for which Euler's equations are linear. The verdict is "reproduced" if
-    the error of one-term collocation in the case `case` is at most `limit`, otherwise "false". The
-    error is the largest one of any omega component against the reference solution of `lab`,
-    relative to the largest omega.
+    A linear top is a body for which Euler's equations are linear.
     """
     found = run(lab.scene(case), Member("collocation", 1))
     truth = lab.truth(case)
@@ -366,9 +327,7 @@ def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
 def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
     """Judge the claim that Euler's equations of a symmetric body have no products of omegas.
 
-    The products of two omega components have the coefficients A, B and C in Euler's equations. The
-    verdict is "reproduced" if the coefficients are 0 in all `cases` of `lab`, and "reproduced in
-    part" if they are 0 in some case.
+    Their coefficients A, B and C must be 0 in all cases; in part, in some.
     """
     left = {
         f"case {case}: largest coefficient": max(map(abs, lab.scene(case).euler_coefficients))
@@ -379,11 +338,7 @@ def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
 
 
 def step_on_cards(lab: Laboratory, step: float) -> Judged:
-    """Judge the claim that each of the three card decks sets the step size DT to `step` (s).
-
-    The verdict is "reproduced" if each deck has a card that sets DT to this value before its loop.
-    `lab` is not used.
-    """
+    """Judge the claim that each of the three card decks sets DT to `step` (s) before its loop."""
     numbers = {
         f"{program}: DT (s)": float(card.statement.partition("=")[2])
         for program in ("two-term", "four-term", "runge-kutta")
@@ -397,9 +352,7 @@ def step_on_cards(lab: Laboratory, step: float) -> Judged:
 def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
     """Judge the claim that the collocation points are within the time interval of the step.
 
-    `cases` has one case. For both collocation programs in `lab`, the fraction of steps in which all
-    points are inside is computed. The verdict is "reproduced" if the fraction is 1 for both
-    programs, "reproduced in part" if it is at least 1/2 for both, otherwise "false".
+    It is true if they are in all steps of both programs; in part, in half of them.
     """
     (case,) = cases
     numbers, shares = {}, []
@@ -416,8 +369,7 @@ def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
 def possible_bodies(lab: Laboratory, cases: list[int]) -> Judged:
     """Judge the claim that every case is a possible rigid body.
 
-    The verdict is "reproduced" if in all `cases` of `lab` no moment of inertia exceeds the sum of
-    the other two, otherwise "false".
+    No moment may exceed the sum of the other two.
     """
     excess = {}
     for case in cases:

@@ -1,14 +1,13 @@
 """Tests of the thesis's claims about one case; each test returns a verdict with its numbers.
 
-Each function is the `test` of one or more claims in `data/claims.toml`. The `rule` of the claim
-describes how the function decides, and the `parameters` of the claim are the keyword arguments.
-`lab` is a laboratory, which runs the programs under the chosen assumptions, and `case` is the
-number of a case of Table 1. All numbers of a verdict are computed by the test. The tests over
+Each function is the `test` of one or more claims in `data/claims.toml`. The claim's `rule`
+describes how it decides, and its `parameters` are the keyword arguments. `lab` is a laboratory,
+which runs the programs under the chosen assumptions, and `case` a number of Table 1. The tests over
 several cases are in `methods`.
 
-Unless a docstring says otherwise, an error is the largest error of any component of omega against
-the reference solution, over the steps that the program ran. A claim that fails has the verdict "not
-reproduced".
+Unless a docstring says otherwise, an error is the largest of any component of omega against the
+reference solution, over the steps that the program ran; the amplitude is half the largest range
+(largest minus smallest value) of a reference omega. A claim that fails is "not reproduced".
 """
 
 import math
@@ -34,10 +33,7 @@ UNDECIDED = "undecided"
 
 @dataclass(frozen=True)
 class Judged:
-    """The verdict on one claim of the thesis, and the computed numbers that support it.
-
-    `numbers` maps a description of each number to its value.
-    """
+    """The verdict on one claim, and the computed numbers that support it, by description."""
 
     verdict: str
     numbers: dict[str, float]
@@ -46,40 +42,26 @@ class Judged:
 def graded(
     numbers: dict[str, float], whole: bool, part: bool = False, otherwise: str = NOT_REPRODUCED
 ) -> Judged:
-    """Return the verdict "reproduced" if `whole`, "reproduced in part" if `part`, else `otherwise`.
-
-    The verdict is on a claim of the thesis. `numbers` are the computed numbers that support it, by
-    description; the result has them too.
-    """
+    """Return "reproduced" if `whole`, "reproduced in part" if `part`, else `otherwise`."""
     return Judged(REPRODUCED if whole else IN_PART if part else otherwise, numbers)
 
 
 def judged(grade: rules.Grade, otherwise: str = NOT_REPRODUCED) -> Judged:
-    """Return the verdict on a claim of the thesis, from the result `grade` of its test.
-
-    The test was made for one initial omega. `otherwise` is the verdict if the claim is reproduced
-    neither as a whole nor in part.
-    """
+    """Return the verdict for a grade from one initial omega."""
     numbers = {name: float(each) for name, each in grade.numbers.items()}
     return graded(numbers, bool(grade.whole), bool(grade.part), otherwise)
 
 
 def constant_solution(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim of the thesis that the solution of a case is constant.
-
-    The verdict is "reproduced" if every omega component of the reference solution, which `lab`
-    computes, varies by at most 1e-12 rad/s; otherwise "false".
-    """
+    """Judge the claim that the solution of a case is constant, to 1e-12 rad/s."""
     moved = float(ranges(lab.truth(case)).max())
     return graded({"change over the run (rad/s)": moved}, moved <= 1e-12, otherwise=FALSE)
 
 
 def known_solution(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the solution of a case is (sin 5t, cos 5t, 10), as the thesis prints.
+    """Judge the claim that the solution of a case is (sin 5t, cos 5t, 10) rad/s, as printed.
 
-    This printed omega (rad/s) is compared with the reference solution, which `lab` computes. The
-    verdict is "reproduced" if no component differs by more than 1e-15 (1 + 5 t) rad/s; otherwise it
-    is "false". Here t (s) is the end of the run.
+    It may differ from the reference by 1e-15 (1 + 5 t) rad/s, where t (s) is the end of the run.
     """
     truth = lab.truth(case)
     t = truth.time
@@ -91,22 +73,14 @@ def known_solution(lab: Laboratory, case: int) -> Judged:
 
 
 def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge the claim of the thesis that omega3 varies in a case.
-
-    The verdict is "reproduced" if the range of omega3 over the run exceeds `limit` (rad/s),
-    otherwise "false". The range is the largest minus the smallest value of the reference solution,
-    which `lab` computes.
-    """
+    """Judge the claim that omega3 varies in a case, else "false"."""
     return judged(rules.omega3_varies(lab, case, limit), FALSE)
 
 
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that all three programs coincide with the known solution of a case.
 
-    The verdict is "reproduced" if the error of every program in `lab` is below `limit` (rad/s),
-    half a unit of the last printed digit. An error is the largest error of any omega component
-    against the reference solution. The numbers that support the verdict also show how many steps
-    the Runge-Kutta program runs from each initial omega in `starts`.
+    The numbers also show how many steps the Runge-Kutta program runs from each of `starts`.
     """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
@@ -123,9 +97,7 @@ def _shown(start: Triple) -> str:
 def coincident(lab: Laboratory, case: int, share: float) -> Judged:
     """Judge the claim that collocation coincides with the known solution on the thesis's graph.
 
-    `lab` runs both collocation programs on case `case`. The error of each component of omega that
-    varies is divided by the component's range, its largest minus its smallest value. The verdict is
-    "reproduced" if no ratio exceeds `share`, else "not reproduced".
+    No error may exceed `share` of the component's range.
     """
     numbers = {}
     for program in COLLOCATION:
@@ -136,13 +108,7 @@ def coincident(lab: Laboratory, case: int, share: float) -> Judged:
 
 
 def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
-    """Judge the claim that collocation errors, divided by the amplitude, are from `low` to `high`.
-
-    `lab` runs both collocation programs on case `case`. The verdict is "reproduced" if this is true
-    for both, else "not reproduced". An error is the largest error of any omega component against
-    the reference solution. The amplitude is half the largest range (largest minus smallest value)
-    of a component of the reference omega.
-    """
+    """Judge the claim that collocation errors over the amplitude are from `low` to `high`."""
     amplitude = float(ranges(lab.truth(case)).max()) / 2.0
     numbers = {
         f"{program}: largest error over the amplitude": lab.error(program, case) / amplitude
@@ -152,13 +118,7 @@ def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
 
 
 def poor(lab: Laboratory, case: int, share: float) -> Judged:
-    """Judge the claim that the results of the Runge-Kutta program are poor.
-
-    `lab` runs the program on case `case`. The verdict is "reproduced" if its error exceeds the
-    fraction `share` of the amplitude, else "not reproduced". The error is the largest error of any
-    omega component against the reference solution. The amplitude is half the largest range (largest
-    minus smallest value) of a component of the reference omega.
-    """
+    """Judge the claim that the Runge-Kutta error exceeds `share` of the amplitude."""
     amplitude = float(ranges(lab.truth(case)).max()) / 2.0
     found = lab.error("runge-kutta", case) / amplitude
     return graded({"largest error over the amplitude": found}, found > share)
@@ -167,9 +127,7 @@ def poor(lab: Laboratory, case: int, share: float) -> Judged:
 def error_constant(lab: Laboratory, case: int) -> Judged:
     """Judge the claim that the error of collocation does not grow during the run.
 
-    `lab` runs both collocation programs on case `case`. The largest error of omega in the last
-    fifth of the steps is compared with the largest error in the first fifth. The verdict is
-    "reproduced" if it is at most twice as large for both programs, else "not reproduced".
+    In the last fifth of the steps it may be at most twice that of the first.
     """
     truth = lab.truth(case).omega
     numbers = {}
@@ -184,11 +142,8 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
     """Judge the claim that the stop test ended the Runge-Kutta run at step number `step`.
 
-    The stop test, a Lipschitz test, is part of the program, which `lab` runs on case `case`. The
-    verdict is "reproduced" if it ended the run at this step, "reproduced in part" if at another
-    step, else "not reproduced". The program is also run with every subset of its defects, the
-    mistakes of the printed program. The result, a `Judged`, lists as evidence the subsets with
-    which the test ends the run at `step`.
+    At another step it is reproduced in part. The numbers list the subsets of defects with which the
+    test ends the run at `step`.
     """
     stop = lab.run("runge-kutta", case).stop
     found = math.nan if stop is None else float(stop.step)
@@ -216,10 +171,7 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
 def growing(lab: Laboratory, case: int) -> Judged:
     """Judge the claim that omega1 of the Runge-Kutta program grows beyond the sine of the solution.
 
-    `lab` runs the program on case `case`. Two conditions are tested on omega1 at the end of the
-    run. It must exceed 1 rad/s, the amplitude of the sine. It must also exceed omega1 of the
-    reference solution at that time by more than a thousandth of this value. The verdict is
-    "reproduced" if both conditions hold, else "not reproduced".
+    At the end it must exceed 1 rad/s, the amplitude, and the solution by more than a thousandth.
     """
     run = lab.run("runge-kutta", case)
     value, solution = float(run.omega[-1, 0]), float(lab.truth(case).omega[run.steps - 1, 0])
@@ -230,10 +182,7 @@ def growing(lab: Laboratory, case: int) -> Judged:
 def search(lab: Laboratory, case: int) -> Judged:
     """Judge the claim that a search for an error in the Runge-Kutta program found none.
 
-    No run can test whether the author's search found an error, so that the verdict is always "not
-    testable". With it one number is returned: the error of the program, divided by the error of the
-    corrected program. Both errors are the largest of any omega component in case `case`, over the
-    steps that the program's run on this case completed.
+    No run can test this. The number is the error over that of the corrected program.
     """
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
@@ -243,33 +192,17 @@ def search(lab: Laboratory, case: int) -> Judged:
 
 
 def concur(lab: Laboratory, case: int, share: float) -> Judged:
-    """Judge the claim that the two collocation programs agree, by the rule `rules.concur`.
-
-    `lab` runs the programs on case `case`. The verdict is "reproduced in part" if both runs are
-    complete and their omegas differ by at most the fraction `share` of the largest omega. It is
-    "reproduced" if each component also differs by at most a tenth of its range, which is the
-    largest minus the smallest value. Otherwise it is "not reproduced".
-    """
+    """Judge the claim that the two collocation programs agree."""
     return judged(rules.concur(lab, case, share))
 
 
 def fails(lab: Laboratory, case: int, share: float) -> Judged:
-    """Judge the claim that the Runge-Kutta program fails, by the rule `rules.fails`.
-
-    `lab` runs the program on case `case`. Two conditions are tested: the run ended early, and the
-    error of an omega component exceeds the fraction `share` of the component's range. The verdict
-    is "reproduced" if both are true, "reproduced in part" if only one is true, else "not
-    reproduced".
-    """
+    """Judge the claim that the Runge-Kutta program fails."""
     return judged(rules.fails(lab, case, share))
 
 
 def differ(lab: Laboratory, case: int, share: float) -> Judged:
-    """Judge the claim that the results of the two-term and the four-term program differ.
-
-    `lab` runs both programs on case `case`. The verdict is "reproduced" if their omegas differ by
-    more than the fraction `share` of the largest reference omega, else "not reproduced".
-    """
+    """Judge the claim that the two collocation programs differ by `share` of the largest omega."""
     two, four = (lab.run(program, case).omega for program in COLLOCATION)
     apart = distance(two, four) / largest(lab.truth(case))
     return graded({"difference over the largest omega": apart}, apart > share)
@@ -278,35 +211,23 @@ def differ(lab: Laboratory, case: int, share: float) -> Judged:
 def more_reliable(lab: Laboratory, case: int) -> Judged:
     """Judge the claim that the four-term program is more accurate than the two-term program.
 
-    `lab` runs both programs on case `case`. The verdict is "reproduced" if the four-term error is
-    at most 0.5 times the two-term error, "reproduced in part" if at most 0.8 times, else "not
-    reproduced". An error is the largest error of any omega component against the reference
-    solution.
+    Its error must be at most 0.5 times the two-term error; in part, 0.8 times.
     """
     ratio = lab.error("four-term", case) / lab.error("two-term", case)
     return graded({"four-term error over two-term error": ratio}, ratio <= 0.5, ratio <= 0.8)
 
 
 def diverged(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the run of the two-term program diverged, by the rule `rules.diverged`.
-
-    `lab` runs the program on case `case`. The verdict is "reproduced" if the run overflowed, or if
-    its largest error of omega exceeds the largest omega of the reference solution, else "not
-    reproduced".
-    """
+    """Judge the claim that the run of the two-term program diverged."""
     return judged(rules.diverged(lab, case))
 
 
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
     """Judge the claim that the two-term error has its cause in a motion too fast for two terms.
 
-    The thesis gives no initial omega for some cases. Therefore the corrected programs run on case
-    `case` from several: all that the thesis shows anywhere, and one of our own (see `starts`).
-    All other assumptions are those of `lab`. The verdict is "reproduced" if the two-term error is
-    more than `worse` times the four-term error from every initial omega. It is "reproduced in part"
-    if the two-term error is more than `same` times the four-term error from at least one initial
-    omega, else "false". An error is the largest error of any omega component against the reference
-    solution.
+    The corrected programs run from all `starts`, because the thesis gives no initial omega for some
+    cases. The two-term error must be more than `worse` times the four-term error from all; in part,
+    more than `same` times from one.
     """
     numbers = {}
     for start in starts():
@@ -318,20 +239,10 @@ def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
 
 
 def models_concur(lab: Laboratory, case: int, share: float, terms: Sequence[int]) -> Judged:
-    """Judge the claim that collocation models with different numbers of terms agree.
-
-    `lab` computes the models for case `case`, and `terms` are their numbers of terms. By the rule
-    `rules.models_concur` the verdict is "reproduced" if each model differs from the first one by at
-    most the fraction `share` of the largest omega, else "not reproduced".
-    """
+    """Judge the claim that collocation models with different numbers of terms agree."""
     return judged(rules.models_concur(lab, case, share, terms))
 
 
 def dynamic(lab: Laboratory, case: int, factor: float) -> Judged:
-    """Judge the claim that the motion of case `case` is the liveliest in Table 1 of the thesis.
-
-    `lab` runs the four-term program on each case. By the rule `rules.dynamic` the verdict is
-    "reproduced" if the largest angular acceleration of the case is at least `factor` times the
-    largest angular acceleration of every other case.
-    """
+    """Judge the claim that the motion of a case is the liveliest in Table 1."""
     return judged(rules.dynamic(lab, case, factor))

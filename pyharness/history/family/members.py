@@ -1,16 +1,10 @@
 """The family of weighted residual methods in III.1 and IV.2 of the thesis.
 
-A member of the family is a method. It is defined by its weighting, its number of terms and its
-number of corrections, and collocation also by its points.
-
 One step of length h solves omega' = f(t, omega), equations 16-18, with a polynomial trial function
 omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant, with its value at the
-beginning of the step. Each correction evaluates f along the previous estimate. It then chooses the
-coefficients c1, ..., cn so that the integrals of W (omega' - f) vanish for n weight functions W
-(eq. 26). The thesis makes one correction.
-
-The coefficients of a correction are the same in every step; `pyharness.theory.tableau` computes
-them.
+beginning of the step. Each correction evaluates f along the previous estimate, and chooses c1, ...,
+cn so that the integrals of W (omega' - f) vanish for n weight functions W (eq. 26). The thesis
+makes one correction. `pyharness.theory.tableau` computes its coefficients, the same in every step.
 """
 
 import math
@@ -37,13 +31,9 @@ _WORST_CONDITION = 1e8
 class Member:
     """A weighted residual method of the thesis; the constructor raises InputError for wrong fields.
 
-    `weighting` is one of `WEIGHTINGS`. `terms` is n, the number of powers of t in the trial
-    function. `corrections` is the number of corrections in each step. A correction solves again for
-    the coefficients of the trial function, with the products of omega components from the last
-    estimate. The residual is omega' - f, where f is the right-hand side of Euler's equations. Its
-    derivatives with f held constant, i t**(i-1), are the weights of least squares (eq. 25).
-    `points` is for collocation only: the points where the residual vanishes, as fractions of the
-    step. They are k/(n+1) (`thesis`), the points of Gauss and Legendre (`gauss`), or n different
+    `weighting` is one of `WEIGHTINGS`, and `terms` is n. The derivatives of the residual with f
+    held constant, i t**(i-1), are the weights of least squares (eq. 25). `points`, for collocation
+    only, are fractions of the step: k/(n+1) (`thesis`), Gauss-Legendre (`gauss`), or n different
     numbers from 0 to 1.
     """
 
@@ -53,10 +43,7 @@ class Member:
     corrections: int = 1
 
     def __post_init__(self) -> None:
-        """Raise InputError if the fields define no weighted residual method, as with 0 terms.
-
-        Collocation without `points` gets the points of the thesis.
-        """
+        """Raise InputError for wrong fields; by default, points are those of the thesis."""
         if self.weighting not in WEIGHTINGS:
             raise unknown("weighting", self.weighting, WEIGHTINGS)
         if not 1 <= self.terms <= MOST_TERMS:
@@ -103,9 +90,6 @@ class Member:
 def converged_order(member: Member) -> int:
     """Return the order of a method's global error in the limit of many corrections per step.
 
-    `member` is a weighted residual method, which computes a first estimate of omega in each step. A
-    correction solves again for omega, with the right-hand side of Euler's equations at the last
-    estimate. Beyond some number of corrections, further ones do not raise the order.
     docs/explanation/methods.md derives these orders.
     """
     n = member.terms
@@ -124,11 +108,9 @@ def converged_order(member: Member) -> int:
 
 
 def predicted_order(member: Member) -> int:
-    """Return the order p of a weighted residual method, whose global error is O(h**p).
+    """Return the order p of a method, whose global error is O(h**p) in general motion.
 
-    Here h is the step size, and the motion is a general one. `member` is the method. Its first
-    estimate has order 1. Each correction, which solves the step again with the right-hand side at
-    the last estimate, raises the order by one, up to `converged_order`.
+    The first estimate has order 1, and each correction raises it by one, up to `converged_order`.
     """
     return min(member.corrections + 1, converged_order(member))
 
@@ -136,11 +118,9 @@ def predicted_order(member: Member) -> int:
 def run(scene: Scene, member: Member) -> Trajectory:
     """Integrate a scene by a weighted residual method (Jacobs 1982, III.1, eq. 20-27, and IV.2).
 
-    `member` is the method. Return the trajectory of omega, without translational velocity. The
-    first estimate evaluates the torque at the beginning of the step. The corrections, which solve
-    the step again, evaluate it at the nodes, the times within the step where they need the
-    right-hand side. The global error is O(h**p), with the step size h and p from `predicted_order`.
-    In each step omega has a rounding error of about one unit in the last place.
+    There is no translational velocity. The first estimate takes the torque at the beginning of the
+    step, corrections at their nodes. In each step omega has a rounding error of about one unit in
+    the last place.
     """
     omega = integrate(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
@@ -159,10 +139,9 @@ def run(scene: Scene, member: Member) -> Trajectory:
 
 
 def integrate(scene: Scene, members: Sequence[Member]) -> Array:
-    """Integrate a scene by several weighted residual methods at once.
+    """Return omega (rad/s) by several methods at once, shape (members, steps, 3).
 
-    Return omega (rad/s) in the order of the methods `members`, shape (members, steps, 3). After an
-    overflow omega is NaN or infinite. The run time is hardly longer than for a single method.
+    It is not finite after an overflow. The run time is hardly longer than for one method.
     """
     # Most corrections first: members that still need a correction are then contiguous in memory.
     order = sorted(range(len(members)), key=lambda i: -members[i].corrections)
@@ -205,12 +184,7 @@ def integrate(scene: Scene, members: Sequence[Member]) -> Array:
 
 
 def _stages(matrix: Array, rates: Array) -> Array:
-    """Return the product of each method's matrix and rates, in a third of the time of `_sums`.
-
-    `matrix` has shape (i, j, members); its last axis is the index of the method. `rates` contains
-    derivatives of omega, shape (members, j, 3). The result has shape (members, i, 3). It contains
-    the same sums of products as `_sums` computes from the same matrices.
-    """
+    """Return the products of `_sums`, from (i, j, members) matrices, in a third of the time."""
     side_by_side = np.ascontiguousarray(rates.transpose(1, 2, 0))
     total: Array = matrix[:, 0, None] * side_by_side[0]
     product = np.empty_like(total)
@@ -222,11 +196,9 @@ def _stages(matrix: Array, rates: Array) -> Array:
 
 
 def _sums(factors: Array, rates: Array) -> Array:
-    """Return for every method the matrix product of factors and rates, shape (members, i, 3).
+    """Return for every method the product of factors (members, i, j) and rates (members, j, 3).
 
-    `factors` contains a matrix for each method, shape (members, i, j), and `rates` derivatives of
-    omega, shape (members, j, 3). The terms are summed in order by NumPy, so that the result does
-    not depend on a BLAS library.
+    NumPy sums in order, so that the result does not depend on a BLAS library.
     """
     total: Array = np.einsum("mij,mjk->mik", factors, rates)
     return total
@@ -240,10 +212,9 @@ def _rates(scene: Scene, torque: Array, omega: Array) -> Array:
 
 
 def _torque(scene: Scene, times: Array) -> Array:
-    """Return the torque divided by the moments (rad/s2) at `times` (s), an array of any shape.
+    """Return the torque divided by the moments (rad/s2) at `times` (s), shape (..., 3).
 
-    The shape of the result is (..., 3), where ... is the shape of `times`, or (3,) if the torque is
-    constant. The torque of a body given by coefficients is in rad/s2 already.
+    The torque of a body given by coefficients is in rad/s2 already.
     """
     law = scene.body_torque
     torque = np.array(law.constant)

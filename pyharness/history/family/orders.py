@@ -41,11 +41,9 @@ MOST_STEPS = 2_000
 class OrderFinding:
     """The order of convergence of one method in one scene, derived and measured, and its error.
 
-    `member` is a weighted residual method. docs/explanation/methods.md derives its order
-    `predicted`. `measured` is None if no order can be measured, because the errors are rounding
-    errors alone, or too large with every step size. `settled` is true if the last two measured
-    values of the order differ by at most a tenth. `error` is the largest error of any omega
-    component with the scene's own step size (rad/s), infinite after an overflow.
+    `measured` is None if errors are rounding alone, or too large with every step; `settled`, if its
+    last two values differ by at most a tenth. `error` is that of omega with the scene's step
+    (rad/s), infinite after an overflow.
     """
 
     member: Member
@@ -56,19 +54,15 @@ class OrderFinding:
 
     @property
     def deviation(self) -> float:
-        """Return the measured minus the predicted order; NaN if no order was measured.
-
-        The orders are orders of convergence of one method's global error.
-        """
+        """Return the measured minus the predicted order; NaN if no order was measured."""
         return math.nan if self.measured is None else self.measured - self.predicted
 
     @property
     def misses(self) -> bool:
         """Return whether the measured order settled below the derived order by more than `SLACK`.
 
-        `SLACK` is 0.25. The order is settled if its last two measured values differ by at most a
-        tenth. A measured order above the derived order is no miss, because in special scenes the
-        error term that limits the order is small.
+        An order above it is no miss: in special scenes the error term that limits the order is
+        small.
         """
         return self.settled and self.deviation < -SLACK
 
@@ -76,12 +70,7 @@ class OrderFinding:
 def family_members(
     terms: Sequence[int] = range(1, 6), corrections: Sequence[int] = range(1, 9)
 ) -> list[Member]:
-    """Return a weighted residual method for each combination of scheme, `terms` and `corrections`.
-
-    A scheme, in `SCHEMES`, is a weighting with its choice of collocation points. `terms` and
-    `corrections` are sequences: the numbers of terms of the trial function, and the numbers of
-    corrections of the first estimate in each step.
-    """
+    """Return a method for each combination of scheme (of `SCHEMES`), `terms` and `corrections`."""
     return [Member(w, n, p, k) for w, p in SCHEMES for n in terms for k in corrections]
 
 
@@ -90,12 +79,10 @@ def order_table(
     members: Sequence[Member] | None = None,
     progress: Progress = no_progress,
 ) -> list[OrderFinding]:
-    """Measure the orders of convergence and the errors of many weighted residual methods at once.
+    """Measure the orders of convergence and the errors of many methods at once.
 
-    `members` are the methods, by default those of `family_members()`. Return an `OrderFinding` for
-    each method. The phases of the work are the reference solution, the orders over several end
-    times, and the errors. `progress` is called before each phase, with its number. Raise InputError
-    if the reference solution grows without bound, or if the scene has more than `MOST_STEPS` steps.
+    Raise InputError if the reference grows without bound, or the scene has more than `MOST_STEPS`
+    steps.
     """
     if scene.steps > MOST_STEPS:
         raise InputError(f"steps is {scene.steps}; allowed for orders: 1 to {MOST_STEPS}")
@@ -137,11 +124,9 @@ def order_table(
 
 
 def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array) -> Array:
-    """Return the errors of several methods at the time `horizon` (s) for ever smaller step sizes.
+    """Return the errors of several methods at `horizon` (s), shape (step sizes, members).
 
-    The shape is (step sizes, members), where `members` are the methods. An error is the norm of the
-    difference from `end`, the reference omega at the horizon (rad/s), divided by the largest
-    component of `end`.
+    An error is the norm of the difference from the reference `end` over its largest component.
     """
     scale = float(np.abs(end).max()) or 1.0
     rungs = []
@@ -155,11 +140,9 @@ def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array)
 
 
 def _slopes(errors: Array) -> list[float]:
-    """Return the order of convergence from each pair of errors whose step sizes have the ratio 2.
+    """Return the order from each pair of errors whose step sizes have the ratio 2.
 
-    `errors` are the errors of one method from `_ladder`, for decreasing step sizes. The step size
-    of an error is half the step size of the error two places before it. An order is returned only
-    if both errors are in the range from `_SMALLEST`, 5e-14, to `_LARGEST`, 1e-2.
+    These are two places apart; both must be between `_SMALLEST` and `_LARGEST`.
     """
     return [
         math.log2(coarse / fine)

@@ -12,12 +12,7 @@ from pyharness.model.scene_report import heading
 
 
 def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
-    """Return the report of the orders and errors of weighted residual methods in a scene.
-
-    `found` has the measured and derived order of each method and its error. The tables have a row
-    for each weighting, choice of collocation points and number of terms n, and a column for each
-    number of corrections k of the first estimate in each step.
-    """
+    """Return the report of the orders and errors in a scene, by n terms and k corrections."""
     names = ("predicted", "measured", "settled", "error")
     measures = [{name: getattr(each, name) for name in names} for each in found]
     data = [
@@ -42,12 +37,7 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
 
 
 def verdict(found: Sequence[OrderFinding]) -> list[str]:
-    """Return sentences that compare the methods' measured orders with the derived orders.
-
-    `found` has both orders of each method. If measured orders are below the derived orders by more
-    than 0.25, there is a sentence for each of these methods. Otherwise a single sentence counts the
-    methods whose orders agree.
-    """
+    """Return sentences on measured and derived orders: one on each miss, or one on all."""
     unexpected = _unexpected(found)
     if unexpected:
         return [f"UNEXPECTED: {each}" for each in unexpected]

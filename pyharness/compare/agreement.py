@@ -19,8 +19,7 @@ from pyharness.truth.reference import Reference
 class Accuracy:
     """The errors of a trajectory against the reference solution.
 
-    The class has the errors of omega, translational velocity and attitude, and the drifts of energy
-    and angular momentum, which are constant without torque.
+    Energy and angular momentum have drifts, known without torque.
     """
 
     omega: tuple[float, float, float]  # largest error of each component (rad/s)
@@ -37,20 +36,15 @@ class Accuracy:
 
     @property
     def angle(self) -> float | None:
-        """Return the largest error of the trajectory's attitude (rad); None without an attitude.
-
-        The error is infinite if no row was compared.
-        """
+        """Return the largest error of the attitude (rad), or None; infinite without rows."""
         return None if self.turned is None else _largest(self.turned)
 
 
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
-    """Return the errors of a trajectory against the reference solution `truth`.
+    """Return the errors of a trajectory against `truth`, which has rows at the same times.
 
-    The trajectory and `truth` must have rows at the same times. If one of them ends earlier, the
-    later rows of the other are not compared. The errors are infinite if there is no row to compare.
-    Energy and angular momentum, which are constant without torque, are compared with their initial
-    values in `scene`.
+    If one ends earlier, later rows are not compared; without any, errors are infinite. Without
+    torque, energy and momentum are compared with their initial values.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
@@ -74,7 +68,7 @@ def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy
 
 
 def _largest(errors: Array) -> float:
-    """Return the largest of some errors; infinity if there are none, so that nothing is known."""
+    """Return the largest of some errors; infinity if there are none."""
     return float(errors.max()) if errors.size else math.inf
 
 
@@ -100,11 +94,10 @@ def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float | None:
 
 
 def distance(first: Trajectory, second: Trajectory) -> float:
-    """Return the largest distance of two trajectories of a program, in units in the last place.
+    """Return the largest distance of two trajectories, in units in the last place.
 
-    The recorded times, the angular velocities and the translational velocities are compared element
-    by element. Two NaNs have the distance 0. If the numbers of rows differ, the distance is
-    infinite.
+    Recorded times, angular and translational velocities are compared. It is infinite if the numbers
+    of rows differ.
     """
     if len(first.time) != len(second.time):
         return math.inf
@@ -118,10 +111,8 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
     """Return the names of the results in which two trajectories of a program differ.
 
-    First the numbers of steps, the numbers of evaluations, the ways in which the runs ended, and
-    the results of the stop test are compared. If any of these differ, the list has only their
-    names. Otherwise the rows at all times and the error code IER of the linear solver are compared
-    bit for bit. The list is empty if all results agree.
+    If steps, evaluations, endings or stops differ, only these are named; otherwise all rows and IER
+    are compared bit for bit.
     """
     counts = (
         ("steps", first.steps, second.steps),
@@ -154,11 +145,10 @@ def _velocity(trajectory: Trajectory) -> Array:
 
 
 def ulps(x: Array, y: Array) -> float:
-    """Return the largest distance between corresponding elements of two arrays of one shape.
+    """Return the largest distance between elements of two arrays, in units in the last place.
 
-    The distance is in units in the last place: the number of steps from one float to the other
-    through all representable floats. The distance of two NaNs is 0, and that of a NaN and a number
-    is infinite.
+    It counts the floats from one to the other. That of two NaNs is 0, of a NaN and a number
+    infinite.
     """
     both_nan = np.isnan(x) & np.isnan(y)
     one_nan = np.isnan(x) ^ np.isnan(y)

@@ -1,7 +1,8 @@
 """Candidates, a common interface of methods, prepared solvers and programs.
 
-Checks and timings run a candidate on a scene in the same way, whichever of the three it is. A
-prepared solver solves one scene by one method, for many initial conditions.
+Checks and timings run all three in the same way. A prepared solver, made by `prepare`, solves one
+scene by one method, for many initial conditions. A tolerance is relative to the largest component
+of omega; `effort` multiplies the work limit.
 """
 
 import math
@@ -29,10 +30,7 @@ _SAME = 1e-9  # relative difference up to which two times are equal; the step si
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """The result at one time when a method, prepared solver or program has solved a scene.
-
-    A prepared solver is made by `prepare` for a single scene.
-    """
+    """The result of a candidate at one time."""
 
     omega: Array  # shape (3,), rad/s; NaN if the candidate did not reach the time
     ended: str = "complete"  # how the run ended: "complete", or why there is no full result
@@ -42,29 +40,22 @@ class End:
 
     @property
     def is_refused(self) -> bool:
-        """Return whether a prepared solver can't solve the scene, or exceeded its work limit.
-
-        A prepared solver is made by `prepare` for a single scene.
-        """
+        """Return whether a prepared solver can't solve the scene, or exceeded its work limit."""
         return self.ended in ("refused", "gave up")
 
     @property
     def has_result(self) -> bool:
-        """Return whether the method, prepared solver or program reached the requested time.
+        """Return whether the candidate reached the requested time.
 
-        A prepared solver is made by `prepare` for a single scene. The result may nevertheless be
-        "sensitive": its amplified rounding error is too large for the relative tolerance.
+        The result may still be "sensitive": its amplified rounding error is too large for the
+        tolerance.
         """
         return self.ended in WITH_ALL_ROWS
 
 
 @dataclass(frozen=True)
 class Ready:
-    """An integration from time 0 to one time, in two parts of which only the first is timed.
-
-    `run` is the function to time, which integrates without any preparation. `read` converts the
-    result of `run` to an End.
-    """
+    """An integration from time 0 to one time: `run` is timed, and `read` converts its result."""
 
     run: Callable[[], Any]
     read: Callable[[Any], End]
@@ -72,12 +63,7 @@ class Ready:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A method with its tolerance, a prepared solver, or a program, as one common interface.
-
-    The prepared solver is one that `prepare` makes for a single scene. The program is one of the
-    thesis, with a choice of its defects. Checks and timings run all three kinds of candidates by
-    the same functions.
-    """
+    """A method with its tolerance, a prepared solver, or a program, as one common interface."""
 
     name: str
     # Takes a scene and a time (s). Raises InputError if the candidate can't solve the scene, or has
@@ -88,21 +74,13 @@ class Candidate:
     rows: Callable[..., Trajectory]
 
     def end(self, scene: Scene, time: float) -> End:
-        """Return the result at one `time` (s); raise InputError if the candidate has none.
-
-        The candidate is a method, a solver prepared for one scene by `prepare`, or a program.
-        """
+        """Return the result at one `time` (s); raise InputError if the candidate has none."""
         ready = self.ready(scene, time)
         return ready.read(ready.run())
 
 
 def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
-    """Return a `Candidate` (common interface of solvers) that runs a method by `solve`.
-
-    `name` is the name of the method. `tolerance` is relative to the largest component of omega, and
-    `effort` is the factor by which the work limit of the method is multiplied. The candidate's rows
-    include the attitude if the scene has one.
-    """
+    """Return a candidate that runs a method by `solve`; rows have the attitude if the scene has."""
 
     def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
         times = scene.times() if times is None else times
@@ -116,12 +94,10 @@ def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candid
 
 
 def prepared_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a `Candidate` (common interface of solvers) that runs a solver made by `prepare`.
+    """Return a candidate that runs a solver made by `prepare` for the method `name`.
 
-    The solver is prepared for a single scene and the method `name`. If `primed` is true, the solver
-    is first called with another initial omega. This call must have no effect on the result.
-    `tolerance` is relative to the largest component of omega; None selects the default of the
-    method. A method with a fixed step, and Gauss collocation, use the scene's step size.
+    If `primed`, the solver is first called with another initial omega, which must have no effect. A
+    fixed step, and Gauss collocation without a tolerance, use the scene's step size.
     """
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -134,11 +110,7 @@ def prepared_candidate(name: str, tolerance: float | None, primed: bool = False)
 
 
 def attitude_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a `Candidate` (common interface) that runs a prepared solver for omega and attitude.
-
-    A solver that `prepare` makes for a single scene is called a prepared solver. The arguments have
-    the same meanings as those of `prepared_candidate`.
-    """
+    """Return a candidate as `prepared_candidate` does, for omega and attitude."""
 
     def ready(scene: Scene, time: float) -> Ready:
         solver, start = prepare(scene, name, tolerance, attitude=True), np.array(scene.omega)
@@ -167,11 +139,7 @@ def program_candidate(
     effort: float = 1.0,
     word: str = BINARY64,
 ) -> Candidate:
-    """Return a `Candidate` (common interface of solvers) that runs a program of the thesis.
-
-    `listing` is the program with those of its defects that are not corrected. The other arguments
-    are those of `Program.run`.
-    """
+    """Return a candidate that runs a program of the thesis, with the options of `Program.run`."""
     options = lipschitz, may_stop, velocity
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -194,27 +162,17 @@ def program_candidate(
 
 
 def unstopped(listing: Listing) -> Candidate:
-    """Return a `Candidate` that runs a compiled program of the thesis without its stop test.
-
-    A `Candidate` is a common interface of solvers. `listing` is the program with those of its
-    defects that are not corrected. The program does not compute the translational velocity.
-    """
+    """Return a candidate that runs a compiled program without stop test and velocity."""
     return program_candidate(listing, may_stop=False, velocity=False)
 
 
 def plain(values: Iterable[float]) -> Array:
-    """Return a copy of `values`, a result of a compiled function, as an array of floats.
-
-    The copy is needed because the next call of the function reuses the memory of its result.
-    """
+    """Return a copy of a compiled function's result, whose memory its next call reuses."""
     return np.array([float(x) for x in values])
 
 
 def not_finite(why: str = "overflow") -> End:
-    """Return an `End` (result at one time) with omega NaN, for a run without result.
-
-    `why` says how the run ended.
-    """
+    """Return an `End` with omega NaN; `why` says how the run ended."""
     return End(np.full(3, math.nan), why)
 
 
@@ -234,7 +192,7 @@ def _answered(solver: Solver, omega: Array) -> End:
 
 
 def _printed(result: Any) -> End:
-    """Return the last row of a compiled program's run as an `End` (result at one time)."""
+    """Return the last row of a compiled program's run as an `End`."""
     rows, _, n_rows, status, evaluations, variable, _ = result
     if status == STOPPED:
         return not_finite(f"stopped at step {n_rows} by {STOP_VARIABLES[variable - 1]}")

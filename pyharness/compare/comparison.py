@@ -1,8 +1,8 @@
 """Comparisons of the original and corrected programs, and of other methods, on one scene.
 
-The results of each program are compared in two ways. The distance between the results of Fortran
-and of its Python port, the twin, is in units in the last place. The error against the reference
-solution is in rad/s; it has no meaning if it is below the error bound of the reference.
+The distance between Fortran and its Python port, the twin, is in units in the last place. The error
+against the reference solution is in rad/s; it has no meaning below the error bound of the
+reference.
 """
 
 import itertools
@@ -54,11 +54,7 @@ _TIMING_SECONDS = 3e-4
 
 @dataclass(frozen=True, eq=False)
 class ProgramFinding:
-    """The results of one version of a program, and their differences from the reference.
-
-    The version is given by `listing`, a choice of the program's defects. The differences between
-    Fortran and the twin, which is the Python port, are also included.
-    """
+    """The results of one listing, and their differences from reference and twin."""
 
     listing: Listing
     trajectory: Trajectory
@@ -78,10 +74,7 @@ class ProgramFinding:
 
 @dataclass(frozen=True, eq=False)
 class MethodFinding:
-    """The results of one method.
-
-    If the method failed, `failure` says why, and there is no trajectory and no accuracy.
-    """
+    """The results of one method; if it failed, `failure` says why and there are none."""
 
     method: str
     tolerance: float
@@ -100,23 +93,22 @@ class Comparison:
     Attributes
     ----------
     scene : Scene
-        The scene. If attitudes were requested, it has the initial attitude.
+        The scene, with the initial attitude if attitudes were requested.
     lipschitz : float or None
-        The Lipschitz constant of the Runge-Kutta program's stop test, 1/s; None without programs.
+        The constant of the Runge-Kutta program's stop test, 1/s; None without programs.
     reference : Reference
         The reference solution and the estimate of its error.
     bound : ErrorBound
-        The error of the reference: proved where a proof is found, otherwise estimated. No other
-        result depends on it.
+        The error of the reference, proved or estimated; no other result depends on it.
     programs : tuple of ProgramFinding
-        The results of the programs, one for each listing; empty if only methods are compared.
+        The results of the programs, one for each listing.
     methods : tuple of MethodFinding
         The results of the methods: those of `solve_ivp`, or those that were requested.
     growth : float or None
-        The error amplification: the largest norm of the state-transition matrix of omega from any
-        earlier time to the last time. None if it is unknown.
+        The error amplification, if it is known: the largest norm of the state-transition matrix of
+        omega from any earlier time to the last.
     word : str
-        The name of the arithmetic in which the programs ran, as in ``binary64``.
+        The arithmetic of the programs, as in ``binary64``.
     """
 
     scene: Scene
@@ -132,11 +124,7 @@ class Comparison:
 
     @property
     def digits(self) -> float | None:
-        """Return the number of correct decimal digits that amplified rounding errors permit.
-
-        No method in binary64 can have more correct digits. The number is None if the error
-        amplification is unknown.
-        """
+        """Return the decimal digits that amplified rounding leaves in binary64, if known."""
         return None if self.growth is None else digits_left(ROUNDING * self.growth)
 
     @property
@@ -153,10 +141,9 @@ class Comparison:
     def unexpected(self) -> tuple[str, ...]:
         """Return a sentence for each unexpected result; the tuple is empty if there is none.
 
-        A result is unexpected if Fortran and the Python port differ, or if the error of a corrected
-        program does not decrease with the order of the program as the step is halved. If only
-        methods are compared, a method's result is unexpected if its error exceeds the limit that
-        follows from its tolerance, or if it ends before the reference solution does.
+        It is unexpected that Fortran and twin differ, or that a corrected program does not have its
+        order. If only methods are compared, it is unexpected that an error exceeds its limit, which
+        follows from the tolerance, or that a method ends before the reference.
         """
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         for each in self.programs:
@@ -194,11 +181,7 @@ class Comparison:
 
     @property
     def not_judged(self) -> tuple[str, ...]:
-        """Return a sentence for each corrected program whose order could not be determined.
-
-        The order is that of convergence, measured on this scene. The sentence names the program and
-        the reason.
-        """
+        """Return a sentence for each corrected program whose order could not be determined."""
         return tuple(
             f"{each.who}: {each.order}"
             for each in self.programs
@@ -224,39 +207,34 @@ def compare_programs(
     scene : Scene
         The body, the initial condition, the torque and the steps.
     listings : sequence of Listing, optional
-        The programs to run, each with a choice of its defects; by default all three programs,
-        original and corrected.
+        The versions of programs to run; by default all three, original and corrected.
     lipschitz : float
-        The Lipschitz constant of the stop test (1/s), which only the Runge-Kutta program has.
+        The constant of the Runge-Kutta program's stop test (1/s).
     may_stop : bool
         Whether the stop test may end a run.
     tolerance : float, optional
-        The tolerance of each method of `solve_ivp`, relative to the largest component of omega; the
-        default is the one that `solve` uses for the method.
+        The tolerance of each method of `solve_ivp`, relative to the largest component of omega; by
+        default that of `solve`.
     effort : float
         Factor on the work limit of each program, of each method and of the reference.
     attitude : bool
-        Whether attitudes are compared too. The initial attitude is the scene's, or, if the scene
-        has none, that in which body axes and axes of space are parallel. A program's attitude is
-        integrated from its rows of omega by a method of order 4.
+        Whether attitudes are compared too, from the scene's or from parallel axes of body and
+        space. A program's is integrated from its rows of omega by a method of order 4.
     word : str
-        The arithmetic of the programs, one of `pyharness.original.programs.WORD_NAMES`. If the
-        compiled programs do not support it, only the Python ports run, and are not compared with
-        Fortran. Orders of convergence are measured in binary64 only.
+        The arithmetic of the programs, one of `pyharness.original.programs.WORD_NAMES`. Without
+        compiled programs for it, only the Python ports run. Orders are measured in binary64 only.
 
     Returns
     -------
     Comparison
-        The results of all programs and methods. Its property `unexpected` is empty if every result
-        is as expected.
+        All results; its property `unexpected` is empty if they are as expected.
 
     Raises
     ------
     NotBuiltError
         If the extension is not built.
     InputError
-        If a program or the reference would exceed its work limit, or if the scene or the word is
-        not valid.
+        If a program or the reference would exceed its work limit, or the scene or word is invalid.
 
     Examples
     --------
@@ -318,12 +296,8 @@ def listings_for(
 ) -> list[Listing]:
     """Return the listings to compare: for each program the original and the corrected listing.
 
-    A listing is a version of a program: a choice of its defects, of readings (interpretations of
-    doubtful cards) and of conjectures (assumptions about missing cards). `fix` has names of defects
-    to correct, and `keep` names of defects to keep. If a program has any of these defects, the
-    listing with this selection comes between the other two. The selection starts from the listing
-    `base`, ``original`` or ``corrected``. If only `base` is given, without `fix` and `keep`, it is
-    the only listing of each program. `readings` and `conjectures` have the same meaning as in
+    The selection that `fix` and `keep` make from `base` comes between them, for programs with any
+    of these defects; `base` alone is the only listing. `readings` and `conjectures` are as in
     `subset`. Raise InputError for a name that none of `programs` has.
     """
     chosen = list(programs)
@@ -357,11 +331,10 @@ def listings_for(
 def method_finding(
     scene: Scene, name: str, tolerance: float, effort: float, truth: Reference
 ) -> MethodFinding:
-    """Return the results of the method `name` on a scene, with their errors against `truth`.
+    """Return the results of a method at the scene's steps, or its InputError's message.
 
-    The times are the ends of the scene's steps. `tolerance` is relative to the largest component of
-    omega, and `effort` is the factor on the work limit. If the method raises InputError, the result
-    has its message.
+    `tolerance` is relative to the largest component of omega, and `effort` multiplies the work
+    limit.
     """
     start = time.perf_counter()
     try:

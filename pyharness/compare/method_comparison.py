@@ -33,13 +33,13 @@ def compare_methods(
     Parameters
     ----------
     scene : Scene
-        The body, the initial condition, the torque and the times: the ends of the scene's steps.
-        The torque may depend on omega or attitude if it can be recorded.
+        The scene; times are the ends of its steps. The torque may depend on omega or attitude if it
+        can be recorded.
     methods : sequence of str
         Names in `pyharness.methods.registry.METHODS`; by default `auto` and SciPy's methods.
     tolerance : float, optional
-        The tolerance of each method, relative to the largest component of omega; the default is the
-        one that `solve` uses for the method. A method with a fixed step takes none.
+        The tolerance of each method, relative to the largest component of omega; by default that of
+        `solve`. A method with a fixed step takes none.
     effort : float
         Factor on the work limit of each method and of the reference.
     attitude : bool
@@ -48,15 +48,14 @@ def compare_methods(
     Returns
     -------
     Comparison
-        The results of the methods, without programs. Its property `unexpected` is empty if every
-        method meets its tolerance.
+        The results; its property `unexpected` is empty if every method meets its tolerance.
 
     Raises
     ------
     NotBuiltError
         If the extension is not built.
     InputError
-        If a method is unknown or can't solve the scene, if a tolerance is out of range, or if the
+        If a method is unknown or can't solve the scene, a tolerance is out of range, or the
         reference would exceed its work limit.
 
     Examples

@@ -68,7 +68,7 @@ class Order:
         return self.state in ("as due", "rounding", "misses")
 
     def __str__(self) -> str:
-        """Return the measured order as text, or, if it is unknown, the reason in a few words."""
+        """Return the measured order as text, or why it is unknown."""
         if self.value is not None:
             return f"order {self.value:.2f}"
         return {
@@ -82,9 +82,8 @@ class Order:
 class _SingularError(Exception):
     """The signal that a run failed at a step size for which its matrix may be singular.
 
-    If the linear solver LEQT1F finds the collocation matrix singular, the program uses the
-    right-hand sides in place of the solution. With this substitution the program is another method,
-    whose order is not measured.
+    The program then uses the right-hand sides in place of LEQT1F's solution. This is another
+    method, whose order is not measured.
     """
 
 
@@ -93,10 +92,8 @@ def measured_order(
 ) -> Order:
     """Measure the order with which omega of a compiled program converges to `truth`.
 
-    `listing` is the program with those of its defects that are not corrected. The function
-    `order_of` makes the measurement, and explains `truth`, `pairs` and the result. The state of the
-    result is `sensitive` if the error may be amplified rounding error. The state is `misses` if the
-    program does not converge with its order, but a textbook method of the same order does.
+    In addition to `order_of`, the state is `sensitive` if the error may be amplified rounding, and
+    `misses` if a textbook method of the same order does converge with it.
     """
 
     def omega(finer: Scene) -> Array:
@@ -130,13 +127,11 @@ def order_of(
 ) -> Order:
     """Measure the order of a numerical solution by halving the step size until it is small.
 
-    `scene` has the largest step size, and `truth` is the reference solution at its times.
-    `solution` takes a scene and returns its `quantity` after each step, shape (n, 3), with fewer
-    rows after an overflow. `due` is the order that theory predicts. The measurement ends when the
-    order is at least `due` - 0.5 in `pairs` consecutive halvings, when it is smaller in as many
-    halvings, or when the error is only rounding error. A run has at most `most_steps` steps; by
-    default at most 2**18, or as many as eight halvings lead to, if these are more. The result is an
-    Order, which has the measured order and the state of the measurement.
+    `solution` takes a scene and returns `quantity` after each step, shape (n, 3), with fewer rows
+    after an overflow; `truth` is at the times of `scene`, which has the largest step. The
+    measurement ends when the order is at least `due` - 0.5 in `pairs` consecutive halvings, smaller
+    in as many, or when the error is only rounding. A run has at most `most_steps` steps; by default
+    2**18, or those of eight halvings if these are more.
     """
     n = len(truth.time)
     if n < scene.steps:
@@ -193,11 +188,7 @@ def _shows(order: float, due: int) -> bool:
 
 
 def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
-    """Yield the scene with its own step size, with half of it, with a quarter, and so on.
-
-    All these scenes have the same last time, and at most `most_steps` steps, or, if `most_steps` is
-    None, as many as `order_of` uses by default.
-    """
+    """Yield the scene with its own step size, with half of it, with a quarter, and so on."""
     most = max(_MOST_STEPS, scene.steps << _HALVINGS) if most_steps is None else most_steps
     for halvings in itertools.count():
         parts = 2**halvings
@@ -221,10 +212,9 @@ def _fastest(scene: Scene, omega: Array) -> float:
 
 
 def _is_grown_rounding(scene: Scene, found: Order) -> bool:
-    """Return whether the error in a measurement of an order may be amplified rounding error.
+    """Return whether the error of a measurement may be amplified rounding error.
 
-    `found` is the measurement, and its error is `found.error`. The result is true if this error is
-    not above the bound on amplified rounding errors, or if the bound can't be computed.
+    It may if it is not above the bound on this, or if the bound can't be computed.
     """
     if not found.steps or not math.isfinite(found.error):
         return False
@@ -236,10 +226,9 @@ def _is_grown_rounding(scene: Scene, found: Order) -> bool:
 
 
 def _may_be_singular(program: str, step_size: float) -> bool:
-    """Return whether the linear solver LEQT1F may find a program's collocation matrix singular.
+    """Return whether LEQT1F may find a program's collocation matrix for a step (s) singular.
 
-    The matrix depends on `step_size` (s). The result is true if an element overflows, or if the
-    condition number is not below 1e15. `program` is the name of the program.
+    It may if an element overflows, or if the condition number is not below 1e15.
     """
     from pyharness.theory.collocation_matrices import PARTS
 

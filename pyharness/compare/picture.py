@@ -55,11 +55,8 @@ def _curves(comparison: Comparison) -> list[_Curve]:
 def comparison_picture(comparison: Comparison) -> Picture:
     """Return the picture of a comparison, and the table of numbers that it shows.
 
-    Each program has a column of panels, or each method if there are no programs. Three panels show
-    the three components of omega (rad/s) as functions of time, for the versions of the program or
-    for the method, and for the reference solution. A panel below
-    shows the error of omega (rad/s). If attitudes were requested, another panel shows the error of
-    the attitude (rad).
+    Each program, or method, has a column of panels: three components of omega (rad/s) over time,
+    with the reference, their error and, if requested, that of the attitude (rad).
     """
     from matplotlib.figure import Figure
 

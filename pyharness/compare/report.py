@@ -41,13 +41,7 @@ _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 
 
 def comparison_report(comparison: Comparison) -> Report:
-    """Return the report of a comparison of programs and methods with the reference solution.
-
-    If there are programs, the methods are those of SciPy's `solve_ivp`. The report also says
-    whether Fortran and the Python port of each program agree, and whether the corrected programs
-    converge with their orders. If only methods are compared, it says whether their errors are
-    within the limits that follow from their tolerances.
-    """
+    """Return the report of a comparison of programs and methods with the reference solution."""
     in_floats = comparison.word == BINARY64
     scene, truth = heading(comparison.scene), comparison.reference
     bound = comparison.bound
@@ -98,11 +92,7 @@ def comparison_report(comparison: Comparison) -> Report:
 def verdict(comparison: Comparison) -> list[str]:
     """Return sentences that say whether the results of a comparison are as expected.
 
-    Expected is that Fortran and the Python port of each program agree, and that the corrected
-    programs converge with their orders. The first sentence says if all results are as expected;
-    otherwise there is a sentence for each unexpected result. A further sentence says if the scene
-    is sensitive to rounding errors. A sentence names each corrected program whose order of
-    convergence could not be determined.
+    Others name a sensitive scene, and corrected programs whose order could not be determined.
     """
     told = [f"UNEXPECTED: {each}" for each in comparison.unexpected] or [_as_expected(comparison)]
     if comparison.is_sensitive:
@@ -171,10 +161,7 @@ def _methods(comparison: Comparison) -> Table:
 
 
 def _attitudes(comparison: Comparison) -> list[list[Table]]:
-    """Return the table of attitude errors as a section of the report, in a list.
-
-    The list is empty if attitudes were not requested.
-    """
+    """Return the table of attitude errors in a list, if attitudes were requested."""
     if comparison.reference.attitude is None:
         return []
     columns = (
@@ -193,10 +180,7 @@ def _attitudes(comparison: Comparison) -> list[list[Table]]:
 
 
 def _data(comparison: Comparison) -> Table:
-    """Return the results of a comparison as one table for CSV.
-
-    The table has a row for each program and method.
-    """
+    """Return the results of a comparison as one table for CSV, a row for each."""
     names = (
         "method listing active steps ended stop_variable stop_quotient error_w1 error_w2 error_w3 "
         "error_v energy_drift momentum_drift ulps order order_state evaluations seconds"

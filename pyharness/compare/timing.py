@@ -27,12 +27,10 @@ def seconds(
 ) -> list[float]:
     """Return the time of one call of each function in `runs` (s), measured in several rounds.
 
-    In each of the `rounds` rounds, each function is called repeatedly for about `length` seconds. A
-    first call before the rounds is not counted. A function whose first call takes longer than
-    `slow` (s) is timed in at most three rounds. A function whose first call takes longer than five
-    times `slow` is timed in one round. The result is the median of the times of the rounds, or
-    another `statistic`. `say` is called with a message at the beginning of each round. `clocks` has
-    a clock (s) for each function; by default it is the wall clock.
+    In each round, a function is called for about `length` seconds. A first call is not counted, but
+    if it takes longer than `slow` (s), at most three rounds are timed, and one if five times
+    longer. The result is the `statistic` of the rounds. `clocks`, by default the wall clock, are in
+    s; `say` gets a message for each round.
     """
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))
@@ -56,11 +54,7 @@ def seconds(
 
 
 def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> float:
-    """Return the time of one call of the function `run` (s), averaged over consecutive calls.
-
-    `calls` is the number of calls that are timed. If there are several, an untimed call precedes
-    them.
-    """
+    """Return the time of one call (s), averaged over `calls`, before which one is not timed."""
     if calls > 1:
         run()
     begin = clock()
@@ -73,9 +67,8 @@ def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> floa
 def ended_after(limit: float) -> Iterator[None]:
     """Raise RuntimeError in a ``with`` block of Python code that takes longer than `limit` (s).
 
-    If a compiled function is running at the limit, the error is raised after the function has
-    ended. Only the main thread may use this context manager, because only the main thread receives
-    signals.
+    A compiled function is not interrupted. Only the main thread, which receives signals, may use
+    it.
     """
 
     def end(*_: object) -> None:
@@ -92,10 +85,7 @@ def ended_after(limit: float) -> Iterator[None]:
 
 @contextlib.contextmanager
 def silenced() -> Iterator[None]:
-    """Suppress Python warnings and NumPy's floating-point errors in a ``with`` block.
-
-    This context manager is used while calls are timed.
-    """
+    """Suppress Python warnings and NumPy's floating-point errors in a ``with`` block."""
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield

@@ -22,7 +22,7 @@ def _times(values: Triple, factor: float) -> Triple:
 def cancelling(kind: str, number: int) -> Scene:
     """Return a random body, at rest or nearly, whose torques cancel to 1e-2 to 1e-11 of their size.
 
-    `kind` is a member of `MERGED` or `LEFT`. It determines the scene together with `number`.
+    `kind` is a member of `MERGED` or `LEFT`.
     """
     source = Random(f"cancelling/{kind}/{number}")
     frequency, left = source.uniform(0.5, 4.0), 10.0 ** -source.uniform(2.0, 11.0)

@@ -1,8 +1,6 @@
 """Extreme scenes, each with a name and an end time, in five named groups that are called suites.
 
-The suites contain motions near the separatrix, bodies near symmetry, bodies of extreme shape, one
-motion in many units of time, and bodies with an attitude. Only one scene has a torque: Case 6 of
-the thesis.
+Only one scene has a torque: Case 6 of the thesis.
 """
 
 import math
@@ -17,10 +15,7 @@ from pyharness.scenes.rescaled import scaled
 
 
 class Circumstance(NamedTuple):
-    """One named extreme scene, and the time (s) until which methods are tested on it.
-
-    Extreme scenes have, for example, nearly equal moments or a very large omega.
-    """
+    """One named extreme scene, and the time (s) until which methods are tested on it."""
 
     name: str
     scene: Scene
@@ -30,17 +25,15 @@ class Circumstance(NamedTuple):
 def speed(scene: Scene, largest: float) -> float:
     """Return a bound of the relative rate of change (1/s) of omega in a body without torque.
 
-    It is the largest of |A|, |B| and |C|, the coefficients of Euler's equations, times `largest`,
-    the largest component of omega (rad/s).
+    It is the largest of |A|, |B| and |C| times the largest component of omega (rad/s).
     """
     return max(map(abs, scene.euler_coefficients)) * largest
 
 
 def in_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene with such a step size and number of steps that it ends at `time` (s).
+    """Return the scene in 10 to 20 000 steps that end at `time` (s).
 
-    The step size times the bound of the relative rate of change of omega, which the function
-    `speed` returns, is about 0.002. However, there are at least 10 and at most 20 000 steps.
+    A step times the bound of `speed` is about 0.002 within these limits.
     """
     rate = speed(scene, max(map(abs, scene.omega)))
     count = max(10, min(20_000, math.ceil(rate * abs(time) / 0.002)))
@@ -62,8 +55,8 @@ _FLIPS = 5
 def quarter(disturbance: float) -> float:
     """Return the time (s) until the component of omega about axis 2 first vanishes.
 
-    The body has the moments `MIDDLE_AXIS`, 6, 5 and 2 kg m2, and no torque. Its initial omega is
-    (`disturbance`, 1, 0) rad/s. The time is a quarter of the period of omega.
+    It is a quarter of the period, with the moments `MIDDLE_AXIS` and the initial omega
+    (`disturbance`, 1, 0) rad/s.
     """
     # The quarter period, which is the complete elliptic integral K(k) over the frequency, by the
     # arithmetic-geometric mean.
@@ -76,9 +69,9 @@ def quarter(disturbance: float) -> float:
 def _separatrix() -> Iterator[Circumstance]:
     """Yield scenes that begin with a perturbed rotation about the axis of the middle moment.
 
-    The perturbations are from 1e-1 to 1e-15 rad/s. At a flip, omega about that axis changes its
-    sign. The end times are before the first flip, in the middle of the first flip, and in the
-    middle of the fifth flip. Other scenes are on the separatrix, where the body flips only once.
+    Perturbations are from 1e-1 to 1e-15 rad/s. At a flip, omega about that axis changes its sign;
+    end times are before the first, and in the middle of the first and fifth. Other scenes are on
+    the separatrix, with one flip.
     """
     for d in (10.0**-k for k in range(1, 16)):
         beside, on = (d, 1.0, 0.0), (d, 1.0, d)
@@ -102,10 +95,7 @@ _SHORT, LONG = 20.0, 1e6  # s
 
 
 def _near_symmetry() -> Iterator[Circumstance]:
-    """Yield scenes of bodies with two or three equal or nearly equal moments, without torque.
-
-    The relative differences of the moments are from 1e-1 to 1e-16, or 0.
-    """
+    """Yield scenes of bodies with two or three equal or nearly equal moments, without torque."""
     for difference in _DIFFERENCES:
         near = 1.0 - difference
         size = f"{difference:.0e}" if difference else "equal"
@@ -149,8 +139,8 @@ _BODIES: dict[str, Triple] = {
 def _shapes() -> Iterator[Circumstance]:
     """Yield scenes of bodies with extreme ratios of the moments, and Case 6 of the thesis.
 
-    The bodies are needles, coins, flat plates, and bodies that can not exist, because one moment
-    exceeds the sum of the other two. Each body occurs with several orders of its moments.
+    They are needles, coins, flat plates, and bodies that can't exist, with their axes in several
+    orders.
     """
     for name, moments in _BODIES.items():
         for axes in _ORDERS:
@@ -174,11 +164,7 @@ TWOS = (-996, -500, -100, 100, 498, 996)
 
 
 def _scales() -> Iterator[Circumstance]:
-    """Yield scenes of one motion with rescaled time.
-
-    Omega is multiplied by a factor, and time is divided by the same factor. The factors are from
-    1e-300 to 1e300. Therefore omega is from about 1e-300 to 1e300 rad/s.
-    """
+    """Yield scenes of one motion with omega multiplied by 1e-300 to 1e300, and time divided."""
     scene = in_steps(ORDINARY, ORDINARY_TIME)
     named = [(f"1e{power}", float(f"1e{power}")) for power in _TENS]
     named += [(f"2^{power}", math.ldexp(1.0, power)) for power in TWOS]
@@ -190,11 +176,7 @@ POINTED: Quaternion = unit_quaternion("attitude", (0.5, -0.1, 0.7, 0.5))[0]
 
 
 def _attitude() -> Iterator[Circumstance]:
-    """Yield scenes with an initial attitude, without torque.
-
-    The scenes contain motions near the separatrix, bodies near symmetry, symmetric bodies, bodies
-    of extreme shape, one steady rotation, and one body at rest.
-    """
+    """Yield scenes with an initial attitude, without torque, of the other kinds and steady."""
     for name, scene, time in _separatrix():
         yield Circumstance(f"separatrix-{name}", replace(scene, attitude=POINTED), time)
     bodies: list[tuple[str, str, Triple, Triple]] = []

@@ -1,7 +1,4 @@
-"""Random scenes of several named kinds, such as near-symmetric: a function draws each kind.
-
-The argument `source` of these functions is the random generator.
-"""
+"""Random scenes of several named kinds, such as near-symmetric: a function draws each kind."""
 
 import math
 from collections.abc import Callable
@@ -15,19 +12,13 @@ from pyharness.scenes.rotated import rotated
 
 
 def _body(source: Random) -> list[float]:
-    """Return random principal moments (kg m2) that a body can have, in ascending order.
-
-    `source` is the random generator.
-    """
+    """Return random principal moments (kg m2) that a body can have, in ascending order."""
     low, middle = sorted((source.uniform(1.0, 50.0), source.uniform(1.0, 50.0)))
     return [low, middle, source.uniform(middle, low + middle)]
 
 
 def _plain(source: Random) -> Scene:
-    """Return a random scene with a body that can exist and rotates at a few radians per second.
-
-    The torque is random too. `source` is the random generator.
-    """
+    """Return a random possible body at a few radians per second, under a random torque."""
     moments = _body(source)
     source.shuffle(moments)
     return _scene(source, _vector(source, 5.0), _triple(moments))
@@ -50,11 +41,7 @@ def _near_separatrix(source: Random) -> Scene:
 
 
 def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
-    """Return the omega (rad/s) of a rotation about axis 2 plus a random perturbation.
-
-    `spin` is the angular velocity about axis 2 (rad/s). Each component of the perturbation is at
-    most `faint` (rad/s). `source` is the random generator.
-    """
+    """Return a rotation of `spin` about axis 2 plus a perturbation up to `faint` (rad/s)."""
     return [w + faint * e for w, e in zip((0.0, spin, 0.0), _vector(source, 1.0), strict=True)]
 
 
@@ -67,10 +54,7 @@ def _violent(source: Random) -> Scene:
 
 
 def _from_rest(source: Random) -> Scene:
-    """Return a random scene with a body initially at rest, under a torque about one or all axes.
-
-    `source` is the random generator.
-    """
+    """Return a random scene with a body initially at rest, under a torque about one or all axes."""
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-3.0, 1.0)
     axes = source.choice(((0,), (1,), (2,), (0, 1, 2), (0, 1, 2)))
@@ -83,11 +67,9 @@ def _from_rest(source: Random) -> Scene:
 
 
 def _slow_waves(source: Random) -> Scene:
-    """Return a random scene under a torque of slow sine or cosine terms.
+    """Return a random scene under a torque of waves of 1e-12 to 0.1 rad/s.
 
-    The frequencies of these terms are from 1e-12 to 0.1 rad/s. The angle of a sine or cosine may
-    therefore change by only 1e-14 rad in the whole motion. In half of the scenes the body is
-    initially at rest. `source` is the random generator.
+    Their phase may change by only 1e-14 rad. In half of the scenes the body is initially at rest.
     """
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-2.0, 2.0)
@@ -97,10 +79,9 @@ def _slow_waves(source: Random) -> Scene:
 
 
 def _many_speeds(source: Random) -> Scene:
-    """Return a random scene with sine and cosine torques of frequencies from 1e-6 to 630 rad/s.
+    """Return a random scene with two to six torque waves of frequencies from 1e-6 to 630 rad/s.
 
-    There are two to six such terms. In a fifth of the scenes the cosines have the amplitudes and
-    frequencies of the sines instead of their own. `source` is the random generator.
+    In a fifth of the scenes the cosines have the amplitudes and frequencies of the sines.
     """
     scene = _plain(source)
     some: list[list[Wave]] = [[], []]
@@ -118,10 +99,7 @@ def _many_speeds(source: Random) -> Scene:
 
 
 def _far_scale(source: Random) -> Scene:
-    """Return a random scene in other units of time and mass, with very large or very small omega.
-
-    Omega is from about 1e-135 to 1e135 rad/s, or 0. `source` is the random generator.
-    """
+    """Return a random scene in other units of time and mass: omega 1e-135 to 1e135 rad/s, or 0."""
     exponent = source.choice((-1, 1)) * source.randint(20, 450)
     scene = source.choice((_plain, _from_rest, _slow_waves, _many_speeds))(source)
     if abs(exponent) > 300:
@@ -135,8 +113,7 @@ def _far_scale(source: Random) -> Scene:
 def _sensitive(source: Random) -> Scene:
     """Return a random scene near a rotation about the axis of the middle moment of inertia.
 
-    Such a motion is sensitive: an initial error of omega may grow by a factor of up to 1e6.
-    `source` is the random generator.
+    An initial error of omega may grow by a factor of up to 1e6.
     """
     low, middle, high = body = _body(source)
     spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
@@ -155,27 +132,18 @@ def _sensitive(source: Random) -> Scene:
 
 
 def _long(source: Random) -> Scene:
-    """Return a random scene whose body rotates by up to a few hundred radians.
-
-    `source` is the random generator.
-    """
+    """Return a random scene whose body rotates by up to a few hundred radians."""
     scene = _plain(source)
     return replace(scene, step_size=10.0 ** source.uniform(0.5, 1.3) / scene.steps)
 
 
 def _no_body(source: Random) -> Scene:
-    """Return a random scene with random coefficients A, B, C of Euler's equations, of any sign.
-
-    The coefficients belong to no possible body. `source` is the random generator.
-    """
+    """Return a random scene with coefficients A, B, C of any sign, of no possible body."""
     return _scene(source, _vector(source, 2.0), None, _vector(source, 1.5))
 
 
 def _extreme(source: Random) -> Scene:
-    """Return a random scene with numbers from nearly the whole range of binary64.
-
-    In most of these scenes the solution overflows. `source` is the random generator.
-    """
+    """Return a random scene with numbers from nearly all of binary64; most overflow."""
 
     def any_size() -> float:
         if source.random() < 0.1:
@@ -190,29 +158,20 @@ def _extreme(source: Random) -> Scene:
 
 
 def _unsorted_body(source: Random) -> Triple:
-    """Return random principal moments (kg m2) that a body can have, not sorted.
-
-    `source` is the random generator.
-    """
+    """Return random principal moments (kg m2) that a body can have, not sorted."""
     low, middle = source.uniform(5.0, 50.0), source.uniform(5.0, 50.0)
     return source.uniform(abs(low - middle), low + middle), low, middle
 
 
 def _pointing(source: Random) -> Scene:
-    """Return a random scene without torque, with a random initial attitude.
-
-    `source` is the random generator.
-    """
+    """Return a random scene without torque, with a random initial attitude."""
     moments, omega = _unsorted_body(source), _vector(source, 3.0)
     w, x, y, z = (source.gauss(0, 1) for _ in range(4))
     return Scene("", omega, moments=moments, attitude=(w, x, y, z))
 
 
 def _driven(source: Random) -> Scene:
-    """Return a random scene under the sum of a constant, a linear and a sinusoidal torque.
-
-    `source` is the random generator.
-    """
+    """Return a random scene under the sum of a constant, a linear and a sinusoidal torque."""
     moments = _unsorted_body(source)
     constant, rate, sine = (_vector(source, size) for size in (20.0, 5.0, 20.0))
     law = TorqueLaw(constant, rate, ((sine, source.uniform(0.1, 20.0)),))
@@ -241,9 +200,8 @@ KINDS = {"plain": _plain, **NASTY, "pointing": _pointing, "driven": _driven}
 def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
     """Return a random torque law, in which no component of a term exceeds `size`.
 
-    The unit of `size` is N m, or N m/s for the term linear in time. `kinds` is a bit mask of the
-    terms: 1 constant, 2 linear in time, 4 sine, 8 cosine. `frequencies` are the lowest and the
-    highest frequency of the sine and the cosine (rad/s). `source` is the random generator.
+    It is in N m, or N m/s for the linear term. `kinds` is a bit mask: 1 constant, 2 linear in time,
+    4 sine, 8 cosine. `frequencies` are lowest and highest (rad/s).
     """
     low, high = map(math.log10, frequencies)
     constant, rate = _vector(source, size), _vector(source, size)
@@ -265,10 +223,8 @@ def _scene(
 ) -> Scene:
     """Return a scene with the given omega (rad/s) and body, and with random torque and steps.
 
-    The torque is zero, constant, constant plus linear in time, or a sine plus a cosine. If the
-    argument `torque` is false, it is zero. The body is given by `moments` (kg m2) or by
-    `coefficients` (A, B, C of Euler's equations); one of the two is None. `source` is the random
-    generator.
+    The torque is zero, constant, constant plus linear in time, or a sine plus a cosine. The body
+    has `moments` (kg m2) or `coefficients`.
     """
     size = (max(moments) if moments else 10.0) * source.uniform(0.1, 2.0)
 

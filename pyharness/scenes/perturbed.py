@@ -11,11 +11,9 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def perturbed(scene: Scene, part: float) -> Iterator[Scene]:
-    """Yield a copy of the scene for each of its numbers, in which only this number is perturbed.
+    """Yield a copy of the scene for each of its numbers other than 0, times 1 + `part`.
 
-    The number is multiplied by 1 + `part`, so that `part` is the relative perturbation. The numbers
-    are the moments or coefficients, the components of the initial omega and of the torque terms,
-    and the frequencies of the torque waves. There is no copy for a component that is 0.
+    They are moments or coefficients, initial omega, components of torque terms, and frequencies.
     """
     for name in ("moments", "coefficients", "omega"):
         for triple in _triples(getattr(scene, name), part):

@@ -19,12 +19,7 @@ _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 
 @dataclass(frozen=True)
 class Draw:
-    """The random inputs of one check: a scene, a program, and parameters of their runs.
-
-    The scene is solved by modern methods of this package and by a program of the thesis. `listing`
-    is this program with a random choice of its defects. A seed and the number of the check
-    determine all inputs.
-    """
+    """The random inputs of one check: a scene, a program, and parameters of their runs."""
 
     scene: Scene  # in odd draws a difficult scene, named by its kind in `NASTY`
     listing: Listing  # of any program, with random defects and readings
@@ -36,37 +31,22 @@ class Draw:
 
     @property
     def time(self) -> float:
-        """The end time (s) of a method's integration; negative if it is backward in time.
-
-        The absolute value is the scene's step size times the scene's number of steps.
-        """
+        """The end time (s) of a method's integration; negative if it is backward in time."""
         return self.scene.step_size * self.scene.steps * (-1.0 if self.backward else 1.0)
 
     def tolerance(self, finest: float) -> float:
-        """Return the random relative tolerance with which a method is checked.
-
-        `finest` is the smallest tolerance that the method accepts. The attribute `digits`, a random
-        number from 0 to 1, determines the result: 1e-3 for 0, `finest` for 1, and a value between
-        them, in logarithmic scale, otherwise.
-        """
+        """Return the relative tolerance, from 1e-3 to a method's `finest` by `digits`."""
         return float(max(finest, COARSEST * (finest / COARSEST) ** self.digits))
 
 
 def weekly_seed(day: datetime.date | None = None) -> str:
-    """Return the week of `day` as text, as in 2026-W47.
-
-    The text is used as a seed of random checks, and changes every Monday. If `day` is None, the
-    current week is returned.
-    """
+    """Return the week of `day`, by default today, as in 2026-W47; a seed of random checks."""
     year, week, _ = (day or datetime.date.today()).isocalendar()
     return f"{year}-W{week:02d}"
 
 
 def draw(seed: str, number: int) -> Draw:
-    """Return the random inputs of check `number`: a scene, a program with defects, and parameters.
-
-    `seed` and `number` determine the result, which is the same in every version of Python.
-    """
+    """Return the random inputs of check `number`, the same in every version of Python."""
     # Each draw has its own random generator, so that it can be repeated without the other draws.
     source = Random(f"{seed}/{number}")
     scene = KINDS["plain"](source)
@@ -98,9 +78,5 @@ def text_generator(seed: str) -> np.random.Generator:
 
 
 def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
-    """Return the random scene of one kind that `seed` determines.
-
-    `kind` is a key of `pyharness.scenes.kinds.KINDS`, such as ``plain``. `name` is the name of the
-    scene.
-    """
+    """Return the scene of a kind, a key of `scenes.kinds.KINDS`, that `seed` determines."""
     return replace(KINDS[kind](Random(seed)), name=name)

@@ -1,9 +1,9 @@
 """Rescaled time: conversion of scenes and trajectories to another unit of time.
 
 Products of two components of omega underflow below 1e-154 rad/s and overflow above 1e154 rad/s,
-although omega itself is representable. Therefore a method that forms such products receives the
+although omega itself is representable. A method that forms such products therefore receives the
 scene in a unit of time in which omega is near 1. The ratio of the units is a power of two, so that
-the conversion does not round any number.
+no number is rounded.
 """
 
 import math
@@ -30,10 +30,8 @@ _LARGE = 2.0**300
 def scaled(scene: Scene, factor: float) -> Scene:
     """Return the scene with rescaled time: omega is multiplied by `factor`, time divided by it.
 
-    If omega(t) is the solution of the given scene, the solution of the returned scene is
-    factor * omega(factor * t). If `factor` is a power of 2, no number is rounded. Raise InputError
-    if the torque depends on the state and can't be rescaled, for which see `rescaling_factor`, or
-    if the inertia changes with time.
+    The solution becomes factor * omega(factor * t). Raise InputError if the torque depends on the
+    state and can't be rescaled (see `rescaling_factor`), or if the inertia changes with time.
     """
     is_constant = scene.changing is None
     tape = _tape(scene.torque, factor) if isinstance(scene.torque, StateTorque) else None
@@ -66,9 +64,9 @@ def scaled(scene: Scene, factor: float) -> Scene:
 
 
 def is_ordinary(omega: Triple) -> bool:
-    """Return whether products of components of omega (rad/s) neither overflow nor underflow.
+    """Return whether the largest component of omega is between 2**-300 and 2**300 rad/s.
 
-    The test is that the largest component is between 2**-300 and 2**300 rad/s.
+    Products of components then neither overflow nor underflow.
     """
     return 1.0 / _LARGE <= max(map(abs, omega)) <= _LARGE
 
@@ -81,11 +79,9 @@ def has_ordinary_rows(found: Trajectory) -> bool:
 def rescaling_factor(scene: Scene, time: float) -> float:
     """Return the power of 2 by which omega is multiplied so that it is near 1 rad/s.
 
-    The function `scaled` uses this factor to rescale the time of the scene. Omega is the larger of
-    the initial omega and the omega that the torque may cause until `time` (s), the end of the
-    integration. The result is 1 if the scene needs no rescaling, or if the rescaled scene would
-    overflow or underflow. The omega that a torque of the state may cause is only estimated, and
-    an opaque torque is not rescaled.
+    Omega is the larger of the initial omega and the one that the torque may cause until `time` (s),
+    for a torque of the state an estimate. The result is 1 if no rescaling is needed, if the
+    rescaled scene would overflow or underflow, or if the torque is opaque.
     """
     if is_ordinary(scene.omega):
         return 1.0
@@ -108,11 +104,10 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
 
 def omega_by_torque(scene: Scene, time: float) -> float:
-    """Return a bound of the components of omega (rad/s) that the torque alone causes.
+    """Return a bound of the components of omega (rad/s) that the torque alone causes until `time`.
 
-    It applies from 0 to `time` (s) to a body that is at rest at time 0. Gyroscopic torques, the
-    products of components of omega in Euler's equations, are neglected. The bound is infinite if it
-    is beyond the range of binary64.
+    The body is at rest at time 0 (s), and gyroscopic torques are neglected. The bound may be
+    infinite.
     """
     law, span = scene.law, abs(time)
     moments = scene.moments or (1.0, 1.0, 1.0)
@@ -163,9 +158,7 @@ def _tape(torque: StateTorque, factor: float) -> Tape | None:
 def _fits(scene: Scene, time: float, factor: float) -> bool:
     """Return whether times and torques do not overflow if omega is multiplied by `factor`.
 
-    Time is divided by `factor`, and torques are rescaled to match. `time` is the end of the
-    integration of the given scene (s). The result is also False if a rescaled time is so short that
-    it is subnormal in binary64, and thus has fewer digits.
+    It is False as well if a rescaled time is subnormal, and thus has fewer digits.
     """
     law = scene.law
     waves = law.sines + law.cosines
@@ -179,11 +172,9 @@ def _fits(scene: Scene, time: float, factor: float) -> bool:
 
 
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
-    """Return the trajectory of a rescaled scene in rad/s and s, the units of the original scene.
+    """Return the trajectory of a scene rescaled by `factor` in rad/s and s, at the given times.
 
-    `times` are the requested times of the original scene (s), and `factor` is the factor by which
-    the function `scaled` multiplied omega and divided time. If omega overflows in the original
-    unit, the returned trajectory ends before the first row with an overflow.
+    If omega overflows in these units, it ends before the first row with an overflow.
     """
     with np.errstate(over="ignore"):
         omega = trajectory.omega / factor

@@ -18,11 +18,9 @@ from pyharness.model.trajectory import Array
 def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
     """Return the scene with the function `turn` applied to omega and to all vectors of the torque.
 
-    `turn` takes and returns three components; for example, it permutes axes or changes signs. If
-    `body` is true, `turn` is also applied to the moments. A torque about the axes of space is
-    unchanged. A torque that depends on the state is that of the new axes, and `turn` must be a
-    rotation. The attitude is also unchanged, so that the caller must transform it if necessary.
-    Raise InputError if the inertia changes with time.
+    If `body` is true, it is also applied to the moments. A torque about the axes of space and the
+    attitude are unchanged; the caller must transform the latter if necessary. For a torque of the
+    state, `turn` must be a rotation. Raise InputError if the inertia changes with time.
     """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
@@ -45,7 +43,7 @@ def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene
 def axes_of(turn: Callable[[Triple], Triple]) -> Array:
     """Return new axes as the columns of a matrix, in components about the old axes.
 
-    `turn` takes the components of a vector about the old axes and returns those about the new ones.
+    `turn` takes components about the old axes and returns those about the new ones.
     """
     return np.array([turn((1.0, 0.0, 0.0)), turn((0.0, 1.0, 0.0)), turn((0.0, 0.0, 1.0))])
 
@@ -83,10 +81,9 @@ def restarted_at(
 ) -> Scene:
     """Return the scene whose time 0 is the time `by` (s) of the given scene.
 
-    `omega` (rad/s) and `attitude` (a quaternion) are the state at time `by` and become the initial
-    values. If `attitude` is None, the initial attitude of the given scene is used. The torque is
-    shifted in time. Raise InputError if the torque is opaque, or if `attitude` is None and the
-    torque is about the axes of space or depends on the attitude.
+    `omega` (rad/s) and `attitude`, by default the initial one, are the state at that time. Raise
+    InputError if the torque is opaque, or needs an attitude (or is about the axes of space) that is
+    not given.
     """
     first, second, third = (float(w) for w in omega)
     if isinstance(scene.torque, StateTorque):

@@ -1,7 +1,7 @@
 """Random scenes with torques that depend on omega or attitude, reproducible from a seed.
 
-A torque is the sum of functions that are recorded, or of ready terms. All torques are drawn in
-proportion to the gyroscopic torque, so that they affect slow and fast bodies in the same way.
+A torque is the sum of functions that are recorded, or of ready terms, drawn in proportion to the
+gyroscopic torque, so that slow and fast bodies are affected in the same way.
 """
 
 from collections.abc import Callable
@@ -48,8 +48,8 @@ TIMED = ("table", "pulses")  # ready terms that depend on time alone
 def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Scene, float]:
     """Return a random scene whose torque is the sum of one to three terms, and a time (s).
 
-    `names` are the kinds of terms. The scene has an attitude if a term needs one, or by chance. The
-    time may be negative.
+    The scene has an attitude if a term of `names` needs one, or by chance. The time may be
+    negative.
     """
     chosen = source.sample(names, min(len(names), source.choice((1, 1, 2, 2, 3))))
     size = 10.0 ** source.uniform(-2.0, 1.0)  # of the moments, kg m2

@@ -1,7 +1,4 @@
-"""Random scenes of several named kinds, each with a time; no method was tuned on these scenes.
-
-The argument `generator` of the functions that draw a scene is the random generator.
-"""
+"""Random scenes of several named kinds, each with a time; no method was tuned on these scenes."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -160,10 +157,7 @@ def _unstable(generator: Generator) -> tuple[Scene, float]:
 
 
 def _spin(generator: Generator, kind: str) -> tuple[Scene, float]:
-    """Return a rotation about a principal axis under a torque along that axis, and its time (s).
-
-    `kind` is a member of `SPINS`.
-    """
+    """Return a rotation about a principal axis, a torque of `SPINS` along it, and a time (s)."""
     axis = int(generator.integers(3))
     along = np.zeros(3)
     along[axis] = 1.0
@@ -220,10 +214,7 @@ KINDS: dict[str, Callable[[Generator], tuple[Scene, float]]] = {
 
 
 def timed_scenes(kind: str, seed: int | Sequence[int]) -> Iterator[tuple[Scene, float]]:
-    """Yield random scenes of a kind, a key of `KINDS`, each with a time (s), without end.
-
-    `seed` determines them.
-    """
+    """Yield random scenes of a kind, a key of `KINDS`, each with a time (s), without end."""
     generator = np.random.default_rng(seed)
     while True:
         yield KINDS[kind](generator)

@@ -396,7 +396,7 @@ def _computed(package: Package, folder: Path) -> dict[str, list[list[str]]]:
     for path, content in package.items():
         (folder / "package" / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / "package" / path).write_bytes(content)
-    code = "".join(_blocks("Compute three tables of the article"))
+    code = (GUIDE.parent / "article_tables.py").read_text()
     code += "import sys\nassert not {'pyharness', 'numpy', 'pandas'} & {*sys.modules}\n"
     # -S leaves site-packages out of the path, -I the settings of the user and PYTHONPATH.
     done = subprocess.run(

@@ -2,6 +2,7 @@
 
 import html
 import re
+import runpy
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -232,6 +233,10 @@ def test_two_term_deck_has_the_effects_that_lesson_and_notes_say() -> None:
     scene = replace(case_scene(5), step_size=0.005, steps=200)
     omega = run_program(scene, Listing.original("two-term")).omega[-1]
     assert _page(deck, halved)[-1][:4] == [*(f"{each:.4f}" for each in omega), "200"]
+
+
+def test_numbers_of_the_solutions_are_computed() -> None:
+    runpy.run_path(str(DOCS / "tutorials/lesson_solutions.py"))
 
 
 @pytest.mark.skipif(compiler() is None, reason="no gfortran")

@@ -15,27 +15,27 @@ from nbclient import NotebookClient
 
 import pyharness
 from docs.gallery import build
-from docs.gallery.build import answer, names, page, question
+from docs.gallery.build import PAGES, answer, examples, page, question
 from docs.gallery.execution import OUTPUT, PICTURE, PYTHON, executed, is_current, shown_output
 from pyharness.edition.notebooks import notebook
 from tests.conftest import Printed
 
 _PUBLIC = {f"pyharness.{name}" for name in ("events", "torques")}
+TEXTS = {name: text for name, (_, text) in examples().items()}
 _NUMBER = re.compile(r"\d+(?:[ ,]\d{3})*(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
 def test_every_page_is_in_the_index() -> None:
-    pages = {path.stem for path in build.HERE.glob("*.md")} - {"README"}
-    assert pages == set(names())
-    assert len(names()) == len(pages) >= 12
+    assert {path.stem for path in build.HERE.glob("*.md")} == {*PAGES, "README"}
+    assert len(TEXTS) >= 12
     files = [path for path in build.HERE.iterdir() if path.suffix in (".svg", ".png", ".csv")]
-    assert {path.stem for path in files} == pages
+    assert {path.stem for path in files} == TEXTS.keys()
     assert all(path.stat().st_size < 100_000 for path in files)
 
 
-@pytest.mark.parametrize("name", names())
-def test_page_has_its_parts(name: str) -> None:
-    text = page(name).read_text()
+@pytest.mark.parametrize("name", TEXTS)
+def test_example_has_its_parts(name: str) -> None:
+    text = TEXTS[name]
     assert question(text).endswith("?")
     first = PYTHON.search(text)
     assert first is not None
@@ -52,9 +52,9 @@ def test_page_has_its_parts(name: str) -> None:
     assert len(OUTPUT.findall(text)) == 1
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", TEXTS)
 def test_example_uses_public_names_only(name: str) -> None:
-    for block in PYTHON.findall(page(name).read_text()):
+    for block in PYTHON.findall(TEXTS[name]):
         for node in ast.walk(ast.parse(block)):
             if isinstance(node, ast.ImportFrom) and str(node.module).startswith("pyharness"):
                 found = {each.name for each in node.names}
@@ -63,10 +63,10 @@ def test_example_uses_public_names_only(name: str) -> None:
                 assert not any(each.name.startswith("pyharness") for each in node.names)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", TEXTS)
 def test_numbers_of_the_answer_are_printed(name: str) -> None:
     """Each number of the answer is in the output of the example, or in its code or introduction."""
-    text = page(name).read_text()
+    text = TEXTS[name]
     (output,) = OUTPUT.findall(text)
     known = output + text[: text.index("```output")]
     for number in _NUMBER.findall(answer(text)):
@@ -100,7 +100,7 @@ def test_command_of_the_wing_nut_runs(
 ) -> None:
     """The animation takes half a minute, and is not made here."""
     monkeypatch.chdir(tmp_path)
-    text = page("wing-nut").read_text()
+    text = TEXTS["wing-nut"]
     (scene,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     (command,) = re.findall(r"```sh\npyharness (.*?)\n```", text)
     (tmp_path / "nut.toml").write_text(scene)
@@ -138,21 +138,21 @@ def test_build_replaces_outputs_and_draws(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_pages_of_the_site_link_to_their_notebooks(built_site: dict[str, bytes]) -> None:
-    for name in names():
+    for name in PAGES:
         html = built_site[f"docs/gallery/{name}.html"].decode()
         assert f'href="{name}.ipynb"' in html
-        assert f'src="{name}.' in html
+        assert all(f'src="{each}' in html for each in PICTURE.findall(page(name).read_text()))
         nbformat.validate(json.loads(built_site[f"docs/gallery/{name}.ipynb"]))
     assert "docs/tutorials/integrate-a-body.ipynb" in built_site
     assert b".ipynb" not in built_site["docs/index.html"]
     index = built_site["docs/gallery/README.html"].decode()
-    assert all(f'href="{name}.html"' in index for name in names())
+    assert all(f'href="{name}.html#' in index for name in PAGES)
 
 
 def test_notebooks_are_valid(tmp_path: Path) -> None:
     build.write_notebooks(tmp_path)
     files = sorted(tmp_path.glob("*.ipynb"))
-    assert {path.stem for path in files} >= {*names(), "integrate-a-body"}
+    assert {path.stem for path in files} >= {*PAGES, "integrate-a-body"}
     for path in files:
         found = nbformat.reads(path.read_text(), as_version=4)  # type: ignore[no-untyped-call]
         nbformat.validate(found)
@@ -160,25 +160,25 @@ def test_notebooks_are_valid(tmp_path: Path) -> None:
     assert sum(path.stat().st_size for path in files) < 2_000_000
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", PAGES)
 def test_notebook_has_code_output_and_picture_of_its_page(name: str) -> None:
     text = page(name).read_text()
-    (picture,) = PICTURE.findall(text)
-    record = json.loads(notebook(text, {picture: (build.HERE / picture).read_bytes()}))
+    pictures = {each: (build.HERE / each).read_bytes() for each in PICTURE.findall(text)}
+    record = json.loads(notebook(text, pictures))
     cells = [cell for cell in record["cells"] if cell["cell_type"] == "code"]
     assert ["".join(cell["source"]) + "\n" for cell in cells] == PYTHON.findall(text)
     outputs = [each for cell in cells for each in cell["outputs"]]
     printed = ["".join(each["text"]) for each in outputs if each["output_type"] == "stream"]
     assert printed == OUTPUT.findall(text)
-    assert sum(each["output_type"] == "display_data" for each in outputs) == 1
+    assert sum(each["output_type"] == "display_data" for each in outputs) == len(pictures)
     prose = "".join("".join(c["source"]) for c in record["cells"] if c["cell_type"] != "code")
     assert "](" not in prose
-    assert question(text) in prose
+    assert all(question(TEXTS[Path(each).stem]) in prose for each in pictures)
 
 
 def test_a_notebook_runs_in_jupyter(tmp_path: Path) -> None:
     """A kernel executes the notebook of a page, prints its output and shows its picture."""
-    text = page("wing-nut").read_text()
+    text = TEXTS["wing-nut"]
     cells = nbformat.reads(notebook(text, {}).decode(), as_version=4)  # type: ignore[no-untyped-call]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -1,82 +1,82 @@
 """Builds the gallery: outputs and pictures of its pages, its index, and notebooks.
 
-The page of an example is its only source. ``python -m docs.gallery.build``, in a checkout, executes
+The section of an example in a page is its only source. The name of an example is that of its
+picture. ``python -m docs.gallery.build``, in a checkout, executes
 the examples of all pages and tutorials. It replaces the outputs that they show, draws the pictures
 of the gallery, writes the index `README.md`, and writes notebooks to the folder `build/notebooks`.
-With names, such as ``python -m docs.gallery.build wing-nut``, only these pages are executed.
+With names, such as ``python -m docs.gallery.build free-body``, only these pages are executed.
 """
 
 import re
 import sys
+from functools import cache
 from pathlib import Path
 
 from docs.gallery.execution import PICTURE, executed, picture_file, picture_of, shown_output
 from pyharness.edition import documents
 from pyharness.edition.made_pages import paragraphs, table
+from pyharness.edition.markdown import slug
 from pyharness.views.pictures import saved
 
 HERE = Path(__file__).parent
 PAGE = "gallery/README.md"
 """The path of the index in the folder `docs`."""
 
-GROUPS = {
-    "Motions of a free body": ("wing-nut", "toutatis", "geometric-phase", "lost-digits"),
-    "Satellites": (
-        "gravity-gradient",
-        "detumbling",
-        "antenna-contact",
-        "gyro-fit",
-    ),
-    "Many bodies": ("spreading-cloud", "tumbling-sweep"),
-    "The programs of the thesis": ("figure-7", "fortran-python"),
-}
-"""The names of the examples, by the headings of the index."""
+PAGES = ("free-body", "satellites", "many-bodies", "programs")
+"""The pages, in the order of the index. Each section of a page is an example."""
 
 NOTEBOOKS = HERE.parents[1] / "build" / "notebooks"
 """The folder of the notebooks."""
 
 _HEAD = """
-For users who look for an example: each page has one question, a short program that uses public
-functions only, a picture, and the answer in numbers. The programs run as they are; in a script,
+For users who look for an example: each has one question, a short program that uses public functions
+only, a picture, and the answer in numbers. The programs run as they are; in a script,
 `figure.savefig("picture.png")` writes the figure. `python -m docs.gallery.build` writes outputs,
 pictures, and notebooks to `build/notebooks`; the web pages have the notebooks too.
 """
 
 
-def names() -> list[str]:
-    """Return the names of all examples, in the order of the index."""
-    return [name for group in GROUPS.values() for name in group]
-
-
 def page(name: str) -> Path:
-    """Return the file of an example's page."""
+    """Return the file of a page."""
     return HERE / f"{name}.md"
 
 
+@cache
+def examples() -> dict[str, tuple[str, str]]:
+    """Return the page and the text of each example by its name, in the order of the index."""
+    found = {}
+    for each in PAGES:
+        _, *sections = re.split(r"^(?=## )", page(each).read_text(encoding="utf-8"), flags=re.M)
+        for section in sections:
+            picture = PICTURE.search(section)
+            assert picture is not None, section.partition("\n")[0]
+            found[Path(picture[1]).stem] = each, section
+    return found
+
+
 def question(text: str) -> str:
-    """Return the title of a page."""
-    return text.partition("\n")[0].removeprefix("# ")
+    """Return the heading of an example."""
+    return text.partition("\n")[0].removeprefix("## ")
 
 
 def answer(text: str) -> str:
-    """Return the answer of a page, which is the paragraph that begins with the word Answer."""
+    """Return the answer of an example: the paragraph that begins with the word Answer."""
     (found,) = re.findall(r"^\*\*Answer\.\*\* (.*?)(?:\n\n|\Z)", text, re.DOTALL | re.MULTILINE)
     return " ".join(found.split())
 
 
 def gallery_page() -> str:
     """Return the index of the gallery as Markdown."""
+    rows = []
+    for name, (where, text) in examples().items():
+        found = PICTURE.search(text)
+        assert found is not None, name
+        link = f"{where}.md#{slug(question(text))}"
+        rows.append(
+            [f"[![{_alternative(found[0])}]({found[1]})]({link})", f"[{question(text)}]({link})"]
+        )
     parts = ["# Gallery: questions about rotating bodies\n", paragraphs(_HEAD.strip())]
-    for heading, group in GROUPS.items():
-        rows = []
-        for name in group:
-            text = page(name).read_text(encoding="utf-8")
-            found = PICTURE.search(text)
-            assert found is not None, name
-            picture = f"[![{_alternative(found[0])}]({found[1]})]({name}.md)"
-            rows.append([picture, f"[{question(text)}]({name}.md)", answer(text)])
-        parts += [f"## {heading}\n", table("picture | question | answer", rows)]
-    return "\n".join(parts)
+    return "\n".join([*parts, table("picture | question", rows)])
 
 
 def _alternative(picture: str) -> str:

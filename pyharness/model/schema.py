@@ -1,8 +1,4 @@
-"""Schema numbers of the files that this project writes and reads.
-
-A schema number is the version of a file format. The formats are described in
-docs/reference/formats.md.
-"""
+"""Schema numbers, the versions of file formats, of which docs/reference/formats.md tells."""
 
 from pyharness.model.errors import InputError, kind_of
 
@@ -28,24 +24,8 @@ The number is increased if an old version would misread a new file, or a new ver
 def check_schema(where: str, kind: str, found: object, remedy: str) -> None:
     """Raise InputError if a file's schema number is not the one that this version reads.
 
-    A schema number is the version of a file format.
-
-    Parameters
-    ----------
-    where : str
-        The file, or the place in it, with which the message begins, as in "scene file 'a.toml'".
-    kind : str
-        Kind of the file, a key of `SCHEMAS`, as in "scene file".
-    found : object
-        The schema number in the file; None if the file has none. If the file may omit the number,
-        the caller passes the number in `SCHEMAS` instead of None.
-    remedy : str
-        What the user can do, with which the message ends.
-
-    Raises
-    ------
-    InputError
-        If `found` differs from the number in `SCHEMAS`, or is not an integer.
+    The message begins with `where`, as "scene file 'a.toml'", and ends with `remedy`. `kind` is a
+    key of `SCHEMAS`, and `found` the number in the file, or None.
     """
     known = SCHEMAS[kind]
     if type(found) is int and found == known:

@@ -194,7 +194,7 @@ def test_another_schema_is_refused_in_a_line(kind: str, tmp_path: Path) -> None:
 
 
 def test_numbers_are_those_of_the_document() -> None:
-    page = (ROOT / "docs/reference/formats.md").read_text()
+    page = (ROOT / "docs/reference/output.md").read_text()
     rows = re.findall(r"^\| ([a-z ]+) \| (\d+) \|", page, flags=re.M)
     assert {kind: int(number) for kind, number in rows} == SCHEMAS
 

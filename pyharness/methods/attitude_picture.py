@@ -1,7 +1,4 @@
-"""Pictures of an attitude: paths of the body's axes and of omega in space, and an animation.
-
-The animation shows a rotating brick that has the moments of the scene.
-"""
+"""Pictures of an attitude: paths of axes and omega in space, and an animation of a brick."""
 
 import io
 from pathlib import Path
@@ -29,11 +26,9 @@ _EDGES = [
 
 
 def draw_sphere(axes: Any, found: Trajectory) -> None:
-    """Draw the paths of the body's axes and of the direction of omega on the unit sphere in space.
+    """Draw the paths of the body's axes and of omega's direction on the unit sphere in space.
 
-    `axes` is the three-dimensional Matplotlib diagram into which the paths are drawn. `found` is
-    the trajectory, which must contain the attitude. Dots mark the ends of the paths of the body's
-    axes, and a cross marks the end of the path of omega.
+    Dots mark the ends of the axes, a cross the end of omega.
     """
     assert found.attitude is not None
     _frame(axes)
@@ -65,9 +60,8 @@ def _frame(axes: Any) -> None:
 def check_animation(path: str, scene: Scene) -> None:
     """Raise InputError if no animation of the scene can be written to the file `path`.
 
-    The name of the file must end in .gif or .html. The scene must have principal moments that a
-    brick can have, so that none exceeds the sum of the other two. These conditions do not depend on
-    the solution and can be checked before the scene is solved.
+    It is checked before the scene is solved: the file must end in .gif or .html, and no moment may
+    exceed the sum of the other two.
     """
     if _form(path) not in ANIMATIONS:
         raise InputError(f"--animate '{path}': unknown format; allowed: .gif, .html")
@@ -89,13 +83,10 @@ def check_animation(path: str, scene: Scene) -> None:
 
 
 def animation(scene: Scene, method: str, tolerance: float | None, end: float, path: str) -> bytes:
-    """Return the bytes of an animation of a brick with the scene's moments, from 0 to `end` (s).
+    """Return an animation of a brick with the scene's moments, from 0 to `end` (s), as a file.
 
-    The bytes are a GIF file or an HTML page, depending on the ending of the file name `path`. No
-    file is written. The scene is solved by `method` with `tolerance`, which have the same meaning
-    as in `solve`. A motion of 2 to 10 s is shown in true time. A shorter motion is stretched to
-    2 s, and a longer one is compressed to 10 s. The title then states how much slower or faster it
-    is shown.
+    The format follows `path`. A motion of 2 to 10 s is in true time; others are stretched to 2 s or
+    compressed to 10 s, as the title states.
     """
     from matplotlib import rc_context
     from matplotlib.animation import FuncAnimation
@@ -133,11 +124,9 @@ def animation(scene: Scene, method: str, tolerance: float | None, end: float, pa
 
 
 def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: float) -> Any:
-    """Draw the static parts of an animated brick, and return the function that draws a frame.
+    """Draw what is static, and return the function that draws a frame, a row of `found`.
 
-    `scene` supplies the moments of the brick. The returned function takes the number of a frame,
-    counted from 0. The frame shows the row of the trajectory `found` with the same number. `rate`
-    is the number of seconds of the motion that pass in one second of the animation.
+    `rate` is the seconds of the motion per second of the animation.
     """
     axes: Any = figure.add_axes((0.02, 0.02, 0.96, 0.86), projection="3d")
     _frame(axes)
@@ -167,10 +156,9 @@ def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: flo
 
 
 def _brick(scene: Scene) -> Array:
-    """Return the corners of a brick with the scene's moments, shape (8, 3), within the unit sphere.
+    """Return the corners of a brick with the scene's moments, shape (8, 3), in the unit sphere.
 
-    The size of the brick is fixed, so that only the ratios of the moments matter. Each side has at
-    least 1 % of the length of the longest side, so that it remains visible.
+    Only ratios of moments matter. No side is below 1 % of the longest, to remain visible.
     """
     moments = np.array(scene.moments)
     sides = np.sqrt(np.maximum(0.0, moments.sum() - 2.0 * moments))

@@ -1,11 +1,10 @@
 """The method `averaged`: weak torques over very many revolutions, by two-scale averaging.
 
-Torque-free motions are periodic. A weak torque changes them slowly, and the method computes the
-slow change in macro-steps of very many revolutions. The stroboscopic solution is that of Calvo,
-Chartier, Murua and Sanz-Serna 2011, Numerical stroboscopic averaging for ODEs and DAEs, Applied
-Numerical Mathematics 61. The two scales and their expansion are those of Chartier, Crouseilles,
-Lemou and Mehats 2015, Uniformly accurate numerical schemes for highly oscillatory Klein-Gordon and
-nonlinear Schroedinger equations, Numerische Mathematik 129.
+A weak torque changes the periodic torque-free motion slowly, here in macro-steps of very many
+revolutions. The stroboscopic solution is that of Calvo, Chartier, Murua and Sanz-Serna 2011,
+Numerical stroboscopic averaging for ODEs and DAEs, Applied Numerical Mathematics 61; the two scales
+are those of Chartier, Crouseilles, Lemou and Mehats 2015, Uniformly accurate numerical schemes for
+highly oscillatory Klein-Gordon and nonlinear Schroedinger equations, Numerische Mathematik 129.
 """
 
 import math
@@ -56,16 +55,14 @@ def averaged(
 ) -> Trajectory:
     """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
 
-    `tolerance` is the largest allowed error, relative to the largest |omega|. `effort` multiplies
-    the work limit of some ten seconds. In the trajectory, `steps` is the number of macro-steps, and
-    `evaluations` the number of evaluations of the right-hand side. Its `error` is measured with
-    more nodes and a higher order of averaging.
+    `steps` of the trajectory are macro-steps; its `error` is measured with more nodes and a higher
+    order of averaging.
 
-    Raise InputError for an opaque torque, and if omega would not oscillate about a principal axis
-    without the torque; if the motion is near the separatrix; if the torque is not weak, or varies
-    as fast as the motion and may be in resonance with it; if a recorded torque is no polynomial in
-    omega and time, and waves, so that it may change within a part of a macro-step; and if the work
-    limit is exceeded.
+    Raise InputError for an opaque torque; if omega would not oscillate about a principal axis
+    without the torque, or the motion is near the separatrix; if the torque is not weak, or may be
+    in resonance with the motion; if a recorded torque is more than a polynomial in omega and time,
+    and waves, so that it may change within a part of a macro-step; and if the work limit is
+    exceeded.
     """
     coordinates = Coordinates.of(scene.euler_coefficients, scene.omega)
     if coordinates is None:
@@ -169,10 +166,7 @@ class _Run:
         return self.coordinates.rate * math.sqrt(0.5 * (low + high) * math.sqrt(low * high))
 
     def _forecast(self) -> float:
-        """Return a suitable length (rad) of the next macro-step, from the slopes at its start.
-
-        The length does not go far beyond the last time.
-        """
+        """Return a length (rad) of the next macro-step, from the slopes at its start."""
         point = self.point
         slopes = self.forward * MacroStep.mean_slopes(
             self.coordinates, self.torque, point, self.begin[0], _FEWEST_ANGLES
@@ -199,9 +193,9 @@ class _Run:
         return min(self.longest, _RELATIVE / change, rest + _TURNS_BEYOND * _TURN)
 
     def _step(self) -> MacroStep:
-        """Return the solution over the next macro-step, which has as many revolutions as possible.
+        """Return the solution over the next macro-step, with as many revolutions as possible.
 
-        Raise TimedError if even the fewest revolutions are too many.
+        Raise TimedError if even the fewest are too many.
         """
         time = self.begin[0]
         angles = self._angles(float(self.coordinates.modulus(self.point)))

@@ -2,15 +2,15 @@
 
 The body rotates about principal axis a, and b, c are the next axes in cyclic order. Euler's
 equations are b' = B w_c w_a + n_b, and so on, where n is the torque over the moment. Let the
-coefficients of b and c be P and Q, of opposite signs, and r the coefficient of a. With
-x = |Q|^(1/2) w_b, y = +-|P|^(1/2) w_c and u = w_a^2, and with the angle psi, for which
-psi' = |P Q|^(1/2) |w_a|, the motion without torque is exactly 2 pi-periodic in psi:
+coefficients of b and c be P and Q, of opposite signs, and r the coefficient of a. With x =
+|Q|^(1/2) w_b, y = +-|P|^(1/2) w_c and u = w_a^2, and with the angle psi, for which psi' = |P
+Q|^(1/2) |w_a|, the motion without torque is exactly 2 pi-periodic in psi:
 
     dx/dpsi = -y,  dy/dpsi = x,  du/dpsi = 2 k x y,  with a constant k.
 
-Therefore x + i y = (p1 + i p2) exp(i psi) and u = p3 + k y^2, where p1, p2 and p3 are constant.
-A torque changes them slowly. No elliptic function is needed, and the coordinates are regular where
-the body rotates exactly about axis a. They end at the separatrix, where w_a reaches 0.
+Therefore x + i y = (p1 + i p2) exp(i psi) and u = p3 + k y^2 with constant p1, p2 and p3, which a
+torque changes slowly. The coordinates need no elliptic function, and are regular where the body
+rotates exactly about axis a. They end at the separatrix, where w_a reaches 0.
 """
 
 import math
@@ -27,11 +27,7 @@ Torque = Callable[[Array, list[Array]], list[Array] | Array]
 
 
 class Coordinates(NamedTuple):
-    """The coordinates of the motions about one principal axis.
-
-    A point is the array (p1, p2, p3, t), where t is the time (s). Its further dimensions are those
-    of a grid.
-    """
+    """The coordinates of motions about one axis; a point is (p1, p2, p3, t), t the time (s)."""
 
     axes: tuple[int, int, int]  # b, c, a
     on_b: float  # x over w_b
@@ -42,10 +38,9 @@ class Coordinates(NamedTuple):
 
     @classmethod
     def of(cls, coefficients: Triple, omega: Triple) -> Self | None:
-        """Return the coordinates of the motion with this omega (rad/s) at time 0.
+        """Return the coordinates of the motion from omega (rad/s), with coefficients A, B, C.
 
-        `coefficients` are A, B and C. The result is None if the motion is on a separatrix, or if
-        omega does not oscillate about a principal axis.
+        None on a separatrix, or if omega does not oscillate about a principal axis.
         """
         found: list[tuple[float, Self]] = []
         for a in range(3):
@@ -72,10 +67,9 @@ class Coordinates(NamedTuple):
         return np.array([self.on_b * b, y, a * a - self.bend * y * y, 0.0])
 
     def modulus(self, point: Array) -> Array:
-        """Return the square of the modulus of the elliptic functions that describe the orbit.
+        """Return the squared modulus of the elliptic functions of the orbit.
 
-        It is 0 for a rotation about axis a, and 1 on the separatrix. At points beyond it is
-        infinite.
+        It is 0 for a rotation about axis a, 1 on the separatrix, and infinite beyond.
         """
         one = point[2]
         other = one + self.bend * (point[0] * point[0] + point[1] * point[1])
@@ -96,10 +90,7 @@ class Coordinates(NamedTuple):
         return math.sqrt(max(float(on_axis), float(on_others)))
 
     def by_omega(self, omega: Array, cosine: Array, sine: Array) -> Array:
-        """Return the derivatives of points with respect to omega at n fixed psi, shape (n, 3, 3).
-
-        `omega` has shape (3, n). The points are (p1, p2, p3), without the time.
-        """
+        """Return the derivatives of (p1, p2, p3) by omega, (3, n), at n fixed psi, (n, 3, 3)."""
         b, c, a = self.axes
         found = np.zeros((len(cosine), 3, 3))
         found[:, 0, b], found[:, 0, c] = cosine * self.on_b, sine * self.on_c
@@ -122,10 +113,7 @@ class Coordinates(NamedTuple):
     def slopes(
         self, point: Array, time: Array, cosine: Array, sine: Array, torque: Torque, mean: float
     ) -> Array:
-        """Return the derivatives of a point with respect to psi.
-
-        `time` is the time (s) at which the torque acts, and `mean` (s) is subtracted from dt/dpsi.
-        """
+        """Return the derivatives of a point by psi; `time` and the subtracted `mean` are in s."""
         omega, y, fast = self.omega(point, cosine, sine)
         pace = 1.0 / (self.rate * fast)
         torques = torque(time, omega)

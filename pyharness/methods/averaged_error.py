@@ -37,8 +37,7 @@ def estimates(
 ) -> tuple[float, float]:
     """Return the largest measured error of omega (rad/s), and the largest error amplification.
 
-    They are computed at the end of the last macro-step, where `omega` (rad/s) and the angle psi
-    (rad) are given, and at the ends of some others. `coefficients` are A, B and C.
+    They are computed at the last end, with `omega` (rad/s) and psi (rad), and at some others.
     """
     count = len(done)
     error, growth = _at(coordinates, coefficients, done, omega, angle)

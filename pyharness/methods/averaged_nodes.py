@@ -1,8 +1,7 @@
 """Nodes, and matrices that integrate, differentiate and interpolate, for the method `averaged`.
 
-There are Chebyshev points for the slow variable, and equidistant angles for the fast one. The
-formulas are those of Trefethen 2000, Spectral Methods in MATLAB, chapters 3 and 6, and of Berrut
-and Trefethen 2004, SIAM Review 46.
+Chebyshev points are for the slow variable, equidistant angles for the fast one (Trefethen 2000,
+Spectral Methods in MATLAB, chapters 3 and 6; Berrut and Trefethen 2004, SIAM Review 46).
 """
 
 from functools import lru_cache

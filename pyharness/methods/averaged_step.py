@@ -1,20 +1,19 @@
 """One macro-step of the method `averaged`: the two-scale solution over very many revolutions.
 
-The unknowns v depend on the fast angle psi, with period 2 pi, and on the slow variable
-s = psi / length, which is from 0 to 1 in the macro-step. The equation dv/dpsi = F(v, psi) becomes
+The unknowns v depend on the fast angle psi, with period 2 pi, and on the slow variable s = psi /
+length, from 0 to 1 in the macro-step. The equation dv/dpsi = F(v, psi) becomes
 
     dv/dpsi + (1/length) dv/ds = F(v, psi).
 
-Let V(s) be v at psi = 0, the stroboscopic solution, and W = v - V the oscillation. With < > for the
-mean over psi, the equation is equivalent to
+Let V(s) be v at psi = 0, the stroboscopic solution, W = v - V the oscillation, and < > the mean
+over psi. The equation is equivalent to
 
     V + <W> = V(0) + <W>(0) + length (integral of <F> over s from 0),
     W = integral over psi, from 0, of F - (1/length) dW/ds, without their mean.
 
 Each sweep inserts V and W into the right-hand sides, and raises the order of averaging by one. The
-nodes are Chebyshev points in s and equidistant angles. Newton's method solves the first equation
-at all nodes together. Sweeps with more nodes, more angles and a higher order of averaging measure
-the error.
+nodes are Chebyshev points in s and equidistant angles; Newton's method solves the first equation at
+all of them together. Sweeps with more nodes and angles measure the error.
 """
 
 from functools import lru_cache
@@ -45,7 +44,7 @@ _CLOSE = 1e-7  # rad; Newton's method squares it
 
 
 class NotResolvedError(Exception):
-    """An exception which reports that a macro-step is too long, or has no solution."""
+    """The exception for a macro-step that is too long, or has no solution."""
 
 
 class MacroStep:
@@ -54,14 +53,13 @@ class MacroStep:
     Attributes
     ----------
     stroboscopic : array, shape (4, nodes)
-        The point at psi = 0 as a function of s. Its time is without a part that is proportional
-        to psi.
+        The point at psi = 0; its time is without a part that is proportional to psi.
     error : array, shape (4, nodes)
         The measured error of `stroboscopic`.
     modulus : float
         The largest square of the modulus of the orbits.
     evaluations : int
-        The number of points at which the right-hand side was evaluated.
+        The number of evaluations of the right-hand side.
     """
 
     def __init__(
@@ -76,8 +74,7 @@ class MacroStep:
     ) -> None:
         """Solve from the point `start` over the angle `length` (rad), a multiple of 2 pi.
 
-        `varies` states whether `torque` depends on time. `start_time` is the time (s) at the start.
-        `sizes` are the numbers of nodes and of angles, both even. Raise NotResolvedError if the
+        `sizes` are the numbers of nodes and angles, both even. Raise NotResolvedError if the
         iteration does not converge.
         """
         self.coordinates, self._torque, self._start_time = coordinates, torque, start_time
@@ -193,11 +190,7 @@ class MacroStep:
         return self._newton(residual @ back.T)
 
     def propagated(self, angle: float) -> tuple[Array, Array]:
-        """Return the measured error at an angle psi (rad), and the state-transition matrix.
-
-        The matrix, shape (4, 4), has the derivatives of the point at the angle with respect to the
-        point at the start.
-        """
+        """Return the measured error at an angle (rad), and the state-transition matrix, (4, 4)."""
         at = between_nodes(self._sizes[0], np.array([angle / self.length]))[0]
         found, n, count = np.eye(4), self._n_unknowns, self._sizes[0]
         responses = self._inverse.reshape(n, count, n, count).sum(axis=-1)

@@ -59,9 +59,9 @@ def _state_torque(scene: Scene, given: StateTorque) -> Torque:
 class _Slot(NamedTuple):
     """The dependence of a slot of a tape on omega and time.
 
-    `degree` is the degree of a polynomial in omega and time, and infinite if the slot is more than
-    a sum of products of such and waves. `fastest` is the highest frequency of its waves (rad/s).
-    `rate` is the derivative with respect to time (1/s) of a slot that is linear in time alone.
+    `degree` is that of a polynomial in omega and time, infinite if there is more than these and
+    waves; `fastest` the highest frequency of the waves (rad/s), and `rate` the derivative (1/s) of
+    a slot that is linear in time alone.
     """
 
     degree: float = 0.0
@@ -72,8 +72,8 @@ class _Slot(NamedTuple):
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
     """Return the highest frequency of the waves of a torque (rad/s).
 
-    Raise InputError if the torque depends on omega or time in a way that a macro-step may miss, as
-    a pulse does, and a torque that acts in a narrow range of energy.
+    Raise InputError for a torque that a macro-step may miss, as a pulse, or one in a narrow range
+    of energy.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

@@ -31,16 +31,13 @@ _EFFORT = 1e9  # in effect no work limit: the caller has requested the whole bat
 
 @dataclass(frozen=True)
 class Solver:
-    """The method, or the program of the thesis, that solves the scenes of a batch, with settings.
+    """The method, or the program of the thesis, that solves a batch; the other of the two is None.
 
-    Exactly one of `method` and `program` is not None; it is a name. `tolerance` is the largest
-    allowed error of the method, relative to the largest |omega|. `t_end` is the final time (s). If
-    it is None, the final time is the product of the scene's step size and its number of steps.
-
-    The other fields apply only to programs. `listing` is text that selects the mistakes of the
-    printed program that remain, for example ``original`` or ``corrected``. `reading` is text that
-    selects the interpretations of its doubtful statements. `lipschitz` is the limit of the
-    Lipschitz test (1/s), and `may_stop` states whether this test may end a run.
+    `tolerance` is that of the method, relative to the largest |omega|. `t_end` is the final time
+    (s), by default step size times steps of the scene. The other fields are for programs: `listing`
+    selects the mistakes that remain (``original``, ``corrected``), `reading` the interpretations of
+    doubtful statements, `lipschitz` is the limit of the Lipschitz test (1/s), and `may_stop`
+    whether it stops.
     """
 
     method: str | None = "auto"
@@ -55,28 +52,25 @@ class Solver:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Many scenes that one method or program solves, and their results.
+    """Many scenes that one method or program solves, and their results, computed when first read.
 
-    A result is computed when it is first read. Functions that check a statement of the thesis on
-    many scenes receive a batch. They may read `omega0`, `omega`, `status`, `n_rows` and
-    `stop_variable`, and call `rows` and `by_method`.
+    Functions that check a statement of the thesis may read `omega0`, `omega`, `status`, `n_rows`
+    and `stop_variable`, and call `rows` and `by_method`.
 
     Attributes
     ----------
     scene : Scene
         The quantities that all scenes have in common.
     solver : Solver
-        The method or program that solves the scenes, with its settings.
+        The method or program, with its settings.
     listing : Listing, or None
         The program with a choice of its mistakes; None for a method.
     t_end : ndarray, shape (n,)
-        The final time of each scene, s.
+        Final times, s.
     arrays : mapping
-        The quantities that differ between the scenes, as arrays with one row for each scene. The
-        keys are names of arguments of `solve_many` and `run_many`. `omega0` is always among them;
-        for programs `step_size` and `lipschitz` may be.
+        What differs, one row a scene, by argument of `solve_many` and `run_many`; always `omega0`.
     attitude : bool
-        Whether the method computes attitudes too. The programs of the thesis compute none.
+        Whether attitudes are computed; by methods only.
     """
 
     scene: Scene
@@ -88,78 +82,57 @@ class Batch:
 
     @property
     def omega0(self) -> Array:
-        """Return the initial angular velocities of the scenes, shape (n, 3), rad/s."""
+        """Return the initial angular velocities, shape (n, 3), rad/s."""
         return self.arrays["omega0"]
 
     @property
     def step_sizes(self) -> Array:
-        """Return the step size of each scene, shape (n,), s."""
+        """Return the step sizes, shape (n,), s."""
         return self.arrays.get("step_size", np.full(len(self.omega0), self.scene.step_size))
 
     @property
     def bodies(self) -> Array:
-        """Return the principal moments (kg m2) of each scene's body, shape (n, 3).
-
-        If all scenes have the same body, the shape is (1, 3).
-        """
+        """Return the principal moments (kg m2), shape (n, 3), or (1, 3) if bodies are the same."""
         return self.arrays.get("moments", np.array([self.scene.moments]))
 
     @property
     def is_program(self) -> bool:
-        """Return whether a program of the thesis solves the batch, and not a modern method."""
+        """Return whether a program of the thesis solves the batch."""
         return self.listing is not None
 
     @cached_property
     def omega(self) -> Array:
-        """Return the omega of each scene at `t_end`, shape (n, 3), rad/s.
-
-        Omega is NaN for a scene whose integration ended before `t_end`.
-        """
+        """Return omega at `t_end`, shape (n, 3), rad/s; NaN where the integration ended before."""
         return self._program.omega[:, -1] if self.is_program else self._ends.omega
 
     @property
     def status(self) -> NDArray[np.int8]:
-        """Return how the solution of each scene ended, as integers, shape (n,).
-
-        `pyharness.model.codes.Statuses` defines the integers, for example COMPLETE = 0 and
-        OVERFLOW = 2.
-        """
+        """Return how each solution ended, by `pyharness.model.codes.Statuses`, shape (n,)."""
         return (self._program if self.is_program else self._ends).status
 
     @property
     def n_rows(self) -> NDArray[np.int32]:
-        """Return the number of steps that the program completed in each scene, shape (n,).
-
-        The number is smaller than the requested number if the run overflowed or was stopped. The
-        batch must be solved by one of the three programs of the thesis.
-        """
+        """Return the number of steps that a program completed in each scene, shape (n,)."""
         return self._program.n_rows
 
     @property
     def stop_variable(self) -> NDArray[np.int8]:
-        """Return the variable for which the Lipschitz test stopped each run, as integers, (n,).
+        """Return the variable for which a program's Lipschitz test stopped each run, shape (n,).
 
-        An integer is the position, from 1, of the variable's name in
-        `pyharness.model.trajectory.STOP_VARIABLES`, such as U1. It is 0 for a run that the test did
-        not stop. The batch must be solved by one of the three programs of the thesis.
+        It is a position in `pyharness.model.trajectory.STOP_VARIABLES`, from 1, or 0.
         """
         return self._program.stop_variable
 
     def sample_steps(self, samples: int) -> list[int]:
-        """Return the step numbers that divide a run into `samples` nearly equal parts.
-
-        A number is that of the last step of a part, and steps are counted from 1. The last number
-        is `scene.steps`, the number of steps of the whole run.
-        """
+        """Return the last steps, counted from 1, of `samples` nearly equal parts of a run."""
         steps = self.scene.steps
         return [max(1, round(steps * (i + 1) / samples)) for i in range(samples)]
 
     def rows(self, samples: int) -> Array:
-        """Return omega at `samples` times of each scene, shape (n, samples, 3), rad/s.
+        """Return omega at the ends of `samples` equal parts, shape (n, samples, 3), rad/s.
 
-        The times are the ends of `samples` equal parts of the time from 0 to `t_end`. A method
-        integrates anew from time 0 to each of these times, so that errors of earlier parts do not
-        add up. For a program the times are those of the steps that `sample_steps` returns.
+        A method integrates to each time anew, so that errors do not add up; a program is read at
+        `sample_steps`.
         """
         if not self.is_program:
             return np.stack([each.omega for each in self._samples(samples)], axis=1)
@@ -168,11 +141,9 @@ class Batch:
         return self._rows[samples]
 
     def attitudes(self, samples: int) -> Array:
-        """Return the attitudes at `samples` times of each scene, shape (n, samples, 4).
+        """Return the attitudes at the ends of `samples` equal parts, shape (n, samples, 4).
 
-        The times are the ends of `samples` equal parts of the time from 0 to `t_end`. Attitudes are
-        quaternions, scalar first, from the body to the axes of the body at time 0. The attitude at
-        time 0 is therefore (1, 0, 0, 0). The field `attitude` of the batch must be true.
+        Quaternions, scalar first, from the body to the axes of the body at time 0.
         """
         ends = []
         for each in self._samples(samples):
@@ -186,35 +157,27 @@ class Batch:
 
     @property
     def first_attitudes(self) -> Array:
-        """Return the attitudes at time 0, from the body to space, shape (n, 4) or (1, 4)."""
+        """Return the attitudes at time 0, from body to space, shape (n, 4) or (1, 4)."""
         first = np.array(self.arrays.get("attitude0", [self.scene.attitude or IDENTITY]))
         found: Array = first / np.linalg.norm(first, axis=1, keepdims=True)
         return found
 
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
-        """Return omega (rad/s) of each scene at the time `part` * `t_end`, shape (n, 3).
+        """Return omega (rad/s) at `part` * `t_end` by another method, shape (n, 3).
 
-        Omega is computed by `method`, in place of the method or program of the batch, for example
-        for a comparison. `tolerance` is the largest allowed error, relative to the largest |omega|.
-        If it is below the smallest tolerance of the method, the smallest tolerance is used.
+        A tolerance below the method's smallest is raised to it.
         """
         return self._solve(method, tolerance, self.t_end * part).omega
 
     def from_start(self, omega0: Array) -> "Batch":
-        """Return a copy of the batch with the initial angular velocities `omega0`, (n, 3), rad/s.
-
-        The copy has no results yet.
-        """
+        """Return a batch without results that starts from `omega0`, shape (n, 3), rad/s."""
         return replace(self, arrays={**self.arrays, "omega0": omega0})
 
     def run(self, at: list[int]) -> ProgramEnsemble:
-        """Run the program of the thesis for all scenes, and return its results at the steps `at`.
+        """Run the program of the thesis, and return its results at the steps `at`, ascending.
 
-        `at` contains step numbers, from 1, in ascending order. If possible, all scenes are run in
-        one call. They are run one by one if the linear terms of their torques (`torque_rate`)
-        differ, or if the program can't run one of them. In this case only a scene that the program
-        can't run has the status REFUSED. Results of scenes that are run one by one do not include
-        the program's error code IER.
+        Scenes are run one by one, without the error codes IER, if their `torque_rate` differ or the
+        program refuses one of them; only that one is then REFUSED.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:
@@ -224,10 +187,9 @@ class Batch:
         return self._run_each(at)
 
     def scene_of(self, i: int) -> Scene:
-        """Return scene `i` of the batch (from 0), without attitude unless the torque needs it.
+        """Return scene `i` (from 0), without attitude unless the torque needs it.
 
-        Row `i` of each array replaces a quantity of the common scene. Raise InputError if the
-        numbers of scene `i` are not allowed.
+        Raise InputError if its numbers are not allowed.
         """
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
         scene = self.scene
@@ -252,7 +214,7 @@ class Batch:
         return {}
 
     def _samples(self, samples: int) -> list[Ensemble]:
-        """Return the states at the ends of `samples` equal parts of the time from 0 to `t_end`."""
+        """Return the states at the ends of `samples` equal parts of the time."""
         if samples not in self._found:
             parts = [(i + 1) / samples for i in range(samples - 1)]
             ends = [self._solve_own(self.t_end * part) for part in parts]
@@ -270,13 +232,9 @@ class Batch:
         return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
-        """Return the states of all scenes at `t_end` (s, shape (n,)), computed by `method`.
+        """Return the states at `t_end` (s, shape (n,)); `more` has arguments of `solve_many`.
 
-        A method in `PREPARED`, the methods with a compiled kernel for many scenes, solves all
-        scenes in one call of `solve_many`. Any other method solves the scenes one by one. Under a
-        torque that depends on the state, only methods in `PREPARED_FOR_STATE` have such a kernel.
-        `tolerance` is the largest allowed error, relative to the largest |omega|, and the keyword
-        arguments `more` are passed to `solve_many`, such as `attitude0`.
+        Methods without a compiled kernel for these scenes solve them one by one.
         """
         by_state = isinstance(self.scene.torque, StateTorque)
         if method not in (PREPARED_FOR_STATE if by_state else PREPARED):

@@ -1,6 +1,6 @@
 """Solutions in closed form: a sphere under any torque, and other bodies without torque.
 
-The solution of a body without torque consists of Jacobi's elliptic functions.
+The latter consist of Jacobi's elliptic functions.
 """
 
 from collections.abc import Sequence
@@ -34,9 +34,8 @@ def _largest_estimate(
 ) -> tuple[float | None, float | None]:
     """Return the estimated error and the error amplification, the largest at any of the times (s).
 
-    Both are computed at the last time. Near the separatrix, the amplification may be larger at an
-    earlier time than at the last; it is then also computed at some of the earlier times. `noise`
-    has the same meaning as in `closed_form_estimate`.
+    Near the separatrix, the amplification may be larger at an earlier time than at the last; it is
+    then computed at some of these too.
     """
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
@@ -55,10 +54,8 @@ def known_solution(
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) from its closed form.
 
-    `tolerance` is the largest allowed error, relative to the largest |omega|. It does not change
-    the computed omegas. If the rounding errors, amplified by the motion, exceed it, the
-    trajectory's `ended` is ``sensitive``. `effort` multiplies the work limit of some ten seconds.
-    Raise InputError if the scene has no closed form, or if the work limit is exceeded.
+    If amplified rounding errors exceed the tolerance, it ended ``sensitive``. Raise InputError if
+    the scene has no closed form, or if the work limit is exceeded.
     """
     work = np.array([effort, 0.0])
     attitudes = None

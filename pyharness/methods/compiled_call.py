@@ -8,11 +8,10 @@ from typing import Any, NamedTuple
 class CompiledCall(NamedTuple):
     """A prepared solver as a function for compiled code, as numba calls it.
 
-    ``function(data, start, t_end, state)`` reads the state at time 0 from the address `start`, and
-    writes that at `t_end` (s) to the address `state`: three floats, omega (rad/s), and for a solver
-    of the attitude four more, a unit quaternion. It returns an integer of `pyharness.h`, which is 0
-    if the solution is complete. `data` is the address of what the solver has prepared. It is valid
-    as long as `solver` exists.
+    ``function(data, start, t_end, state)`` reads the state at the address `start`, and writes that
+    at `t_end` (s) to `state`: omega (rad/s), three floats, and for a solver of the attitude a unit
+    quaternion. It returns an integer of `pyharness.h`, 0 for a complete solution. The address
+    `data` is valid as long as `solver` exists.
     """
 
     function: Any
@@ -30,14 +29,12 @@ def compiled_call(solver: Any) -> CompiledCall:
 
 
 def get_include() -> str:
-    """Return the folder of the headers for C code.
-
-    With `pyharness.h` C code calls prepared solvers.
+    """Return the folder of `pyharness.h`, with which C code calls prepared solvers.
 
     Returns
     -------
     str
-        The path of the folder, for an option such as ``-I`` of a compiler.
+        The path of the folder, for a compiler's option ``-I``.
 
     Examples
     --------

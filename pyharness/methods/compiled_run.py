@@ -36,8 +36,8 @@ def integrated(
 ) -> CompiledRows:
     """Return the state at `times` (s), by Dormand and Prince's Runge-Kutta method of order 8.
 
-    `relative` and `absolute` are the local tolerances, as in SciPy's DOP853. `longest` is the
-    longest step (s), and `most` the largest number of calls of the compiled function.
+    `relative` and `absolute` are local tolerances, as in SciPy's DOP853, `longest` the longest step
+    (s), and `most` the largest number of calls.
     """
     n = 3 if scene.attitude is None else _WIDTH
     # A function that takes the attitude without saying so returns NaN.
@@ -62,10 +62,7 @@ def integrated(
 
 @lru_cache(maxsize=1)
 def _tableau() -> tuple[Array, Array, Array, Array]:
-    """Return the coefficients of the method and of its error estimate and dense output.
-
-    They are SciPy's, as `runge_kutta_853.f90` reads them.
-    """
+    """Return SciPy's coefficients, as `runge_kutta_853.f90` reads them."""
     from scipy.integrate import DOP853
 
     n, last = DOP853.n_stages, DOP853.D.shape[1]

@@ -22,10 +22,9 @@ from pyharness.model.trajectory import Trajectory
 def solution_of(
     scene: Scene, found: Trajectory, rows: dense.Rows, method: str, tolerance: float
 ) -> DenseOutput:
-    """Return the solution of a scene as a function of time, between the times of `found` and 0.
+    """Return the solution as a function of time, between 0 and the times of `found`.
 
-    `rows` is a function that returns the trajectory by the same method at given times and to a
-    given tolerance, which is 1 for a method with a fixed step.
+    `rows` returns the trajectory at other times and tolerances.
     """
     is_closed = not found.evaluations and method != "reference"
     return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
@@ -40,9 +39,9 @@ def with_events(
     method: str,
     tolerance: float,
 ) -> Trajectory:
-    """Return a trajectory with its events, without the rows and the function after terminal ones.
+    """Return a trajectory with its events, without what follows a terminal one.
 
-    `ends` are the first and the last of the requested times (s). `rows` is as in `solution_of`.
+    `ends` are the first and last requested times (s).
     """
     sol = found.sol or solution_of(scene, found, rows, method, tolerance)
     events = no_events(len(functions), 3 if found.attitude is None else 7)

@@ -1,7 +1,7 @@
 """Dense output of every method: Chebyshev polynomials through the method's own results.
 
-The intervals of the polynomials are divided until the last coefficients are far below the
-tolerance. A closed form is not approximated, but evaluated.
+Intervals are divided until the last coefficients are far below the tolerance. A closed form is not
+approximated, but evaluated.
 """
 
 import itertools
@@ -55,8 +55,7 @@ class _Open:
     ) -> bool:
         """Return whether a polynomial with this tail has errors of the method that are not smooth.
 
-        `values` at `times` (s) are the method's, `scale` is the largest |omega| (rad/s), and both
-        the errors and the tail must be below `rough`.
+        The errors at `times` (s), relative to `scale`, and the tail must be below `rough`.
         """
         if self.whole is None or not self.tail / _DIVIDED < tail <= rough:
             return False
@@ -88,13 +87,11 @@ class _Solved:
 def dense_output(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float, is_closed: bool
 ) -> DenseOutput:
-    """Return the solution of a scene as a function of time.
+    """Return the solution of a scene as a function of time, between 0 and the rows of `found`.
 
-    `found` is the trajectory of the scene, with its rows in ascending or descending order of time.
-    The function is defined between time 0 and its rows. `rows` returns more rows of the same
-    method, `tolerance` is the requested tolerance, and `finest` the smallest one of the method.
-    `is_closed` says that the method evaluates a closed form. A tolerance of 1 means that the method
-    has a fixed step. Raise InputError if too many polynomials would be needed.
+    The rows are in order of time; `rows` returns more of the same method. `finest` is the method's
+    smallest tolerance; a tolerance of 1 means a fixed step. Raise InputError if too many
+    polynomials would be needed.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
     states: Callable[[Array], Array]
@@ -108,10 +105,9 @@ def dense_output(
 def state_pieces(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float
 ) -> Pieces:
-    """Return the solution of a scene as polynomials, between time 0 and the rows of `found`.
+    """Return the solution as polynomials, a closed form too, between 0 and the rows of `found`.
 
-    The arguments are those of `dense_output`. There must be a row at a time other than 0. A closed
-    form is approximated like the results of any other method.
+    There must be a row at a time other than 0.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()})
     if tolerance == 1.0:
@@ -125,11 +121,10 @@ def state_pieces(
 def _first_edges(
     scene: Scene, found: Trajectory, ends: list[float], tolerance: float
 ) -> list[float]:
-    """Return the ends of the first intervals (s), among which are all changes of tables.
+    """Return the ends of the first intervals (s), among them all changes of tables.
 
-    A torque may act for so short a time that it hardly shows at the few nodes of an interval, but
-    it shows in the steps of a Taylor series. An interval with a short step is divided where its
-    steps end.
+    A short torque hardly shows at the few nodes of an interval, but in the steps of a Taylor
+    series. An interval with a short step is divided where its steps end.
     """
     tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
     inner = {time for time in (tape.breaks if tape else ()) if ends[0] < time < ends[-1]}
@@ -163,8 +158,8 @@ def _fitted(
 ) -> Pieces:
     """Return polynomials through the rows of a method, for intervals that are divided as needed.
 
-    `own` are tolerances of the rows. The second is used if the method can't meet the first. `rough`
-    is the largest error of the rows that is not smooth, relative to the largest |omega|.
+    `own` are tolerances of the rows, the second for when the first can't be met; `rough` is their
+    largest error that is not smooth, relative to the largest |omega|.
     """
     open_pieces = [_Open(low, high) for low, high in itertools.pairwise(edges)]
     done: dict[float, tuple[float, Array]] = {}

@@ -17,29 +17,25 @@ class Ensemble(BatchResult):
     Attributes
     ----------
     omega : ndarray, shape (n, 3)
-        Angular velocities about the body axes at the end, rad/s; NaN for a body without a result.
+        Angular velocities about the body axes, rad/s; NaN for a body without a result.
     status : ndarray of int8, shape (n,)
-        How the computation of each body ended: 0 `complete`, 2 `overflow`, 3 `refused` (the method
-        does not apply to the body), 4 `gave up` (work limit exceeded, or no correct digit of the
-        motion's phase left), 6 `sensitive`. A sensitive body has a result, but the rounding errors
-        that its motion amplifies exceed the requested tolerance.
+        How each computation ended: 0 `complete`, 2 `overflow`, 3 `refused` (the method does not
+        apply), 4 `gave up` (work limit exceeded, or no correct digit of the phase left), 6
+        `sensitive` (a result whose amplified rounding errors exceed the tolerance).
     attitude : ndarray, shape (n, 4), or None
-        Unit quaternions from body to space at the end, scalar first; None if they were not
+        Unit quaternions from body to space, scalar first. This and the following are None if not
         requested.
     estimates : ndarray, shape (n, 2), or None
-        The columns `error` and `growth`; None if they were not requested.
+        The columns `error` and `growth`.
     t_events, y_events : list of list of ndarray, or None
-        For each function of events a list of its events in the motion of each body: the times (s),
-        shape (k,), and omega (rad/s), with the attitude if it is computed, shape (k, 3) or (k, 7).
-        None in place of an array stands for a body without a result. Both are None if no events
-        were requested.
+        For each function and body the times (s) of its events, shape (k,), and the states, omega
+        (rad/s) with the attitude if computed, shape (k, 3) or (k, 7); None for a body without a
+        result.
     sensitivities : dict of ndarray, or None
-        For each requested name the derivatives of omega, and of the attitude's quaternion if it is
-        computed, at the end, shape (n, 3, m) or (n, 7, m), where m is the number of values of the
-        parameter. They are NaN for a body without a result.
+        For each name the derivatives of the final state, shape (n, 3, m) or (n, 7, m) for a
+        parameter of m values; NaN for a body without a result.
     refusals : dict of str, or None
-        The reasons for missing events and sensitivities, by the number of the body (from 0), for
-        bodies that have a final state.
+        The reasons for missing events and sensitivities of bodies with a final state, by number.
 
     Examples
     --------
@@ -61,28 +57,24 @@ class Ensemble(BatchResult):
 
     @property
     def error(self) -> Array | None:
-        """The estimated error of each body's result, shape (n,); None if it was not requested.
+        """The estimated errors, shape (n,); None if not requested, NaN where unknown.
 
-        The error of omega is relative to the largest component of omega from 0 to the end. With
-        attitudes it is the larger of this error and the error of the attitude's angle (rad). It is
-        NaN for a body without result, and for a method that does not estimate its error.
+        They are relative to the largest component of omega so far; with attitudes, the larger of
+        this and the angle (rad).
         """
         return None if self.estimates is None else self.estimates[:, 0]
 
     @property
     def growth(self) -> Array | None:
-        """The error amplification of each motion, shape (n,); None if it was not requested.
+        """The error amplifications, shape (n,); None if not requested, NaN where unknown.
 
-        It is the largest norm of the state-transition matrices from time 0 to any later time, or an
-        upper bound of the largest norm to the end. It is NaN where it is unknown.
+        Each is the largest norm of the state-transition matrices from 0 on, or a bound of that to
+        the end.
         """
         return None if self.estimates is None else self.estimates[:, 1]
 
     def estimates_of(self, piece: slice) -> Array:
-        """Return the estimates of the bodies in `piece` as a kernel writes them, or an empty array.
-
-        The shape is (2, m), where m is the number of bodies, or (2, 0).
-        """
+        """Return the estimates of m bodies as a kernel writes them, shape (2, m), or (2, 0)."""
         return _NO_ESTIMATES if self.estimates is None else self.estimates[piece].T
 
 
@@ -92,13 +84,9 @@ _NO_ESTIMATES = np.empty((2, 0), order="F")
 def place_for(
     out: "Ensemble | Array | None", n: int, with_attitude: bool, with_estimates: bool = False
 ) -> Ensemble:
-    """Return an Ensemble into whose arrays the results of n bodies can be written.
+    """Return an Ensemble for the results of n bodies: `out`, or one with the array `out`, or new.
 
-    If `out` is None, the arrays are new. If `out` is the Ensemble of an earlier call, it is
-    returned. If `out` is an array of shape (n, 3), it becomes the array of omega, and the other
-    arrays are new. `with_attitude` states whether the results include attitudes, `with_estimates`
-    whether they include estimates of error and error amplification. Raise InputError if an array of
-    `out` has the wrong shape or type.
+    Raise InputError if an array of `out` has the wrong shape or type.
     """
     shape = (n, 3)
     if out is None or isinstance(out, np.ndarray):

@@ -1,7 +1,7 @@
 """Polynomials through the values of an event's function, and the errors of these values.
 
-A function is taken for 0 on an interval if it is 0 to within its error there, and reaches this
-value as one with a kink or a jump does. A function that decays has no such interval.
+A function counts as 0 on an interval if it is 0 to within its error there, and reaches 0 by a kink
+or a jump; a decay has no such interval.
 """
 
 import math
@@ -49,7 +49,7 @@ class Solution:
     pieces : Pieces
         The polynomials of omega and attitude.
     sol : DenseOutput
-        The dense output, whose polynomials may be the same.
+        The dense output, perhaps of the same polynomials.
     tolerance : float
         The tolerance of omega; 0 for a method with a fixed step.
     """
@@ -73,10 +73,7 @@ class Solution:
         return self.values(g, times, _normalised(self.sol.states(times)))
 
     def noise(self, g: EventFunction, times: Array) -> Array:
-        """Return, for each time, the error of an event's function due to errors of its arguments.
-
-        These are the rounding error of time and the error of omega and attitude.
-        """
+        """Return the errors of a function by rounding of time and errors of omega and attitude."""
         states = self.states(times)
         rates = self.sol.rates(times, states) if g.event.needs_rates else None
         value = g(times, states, rates)
@@ -202,12 +199,12 @@ class ZeroIntervals:
     Attributes
     ----------
     low, high : ndarray, shape (n,)
-        The ends of the intervals (s), in ascending order.
+        The ends of the intervals (s), ascending.
     noise : ndarray, shape (n,)
         The magnitude below which a value beside them can't be distinguished from 0.
     before, after : ndarray, shape (n,)
-        The signs of the function beside the intervals; 0 where it approaches 0 slowly, as if it
-        decayed, and at the ends of the solution.
+        The signs beside the intervals; 0 where the function decays, and at the ends of the
+        solution.
     """
 
     low: Array
@@ -219,8 +216,8 @@ class ZeroIntervals:
     def roots(self, counts_touches: bool) -> Roots:
         """Return the roots that stand for the intervals.
 
-        A root is where the integration from time 0 reaches the interval, with the change to 0, or
-        no change at time 0. If touches do not count, only changes between the two sides are roots.
+        A root is where the integration from 0 reaches the interval. If touches do not count, only
+        changes between the two sides are roots.
         """
         is_before = self.high < 0.0
         is_first = (self.low <= 0.0) & ~is_before
@@ -292,8 +289,8 @@ def _refined(
 ) -> Array:
     """Return the times, between two lists of times, from which on a function is below a level.
 
-    The polynomial beside a kink of a function may extend beyond the kink. Kinks of the solution are
-    at the ends of its polynomials.
+    The polynomial beside a kink may extend beyond it. Kinks of the solution are at the ends of its
+    polynomials.
     """
     inner, outer = ends.copy(), others.copy()
     k = np.flatnonzero(~np.isin(inner, solution.pieces.edges))

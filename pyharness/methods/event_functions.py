@@ -29,12 +29,12 @@ class Event:
     name : str
         The call that made the event.
     function : callable
-        The function of time, omega, attitude and derivative of omega whose roots are the events.
+        The function of time, omega, attitude and derivative of omega.
     terminal : bool or int
         Whether the first event ends the integration; a number n says that the n-th does.
     direction : {-1, 0, 1}
-        The sign change that counts as an event, in the direction of integration: 1 from negative to
-        positive, -1 from positive to negative, 0 for any.
+        The sign change that counts, in the direction of integration: 1 to positive, -1 to negative,
+        0 for any.
     needs_attitude, needs_rates : bool
         Whether the function uses the attitude, and the derivative of omega.
     counts_touches : bool
@@ -57,13 +57,13 @@ class EventFunction:
     Attributes
     ----------
     name : str
-        The event in messages, for example "events: event 1".
+        The event in messages, as "events: event 1".
     event : Event
-        The function with its attributes. The function is called with arrays.
+        The function with its attributes.
     limit : float
-        The number of events that end the integration; infinite if none does.
+        The number of events that end the integration, or infinite.
     is_vectorized : bool or None
-        Whether the function accepts arrays of times; None if it is not yet known.
+        Whether the function accepts arrays of times; None if not yet known.
     """
 
     name: str
@@ -72,9 +72,9 @@ class EventFunction:
     is_vectorized: bool | None = None
 
     def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:
-        """Return the values at `times` (s) and `states`, one row for each time.
+        """Return the values at `times` (s) and `states`, one row each.
 
-        Raise InputError if a value is no finite number.
+        Raise InputError if a value is not finite.
         """
         columns = (states[:, :3].T, states[:, 3:].T, None if rates is None else rates[:, :3].T)
         found = self._of_arrays(times, *columns) if self.is_vectorized is not False else None
@@ -131,7 +131,7 @@ class EventFunction:
 def event_functions(events: object, attitude: bool) -> list[EventFunction]:
     """Return a user's events, one function or a list, as checked functions.
 
-    `attitude` says whether the attitude was requested. Raise InputError for anything else.
+    Raise InputError for anything else.
     """
     if callable(events) or isinstance(events, Event):
         events = [events]

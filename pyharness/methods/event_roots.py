@@ -1,10 +1,9 @@
 """Isolation of all real roots of polynomials on intervals, for many intervals at once.
 
-A polynomial is given by its Chebyshev coefficients c on an interval. Because no Chebyshev
-polynomial exceeds 1 there, |c[0]| > |c[1]| + |c[2]| + ... excludes a root. The same bound for the
-derivative leaves at most one root, and for the second derivative at most two, with one extremum
-between them. An interval with none of these bounds is divided in two. No root is therefore missed,
-as it may be where a function is only sampled (Trefethen 2013, Approximation Theory and
+No Chebyshev polynomial exceeds 1 on the interval, so that coefficients with |c[0]| > |c[1]| +
+|c[2]| + ... exclude a root. The same bound for the derivative leaves at most one root, and for the
+second derivative at most two, with one extremum between them. Other intervals are divided in two.
+No root is therefore missed, as it may be by sampling (Trefethen 2013, Approximation Theory and
 Approximation Practice, chapters 3 and 18).
 """
 
@@ -53,11 +52,11 @@ class Fits:
     low, high : ndarray, shape (p,)
         The ends of the intervals (s).
     first, last : ndarray, shape (p,)
-        The values of the function at these ends, whose signs are equal for adjacent intervals.
+        The function there, with equal signs for adjacent intervals.
     coefficients : ndarray, shape (p, NODES)
         The Chebyshev coefficients.
     noise : ndarray, shape (p,)
-        The magnitude below which a value of the function can't be distinguished from 0.
+        The magnitude below which a value can't be distinguished from 0.
     """
 
     low: Array
@@ -80,21 +79,18 @@ class Fits:
 
 @dataclass(frozen=True, eq=False)
 class Roots:
-    """Candidates for roots: their times, the sign changes there, and the magnitude of noise.
+    """Candidates for roots.
 
     Attributes
     ----------
     time : ndarray, shape (n,)
         The times (s).
     change : ndarray of int, shape (n,)
-        The sign change in the order of time: 1 from negative to positive, -1 from positive to
-        negative, 0 for a value near 0 without a sign change.
+        The sign change in the order of time: 1 to positive, -1 to negative, 0 for a touch.
     slope, curvature : ndarray, shape (n,)
-        The first (1/s) and second derivative (1/s2) of the polynomial at the root.
-    noise : ndarray, shape (n,)
-        The magnitude below which a value of the function can't be distinguished from 0.
-    near : ndarray, shape (n,)
-        The magnitude below which a value of the polynomial can't be distinguished from 0.
+        The first (1/s) and second derivative (1/s2) of the polynomial.
+    noise, near : ndarray, shape (n,)
+        The magnitudes below which the function and the polynomial can't be distinguished from 0.
     lasting : ndarray, shape (n,)
         How long (s) the function remains 0, negative before time 0; 0 for a root.
     """
@@ -137,10 +133,9 @@ def may_vanish(fits: Fits) -> Array:
 
 
 def isolated(fits: Fits) -> Roots:
-    """Return all roots of polynomials, and the extrema whose values are near 0.
+    """Return all roots of polynomials, and the extrema that may be 0 to within the fit.
 
-    A value of an extremum is near 0 if the fit leaves open whether it is. Roots that are not
-    distinguished by the fit are all returned; the caller combines them.
+    Roots that the fit does not distinguish are all returned, for the caller to combine.
     """
     near = np.maximum(fits.noise, FIT_ERROR * fits.sizes)
     smallest = np.maximum(fits.noise / 16.0, 1e-15 * fits.sizes)
@@ -206,10 +201,7 @@ def _at(fits: Fits, x: Array, change: Index, number: Index, near: Array) -> Root
 
 
 def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
-    """Return one root of each polynomial between points where its sign changes to `sign`.
-
-    The method is Newton's, with a bisection where a step would leave the bracket.
-    """
+    """Return one root of each polynomial where its sign changes to `sign`."""
     slopes = c @ _DERIVATIVE.T
     x = 0.5 * (low + high)
     for _ in range(80):

@@ -1,11 +1,10 @@
 """Events: the times at which functions of time, omega and attitude are 0.
 
 The solution is a polynomial on each of many intervals. A function of it is approximated by
-polynomials on the same intervals, which are divided until the approximation has converged, and all
-roots of these polynomials are isolated. Roots of a smooth function are therefore found however near
-to each other they are, and so are double roots. Where a function is not smooth, the intervals
-become tiny, and sign changes between their nodes are found. A change that is undone before the next
-node of an interval is not seen.
+polynomials on the same intervals, which are divided until they have converged, and all their roots
+are isolated. Close and double roots of a smooth function are therefore found. Where a function is
+not smooth, the intervals become tiny, and sign changes between nodes are found, but not one that is
+undone before the next node.
 """
 
 import math
@@ -36,8 +35,7 @@ _WIDER = 16.0  # factor on the half width of an interval, until the sign changes
 def event_roots(g: EventFunction, solution: Solution) -> Roots:
     """Return all events of a function between the ends of the solution, in ascending order.
 
-    The sign changes of the result are in the order of time, and not in that of integration. A root
-    at an end has the sign change to, or from, the values beside it.
+    Sign changes are in the order of time; those at an end are to, or from, the values beside it.
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         fits, rough = fitted(g, solution)
@@ -192,7 +190,7 @@ def _have_any_sign(g: EventFunction, solution: Solution, times: Array) -> Index:
 def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:
     """Return which adjacent roots are a pair only because of the errors of the polynomials.
 
-    The function is 0, to within its noise, at the extremum between them.
+    The function is 0, to within noise, at the extremum between.
     """
     found: Index = np.zeros(len(noise), dtype=bool)
     gap = np.diff(roots.time)
@@ -234,11 +232,9 @@ def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) ->
 
 
 def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Array:
-    """Return the times of the events on one side of 0, in the order away from 0.
+    """Return the times of the events after (1) or before (-1) 0, in the order away from 0.
 
-    `side` is 1 for the times after 0, and -1 for those before 0. A root at time 0 has the sign
-    change from 0 to the values that follow, and a root at the end of the solution the sign change
-    to 0, as in SciPy.
+    As in SciPy, a root at 0 has the sign change from 0, and one at the end that to 0.
     """
     end = solution.pieces.edges[-1 if side > 0 else 0]
     if side * end <= 0.0:
@@ -261,7 +257,7 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
 def _repeated(
     g: EventFunction, solution: Solution, times: Array, side: int, period: float
 ) -> Array:
-    """Return the times of all events on one side of 0, from those where there are polynomials."""
+    """Return the times of all events on one side of 0, also beyond the polynomials."""
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min
@@ -280,11 +276,11 @@ class FoundEvents:
     Attributes
     ----------
     times : list of ndarray
-        The times (s) of the events of each function, in ascending order.
+        The times (s) of the events of each function, ascending.
     states : list of ndarray
-        Omega (rad/s), and the attitude if it was requested, at these times, one row for each event.
+        Omega (rad/s), and the attitude if requested, one row for each event.
     first, last : float
-        The times (s) of the terminal events before and after 0; infinite without such an event.
+        The times (s) of the terminal events before and after 0, or infinite.
     """
 
     times: list[Array]
@@ -304,8 +300,7 @@ def found_events(
 ) -> FoundEvents:
     """Return the events of several functions, without those beyond a terminal event.
 
-    With a period (s), the polynomials of the solution may end before the solution. Events beyond
-    them are repetitions.
+    With a period (s), events beyond the polynomials are repetitions.
     """
     roots = [event_roots(g, solution) for g in functions]
     sides: dict[int, list[Array]] = {}

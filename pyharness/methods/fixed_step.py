@@ -1,6 +1,6 @@
-"""The single-step methods of section III.2 of the thesis, with the scene's step size.
+"""The improved Euler method, the Taylor series of three terms, and classical Runge-Kutta.
 
-They are the improved Euler method, the Taylor series of three terms, and classical Runge-Kutta.
+Section III.2 of the thesis has these single-step methods.
 """
 
 from collections.abc import Sequence
@@ -17,11 +17,9 @@ from pyharness.model.trajectory import Trajectory
 
 
 def fixed_step(name: str) -> Integrator:
-    """Return the function that solves a scene by the method `name`, with the scene's step size.
+    """Return the solver by ``improved-euler``, ``taylor-3`` or ``rk4``, without error control.
 
-    `name` is ``improved-euler``, ``taylor-3`` or ``rk4``. The methods have no error control, so
-    that the function ignores its argument `tolerance`. A step that would pass a requested time is
-    shortened, so that it ends at the requested time.
+    A step that would pass a requested time is shortened to end there.
     """
     number = getattr(Methods, name.upper().replace("-", "_"))
 

@@ -16,17 +16,14 @@ _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 
 @np.errstate(over="ignore", invalid="ignore")
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
-    """Return the attitudes at the times of a table of omega, as quaternions, shape (n, 4).
+    """Return the attitudes at the times (s) of a table of omega (rad/s), shape (n, 4).
 
-    `omega` has shape (n, 3), rad/s, and `time` has shape (n,), s, in order. `scene` supplies omega
-    and the attitude at time 0. Quaternions are from body to space, scalar first.
+    `scene` supplies omega and attitude at time 0. Quaternions are from body to space, scalar first.
 
-    From each row to the next the attitude is integrated by one commutator-free step of order 4
-    (Celledoni, Marthinsen and Owren 2003). The step multiplies the attitude by two exponentials.
-    The exponent of each is the step size times a weighted sum of omega at the two Gauss points of
-    the step. Omega at a Gauss point is interpolated by a cubic polynomial through the two rows and
-    their derivatives, which Euler's equations supply. After a rotation that overflows, all
-    attitudes are NaN.
+    Each row is one commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003): two
+    exponentials of weighted sums of omega at the Gauss points, from a cubic polynomial through two
+    rows and their derivatives by Euler's equations. After a rotation that overflows, all attitudes
+    are NaN.
     """
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])
@@ -50,11 +47,9 @@ def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
 
 
 def _between(rows: Array, slopes: Array, span: Array, part: float) -> Array:
-    """Return omega at the fraction `part` of each step, by cubic Hermite interpolation.
+    """Return omega (rad/s), (n, 3), at the fraction `part` of n steps, by cubic Hermite.
 
-    `rows` is omega (rad/s) at the n + 1 ends of n steps, shape (n + 1, 3). `slopes` contains the
-    derivatives of these omegas (rad/s2), and `span` the lengths of the steps (s), shape (n, 1). The
-    result has shape (n, 3), rad/s.
+    `slopes` (rad/s2) are the derivatives of `rows`, (n + 1, 3), and `span`, (n, 1), the steps (s).
     """
     rest = 1.0 - part
     ends = (
@@ -65,11 +60,7 @@ def _between(rows: Array, slopes: Array, span: Array, part: float) -> Array:
 
 
 def _turn(angle: Array) -> list[Quaternion]:
-    """Return the quaternions, scalar first, of n rotation vectors.
-
-    `angle` contains the vectors, shape (n, 3). The length of a vector is the angle of rotation
-    (rad), and its direction is the axis.
-    """
+    """Return the quaternions, scalar first, of n rotation vectors (rad), shape (n, 3)."""
     half = 0.5 * np.linalg.norm(angle, axis=1)
     parts = np.column_stack([np.cos(half), 0.5 * np.sinc(half / np.pi)[:, None] * angle])
     return [(w, x, y, z) for w, x, y, z in parts.tolist()]

@@ -27,16 +27,12 @@ _NEAR_THE_END = 1e300
 
 
 def gauss(stages: int) -> Integrator:
-    """Return a solver by Gauss collocation that halves its step size until two solutions agree.
-
-    `stages` is the number of stages, 1 to 8. The order of the method is twice this number. Two
-    solutions agree if the estimated error meets the requested tolerance.
+    """Return a solver by Gauss collocation with 1 to 8 `stages`, of twice this order.
 
     Let d be the largest difference in omega between two successive solutions, and r the quotient of
-    their step sizes, at most 2. The estimated error of the solution with the shorter steps is
-    2 d / (r**p - 1), where the factor 2 is for safety. The exponent p is the order, but at most 8.
-    Methods of higher order take longer steps, with which the error does not yet fall at the full
-    order.
+    their step sizes, at most 2. The estimated error of the finer is 2 d / (r**p - 1), where 2 is
+    for safety, and p the order, but at most 8: methods of higher order take longer steps, with
+    which the error does not yet fall at the full order.
     """
 
     def solve(
@@ -130,14 +126,11 @@ class _Solution:
     def blows_up(self, coarser: "_Solution", start: float) -> bool:
         """Return whether this solution and a coarser one end because omega grows without bound.
 
-        `coarser` is the solution with longer steps. Both solutions must end before the last
-        requested time, at nearly the same time. Let m be the largest |omega| (rad/s) at the end of
-        a solution. One of two conditions must also be satisfied. The first is that m exceeds 1e300
-        in both solutions. The second is that m of this solution exceeds 1.5 times m of the coarser
-        solution, and that this product exceeds 1000 times `start` and 1000 times every |omega| of
-        this solution at a requested time. `start` is the largest initial |omega| (rad/s), or the
-        omega that torque alone would cause if that is larger. It is needed because the solution may
-        have reached no requested time.
+        Both must end before the last time, at nearly the same time. With m the largest |omega|
+        (rad/s) at the end, either m exceeds 1e300 in both, or the finer m exceeds 1.5 coarser m,
+        and this product 1000 times `start` and every |omega| at a requested time. `start` is the
+        largest initial |omega| (rad/s), or that by torque alone; perhaps no requested time is
+        reached.
         """
         if COMPLETE in (self.status, coarser.status):
             return False
@@ -152,11 +145,9 @@ class _Solution:
 class _Kernel(NamedTuple):
     """The function that solves a scene with equal steps, and quantities that determine its steps.
 
-    `solution` takes the largest step size (s), and `counts` returns the numbers of equal steps that
-    it takes between the requested times.
-    `rate` is the largest rate (rad/s) of the phases of the motion and of the torque. `pushed` is
-    the omega (rad/s) that the torque alone would cause until the end. `most` is the work limit of
-    all solutions, a number of right-hand sides.
+    `solution` takes the largest step size (s), and `counts` returns its numbers of steps. `rate` is
+    the largest rate (rad/s) of the phases of motion and torque, `pushed` the omega (rad/s) by the
+    torque alone, and `most` the work limit, in right-hand sides.
     """
 
     solution: "Callable[[float], _Solution]"
@@ -184,10 +175,9 @@ def _kernel(scene: Scene, stages: int, times: Sequence[float], effort: float) ->
 
 
 def _step_counts(lengths: Array, step: float) -> Array:
-    """Return the number of equal steps that the kernel takes in each interval between times.
+    """Return the number of equal steps in each interval of `lengths` (s).
 
-    `lengths` are the lengths of the intervals (s). No step is longer than `step` (s), except for a
-    relative excess of 1e-6.
+    A step exceeds `step` (s) by at most a relative 1e-6.
     """
     with np.errstate(over="ignore", divide="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
@@ -203,9 +193,7 @@ def _lengths(times: Sequence[float]) -> Array:
 def _first_step(rate: float, shortest: float) -> float:
     """Return a first step size (s), in which each phase grows by at most about half a radian.
 
-    The phases grow with at most `rate` (rad/s): the phase of the motion, estimated from the initial
-    omega, and the phase of each torque wave. `shortest` is the shortest interval between requested
-    times (s). This interval is a multiple of the step size, so that its number of steps exactly
-    doubles when the step size is halved.
+    The `shortest` interval (s) is a multiple of it, so that its number of steps exactly doubles
+    when it is halved.
     """
     return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))

@@ -1,4 +1,7 @@
-"""The status of the last call of a prepared solver, and the error estimates of its result."""
+"""The status of the last call of a prepared solver, and the error estimates of its result.
+
+Each report is on this thread's last call; a call that raised an error or was interrupted is none.
+"""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -20,12 +23,7 @@ from pyharness.model.values import Number, Numbers, Triple, three
 
 
 class LastCall:
-    """The base class of all prepared solvers, which reports how the last call in a thread ended.
-
-    A prepared solver, which the function `prepare` returns, solves one scene by one method, for
-    many initial omegas. The reports are status, error estimate, error amplification and number of
-    steps.
-    """
+    """The base class of all prepared solvers, which report how the last call in a thread ended."""
 
     plan: Plan
     _given: tuple[float, str, float]  # requested tolerance, method, and factor on the work limit
@@ -37,35 +35,25 @@ class LastCall:
         def _ending(self) -> tuple[int, int, float, float, Triple, float] | None: ...
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and the arguments from which `copy` and `pickle` recreate the solver."""
+        """Return the class and the arguments with which `copy` and `pickle` recreate the solver."""
         return type(self), (self.plan, *self._given)
 
     def __repr__(self) -> str:
-        """Return a text that names the solver's class, its scene and its method."""
+        """Return the solver's class, scene and method."""
         return f"<{type(self).__name__} of '{self.plan.scene.name}' by {self.plan.method}>"
 
     @property
     def _scene_of_calls(self) -> Scene:
-        """The scene about the axes to which the arguments and results of calls refer."""
+        """The scene about the axes of the arguments and results."""
         return self.plan.scene
 
     @property
     def ctypes(self) -> CompiledCall:
-        """Return the solver as a function for compiled code, such as that of numba.
-
-        The attribute `capsule` is the solver for code in C, with the header in the folder
-        `pyharness.get_include()`.
-        """
+        """Return the solver for compiled code, as of numba; `capsule` is for C."""
         return compiled_call(self)
 
     def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
-        """Return the trajectory from `omega0` (rad/s) at `times` (s), as `solve` computes it.
-
-        `omega0` is the angular velocity at time 0. The times must be strictly monotonic; they may
-        be positive and negative. A solver of the attitude starts from the attitude of the scene, or
-        from (1, 0, 0, 0) if the scene has none. Raise InputError if `omega0` is not three finite
-        numbers, or if the times are not strictly monotonic.
-        """
+        """Return the trajectory from `omega0` (rad/s) at `times` (s), as `solve` computes it."""
         from pyharness.methods.registry import METHODS
         from pyharness.methods.solve import solve
 
@@ -78,74 +66,49 @@ class LastCall:
 
     @property
     def status(self) -> str:
-        """Return how this thread's last call ended, as text.
+        """Return how the last call ended; ``complete`` before the first.
 
-        The texts are ``complete``, ``sensitive``, ``overflow``, ``refused`` and ``gave up``. The
-        text ``gave up`` means that the work limit was exceeded, or that no correct digit of the
-        motion's phase was left. The text ``refused`` means that the method does not apply to the
-        arguments of the call. A ``sensitive`` call has a result, but rounding errors amplified by
-        the motion exceed the solver's tolerance; `digits` is its number of correct digits. For a
-        closed form and for Gauss collocation, whether a call was sensitive is computed when the
-        status is read. This takes microseconds for a closed form, and milliseconds for Gauss
-        collocation. Before the first call the status is ``complete``. A call that raised an
-        InputError or was interrupted does not count.
+        ``gave up`` means that the work limit was exceeded, or no correct digit of the phase was
+        left, and ``refused`` that the method does not apply. A ``sensitive`` call has a result,
+        with `digits` correct digits, but amplified rounding errors exceed the tolerance; to find
+        this takes microseconds for a closed form, and milliseconds for Gauss collocation.
         """
         return self._found()[0]
 
     @property
     def error(self) -> float | None:
-        """Return the estimated error of this thread's last result.
+        """Return the estimated error of the last result, or None.
 
-        The error of omega is relative to the largest component of omega from 0 to the end. If the
-        solver computes the attitude too, the estimate is the larger of two errors: that of omega
-        and that of the attitude's angle (rad). The estimate is None if the method does not estimate
-        its error, or if the call had no result.
+        It is relative to the largest component of omega so far; with attitude, the larger of this
+        and the angle (rad).
         """
         return self._found()[1]
 
     @property
     def growth(self) -> float | None:
-        """Return the error amplification of the motion of this thread's last call, at least 1.
+        """Return the error amplification of the last motion, at least 1, or None if unknown.
 
-        The error amplification is the largest norm of the state-transition matrices, the
-        derivatives of omega at the end with respect to omega at any earlier time. The result is
-        None if the method does not determine it, or if the call had no result.
+        It is the largest norm of the derivatives of the last omega with respect to an earlier one.
         """
         return self._found()[2]
 
     @property
     def digits(self) -> float | None:
-        """Return the number of correct decimal digits of this thread's last result.
-
-        The number follows from the estimated error, and is None if the error is unknown.
-        """
+        """Return the number of correct decimal digits by the estimated error, or None."""
         return digits_left(self.error)
 
     @property
     def steps(self) -> int:
-        """Return the number of steps of this thread's last call.
-
-        For Gauss collocation the result is the number of evaluations of the right-hand side
-        instead. For a closed form, and before the first call, it is 0.
-        """
+        """Return the number of steps, or of right-hand sides for Gauss collocation; else 0."""
         return abs(self._counted())
 
     def _counted(self) -> int:
-        """Return the number of steps of the last call, negative if the kernel chose `quick`.
-
-        The method `quick` is a Runge-Kutta method for few digits. The kernel chooses between
-        `quick` and the Taylor series only if the solver's attribute `plan` names the method `quick
-        or taylor`.
-        """
+        """Return the number of steps, negative if the kernel chose `quick` instead of `taylor`."""
         ending = self._ending
         return 0 if ending is None else ending[1]
 
     def _found(self) -> tuple[str, float | None, float | None]:
-        """Return the status of this thread's last call, its estimated error and its `growth`.
-
-        `growth` is the error amplification of the motion. The error and `growth` are None if they
-        are unknown.
-        """
+        """Return status, estimated error and `growth`; None if unknown."""
         ending = self._ending
         if ending is None:
             return "complete", None, None

@@ -1,7 +1,4 @@
-"""Linearisation of Euler's equations along a solution: state-transition matrices and their norms.
-
-Euler's equations are equations 13-15 of the thesis.
-"""
+"""Linearisation of Euler's equations (13-15 of the thesis) along a solution."""
 
 import numpy as np
 
@@ -14,9 +11,7 @@ _HUGE = 1e100  # limit of a matrix element, which keeps products finite
 def propagators(scene: Scene, times: Array, omega: Array) -> Array:
     """Return the state-transition matrix of omega from each time to the last, shape (n, 3, 3).
 
-    The matrix of a time is the derivative of omega at the last time with respect to omega at that
-    time. `omega` (rad/s, shape (n, 3)) is the solution of the scene at `times` (s, shape (n,)). The
-    times must be so close that omega changes little from each time to the next.
+    `omega` (rad/s, shape (n, 3)) must change little from each of the `times` (s) to the next.
     """
     return transitions(times, jacobians(scene, 0.5 * (omega[1:] + omega[:-1])))
 
@@ -24,8 +19,7 @@ def propagators(scene: Scene, times: Array, omega: Array) -> Array:
 def transitions(times: Array, slopes: Array) -> Array:
     """Return the state-transition matrix from each time to the last, shape (n, m, m).
 
-    `slopes`, shape (n - 1, m, m), are the Jacobian matrices (1/s) of the right-hand side between
-    each of the n `times` (s) and the next, in the middle of the interval.
+    `slopes`, shape (n - 1, m, m), are the Jacobian matrices (1/s) in the middle of the intervals.
     """
     # The Jacobian hardly changes from one time to the next. Therefore the exponential of the
     # Jacobian times the interval is the state-transition matrix over this interval.
@@ -39,19 +33,14 @@ def transitions(times: Array, slopes: Array) -> Array:
 
 
 def growth(propagators: Array) -> float:
-    """Return the error amplification, which is the largest row-sum norm of n matrices, at least 1.
-
-    `propagators` contains the matrices, shape (n, m, m): the state-transition matrices of omega, or
-    of omega and attitude, from n times to the last one.
-    """
+    """Return the error amplification: the largest row-sum norm of the matrices, at least 1."""
     return float(max(1.0, np.abs(propagators).sum(axis=2).max()))
 
 
 def exponentials(small: Array) -> Array:
-    """Return the exponentials of matrices of norm below 1, by the Taylor polynomial of degree 8.
+    """Return the exponentials of matrices, (n, m, m), of norm below 1, by Taylor's polynomial.
 
-    `small` contains the matrices, shape (n, m, m), and the result has the same shape. The norm of
-    the truncation error of an exponential is below 3.1e-6.
+    Its degree is 8, and the norm of the truncation error below 3.1e-6.
     """
     one = np.eye(small.shape[-1])
     total = np.broadcast_to(one, small.shape)
@@ -61,11 +50,7 @@ def exponentials(small: Array) -> Array:
 
 
 def jacobians(scene: Scene, omega: Array) -> Array:
-    """Return the Jacobian matrix (1/s) of Euler's equations at each omega, shape (n, 3, 3).
-
-    `omega` has shape (n, 3), rad/s. A Jacobian matrix contains the derivatives of the right-hand
-    sides of equations 13-15 of the thesis with respect to omega. The scene supplies A, B and C.
-    """
+    """Return the Jacobian matrix (1/s) of Euler's equations at each omega, shape (n, 3, 3)."""
     a, b, c = scene.euler_coefficients
     x, y, z = omega.T
     zero = np.zeros(len(omega))

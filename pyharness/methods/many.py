@@ -1,7 +1,7 @@
 """Solution of many bodies in one call, in parallel in the kernel and in several threads.
 
-The result of a body does not depend on the other bodies, on their order or on the number of
-threads. It is bit-for-bit identical in all these cases.
+The result of a body is bit-for-bit the same whatever the other bodies, their order and the number
+of threads.
 """
 
 from collections.abc import Iterable, Sequence
@@ -90,71 +90,63 @@ def solve_many(
     Parameters
     ----------
     scene : Scene, or sequence of Scene
-        Either one scene, which supplies every quantity for which no array is given; or a sequence
-        of all scenes to solve, together with no arrays.
+        One scene, which supplies each quantity without an array; or all scenes, without arrays.
     t_end : float, or array of shape (n,)
-        Final time of each scene, s; positive, negative or 0.
+        Final times, s; positive, negative or 0.
     omega0 : array, shape (n, 3) or (3,)
-        Initial angular velocities, rad/s. An array of one row is shared by all bodies.
+        Initial angular velocities, rad/s. Here and below all bodies share an array of one row.
     attitude0 : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
-        Quaternions at time 0, from body to space, scalar first, of any norm; or SciPy rotations.
-        The default is the scene's attitude. If there is no initial attitude, no attitudes are
-        returned.
+        Quaternions at time 0, from body to space, scalar first, of any norm. The default is that of
+        the scene; without one, no attitudes are returned.
     moments, coefficients : array, shape (n, 3) or (3,)
         Principal moments (kg m2), or Euler's coefficients A, B, C; not both.
     inertia : array, shape (n, 3, 3) or (3, 3)
-        Full inertia matrices (kg m2), in place of moments. Vectors and attitudes are then about the
-        axes of the matrix. Computing the principal axes takes some tenths of a millisecond per
-        body.
+        Inertia matrices (kg m2), in place of moments. Vectors and attitudes are then about the axes
+        of the matrix.
     torque_constant, torque_rate : array, shape (n, 3) or (3,)
-        Constant torques (N m), and rates of torques that are linear in time (N m/s). For bodies
-        given by coefficients both must be divided by the moments (1/s2, 1/s3).
+        Constant torques (N m), and rates of torques that are linear in time (N m/s); for bodies
+        given by coefficients, divided by the moments (1/s2, 1/s3).
     sines, cosines : array, shape (n, k, 4) or (k, 4)
-        The k sine and cosine terms of the torques. A term is three components of the amplitude
-        (units as in `torque_constant`), and the frequency (rad/s).
+        The k waves of the torques: three components of the amplitude (units as in
+        `torque_constant`) and the frequency (rad/s).
     method : str
-        A name in `pyharness.methods.solver.PREPARED`. `auto` uses the closed form for each body
-        without torque and for each sphere, and the Taylor series for any other body.
+        A name in `pyharness.methods.solver.PREPARED`. `auto` uses the closed form for bodies
+        without torque and spheres, and the Taylor series otherwise.
     tolerance : float
-        The largest allowed error of any component of omega at the end, relative to the largest
-        |omega| from 0 to the end, as in `prepare`. With attitudes it is also the largest allowed
-        error of the attitude's angle (rad). The default depends on the method.
+        Largest allowed error of a component of omega at the end, relative to the largest |omega|
+        from 0 to the end, and of the attitude's angle (rad). The default depends on the method.
     step : float, optional
         Step size of Gauss collocation and of the methods with a fixed step, s. The default is the
-        scene's step size.
+        scene's.
     effort : float
-        Factor on the work limit of a body. A body that exceeds the limit has the status `gave up`.
+        Factor on the work limit of a body. A body that exceeds it has the status `gave up`.
     estimates : bool
-        Whether to return the estimated error of each result, and the error amplification of each
-        motion.
+        Whether to return estimated errors and error amplifications.
     events : callable, Event, or list of these
         Functions whose roots from time 0 to each final time are found, as in `solve`; none may be
-        terminal. They need the method `auto`, `taylor` or `closed-form`. The events of a body take
-        some milliseconds, because its motion is solved once more by the function `solve`.
+        terminal. They need the method `auto`, `taylor` or `closed-form`, and some milliseconds a
+        body, whose motion `solve` computes once more.
     sensitivities : iterable of str
-        Names of parameters, as in `solve`, for the derivatives of the final states with respect to
-        each. They take some tenths of a millisecond for a body, and need the same methods.
+        Names of parameters, as in `solve`, for derivatives of the final states. They need the same
+        methods.
     threads : int
         Number of threads. The kernel releases the interpreter's lock (GIL).
     out : Ensemble, or array of shape (n, 3), optional
-        The object into which the results are written: either the Ensemble of an earlier call with
-        as many bodies, or an array for omega.
+        The result of an earlier call with as many bodies, or an array for omega, to be overwritten.
     progress : bool
         Whether to show a progress bar, in a terminal or in a notebook.
 
     Returns
     -------
     Ensemble
-        The final states. A body that can't be solved has NaN and a status that states the reason,
-        for example if a number is not finite or a moment is not above 0. It does not affect any
-        other body.
+        The final states. A body that can't be solved has NaN and a status with the reason.
 
     Raises
     ------
     InputError
-        If the arrays differ in their numbers of rows, if the method is unknown or can't solve the
-        bodies, if the tolerance or the effort is out of range, or if events or sensitivities are
-        requested that can't be computed for any body.
+        If the arrays differ in their numbers of rows, the method is unknown or can't solve the
+        bodies, the tolerance or effort is out of range, or events or sensitivities can't be
+        computed for any body.
     NotBuiltError
         If the extension is not built.
 
@@ -197,7 +189,7 @@ def _solved(
     out: "Ensemble | Array | None", step: Number | None, *, method: str, tolerance: Number | None,
     effort: float, estimates: bool, threads: int,
 ) -> Ensemble:  # fmt: skip
-    """Return the final states of many scenes; `arrays` has the arrays of `solve_many` by name."""
+    """Return the final states; `arrays` has the arrays of `solve_many` by name."""
     own = {name: value for name, value in arrays.items() if value is not None}
     kind = only_one({name: own[name] for name in _BODY if name in own})
     ready: dict[str, Any] = {}
@@ -272,14 +264,11 @@ def _solve_groups(
     scenes: list[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
     **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Solve scenes that one kernel call can't solve together, and return all final states.
+    """Solve scenes that need several kernel calls, and return all final states in their order.
 
-    Scenes with moments or coefficients are solved in one call, and scenes with a full inertia
-    matrix in another one. Each scene with a torque about the axes of space, or one that depends on
-    the state, is solved alone. `t_end` (s) is one time, or one time for each scene. `step` is the
-    step size (s) of Gauss collocation and of the methods with a fixed step. The keyword arguments
-    `settings` are further arguments of `solve_many`. The final states are in the order of `scenes`.
-    They are written into `out` if it is not None.
+    Scenes with moments or coefficients share one call, scenes with an inertia matrix another. A
+    torque about the axes of space, or that depends on the state, has a call of its own. `settings`
+    are further arguments of `solve_many`.
     """
     check_alike(scenes)
     if scenes[0].attitude is None and any(each.torque.needs_attitude for each in scenes):
@@ -310,12 +299,9 @@ def _solve_groups(
 class _Bodies:
     """The checked arguments of the kernel that solves n bodies in one call.
 
-    `ready` contains the rows of a scene, as `rows_of_scene` returns them, and may be empty. `own`
-    contains further arrays by name, which replace those of the scene, and the final times `t_end`
-    (s). An array of one row is shared by all bodies. `step` (s) is the step size of the methods
-    with a fixed step, and `code` the integer that selects the method in the kernel. `tolerance` is
-    the largest allowed error, relative to the largest |omega|, and `effort` multiplies the work
-    limit of a body.
+    `ready` has the rows of a scene, as `rows_of_scene` returns them, and may be empty; `own` has
+    arrays that replace them, and the final times `t_end` (s). `code` selects the method in the
+    kernel.
     """
 
     def __init__(
@@ -354,11 +340,7 @@ class _Bodies:
             )
 
     def solve(self, threads: int, out: "Ensemble | Array | None", with_estimates: bool) -> Ensemble:
-        """Return the final states of all bodies, computed in at most `threads` threads.
-
-        The states are omega, status and, if requested, attitude and estimates. They are written
-        into `out` if it is not None.
-        """
+        """Return the final states, written into `out` if it is not None."""
         found = place_for(out, self.n, self.attitude is not None, with_estimates)
         if found.estimates is not None:
             found.estimates[:] = _UNKNOWN
@@ -389,10 +371,9 @@ class _Bodies:
 
 
 def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:
-    """Return the integer that selects a method in the kernel, and the tolerance as a float.
+    """Return the integer that selects a method in the kernel, and the tolerance.
 
-    `method` is a name in `pyharness.methods.solver.PREPARED`. A tolerance of None becomes the
-    method's default. Raise InputError if the method is unknown or the tolerance is out of range.
+    Raise InputError if the method is unknown or the tolerance out of range.
     """
     if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)

@@ -27,12 +27,10 @@ def many_attitudes(
     solver: "AttitudeSolver", code: int, omega0: Any, t_end: Any, attitude0: Any = None, *,
     threads: int = 1, out: "Ensemble | Array | None" = None,
 ) -> tuple[Array, Array, NDArray[np.int8]]:  # fmt: skip
-    """Solve one scene from n initial omegas and attitudes, and return final states and statuses.
+    """Solve one scene from n initial omegas and attitudes, as `AttitudeSolver.many` does.
 
-    `code` is the integer that selects the method in the kernel. The other arguments and the results
-    are those of `AttitudeSolver.many`. The scene is solved from each start alone if its torque is
-    about the axes of space or depends on the state, or if its moments change or are those of a full
-    inertia matrix. Raise InputError if an array has another shape.
+    Each is solved alone if the torque is about the axes of space or depends on the state, or if
+    moments change or belong to a full matrix. Raise InputError for another shape.
     """
     starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
     n = len(starts)

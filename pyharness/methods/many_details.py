@@ -24,11 +24,7 @@ _BODY = ("moments", "coefficients", "inertia")
 
 
 class Details:
-    """A request for the events and the sensitivities of many bodies, with checked arguments.
-
-    The bodies are given as in `solve_many`: by one scene, with `arrays` by name, or by a sequence
-    of scenes. A value of None in `arrays` stands for an array that was not given.
-    """
+    """A request for the events and sensitivities of many bodies, given as in `solve_many`."""
 
     def __init__(
         self, scene: Scene | Sequence[Scene], t_end: Any, arrays: dict[str, Any], *, method: str,
@@ -37,8 +33,8 @@ class Details:
     ) -> None:  # fmt: skip
         """Check the request; copy the arrays, over which the results may be written.
 
-        Raise InputError for a method without events and sensitivities, for an event that is no
-        function or is terminal, and for an unknown parameter.
+        Raise InputError for a method without events and sensitivities, an event that is no function
+        or is terminal, and an unknown parameter.
         """
         if method not in _METHODS:
             where = "sensitivities" if events is None else "events"

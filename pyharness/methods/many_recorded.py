@@ -18,11 +18,9 @@ def solve_side_by_side(
 ) -> list[int]:  # fmt: skip
     """Solve the bodies in `piece` side by side, and return the numbers of those that are left.
 
-    `solver` is the prepared solver of all bodies. The arrays have a row for each of n bodies, or
-    one row for all: the initial omegas (rad/s), the final times (s), and the initial attitudes or
-    None. The results are written into `found`. All bodies in `piece` are left if the torque of the
-    solver is neither recorded nor about the axes of space, or if the solver does more than its
-    kernel. A body is also left if its error can't be measured side by side.
+    The arrays have a row for each body, or one for all: initial omegas (rad/s), final times (s),
+    attitudes or None. A body is left if its error can't be measured; all are, if the torque is
+    neither recorded nor about the axes of space, or the solver does more than its kernel.
     """
     is_plain = "__call__" not in vars(type(solver))
     packed = getattr(solver, "packed_for_lanes", solver.packed) if is_plain else None

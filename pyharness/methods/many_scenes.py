@@ -20,25 +20,14 @@ _MOST_KEPT = 8  # scenes whose arrays are kept
 
 
 class Axes:
-    """The principal axes of n bodies with full inertia matrices, and conversions to and from them.
-
-    If the axes of only one body are given, all bodies share these axes.
-    """
+    """The principal axes of n bodies, or one set for all, and conversions to and from them."""
 
     def __init__(self, axes: Array, turns: Array) -> None:
-        """Store the principal axes of each body, which are the columns of `axes`, shape (n, 3, 3).
-
-        `turns` contains the same axes as quaternions, scalar first, shape (n, 4), which rotate from
-        principal axes to the axes of the inertia matrices.
-        """
+        """Store the axes, columns of `axes`, (n, 3, 3), and the same as quaternions, (n, 4)."""
         self.axes, self.turns = axes, turns
 
     def about_principal(self, given: dict[str, Any], names: Iterable[str]) -> None:
-        """Convert initial omegas and attitudes from the inertia matrices' axes to principal axes.
-
-        `given` contains the arrays of `solve_many` by name and is changed in place. The arrays
-        `omega0` and `attitude0` are converted if `names` contains their names.
-        """
+        """Convert the arrays `omega0` and `attitude0` of `given`, if named, in place."""
         if "omega0" in names:
             rows = rows_of("omega0", given["omega0"], 3)
             self._check("omega0", rows)
@@ -50,11 +39,7 @@ class Axes:
             given["attitude0"] = turned_back(attitudes, conjugate)
 
     def give_back(self, omega: Array, attitude: Array | None) -> None:
-        """Convert final omegas and attitudes from principal axes to the inertia matrices' axes.
-
-        `omega` (rad/s) has shape (n, 3). `attitude` contains quaternions, shape (n, 4), or is None.
-        Both are changed in place.
-        """
+        """Convert final omegas, (n, 3), and attitudes, (n, 4), in place."""
         omega[:] = rotated(omega, self.axes)
         if attitude is not None:
             attitude[:] = turned_back(attitude, self.turns)
@@ -65,12 +50,10 @@ class Axes:
 
 
 def from_rows(rows: Sequence[Scene | None]) -> tuple[dict[str, Any], Axes]:
-    """Return scenes with a full inertia matrix as arrays about principal axes.
+    """Return scenes with full inertia matrices as arrays of `solve_many` about principal axes.
 
-    The first result is a dict of the arrays of `solve_many`, with one row for each scene. If `rows`
-    contains None in place of a scene, the row is NaN, and the kernel returns the status REFUSED for
-    it. The arrays contain the coefficients A, B, C instead of moments, because the function
-    `principal` computes them more accurately than they can be computed from rounded moments.
+    The row of a None is NaN, so that the kernel refuses it. Coefficients A, B, C replace moments:
+    `principal` computes them more accurately than rounded moments would give.
     """
     each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
     axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))
@@ -101,21 +84,13 @@ def _full_row(scene: Scene) -> dict[str, Any]:
 
 
 def _filled(laws: list[Any]) -> list[Any]:
-    """Return the sine or cosine terms of several torque laws as lists of equal length.
-
-    `laws` has a list of terms for each torque law. Terms of amplitude 0 are appended to shorter
-    lists.
-    """
+    """Return the waves of several torque laws, the shorter lists with waves of amplitude 0."""
     most = max(map(len, laws))
     return [waves + [[0.0] * 4] * (most - len(waves)) for waves in laws]
 
 
 def _from_scene(scene: Scene) -> dict[str, Any]:
-    """Return the quantities of a scene as a dict of arguments of `solve_many`.
-
-    The keys are names such as `omega0` and `torque_constant`. The body is given either by `moments`
-    or by `coefficients`.
-    """
+    """Return the quantities of a scene as a dict of arguments of `solve_many`."""
     law = checked_scene(scene).body_torque
     kind = "coefficients" if scene.moments is None else "moments"
     return {
@@ -133,12 +108,10 @@ _kept: dict[int, tuple[Scene, dict[str, Any]]] = {}
 
 
 def rows_of_scene(scene: Scene) -> dict[str, Any]:
-    """Return the quantities of a scene as arrays of one row, which the caller must not change.
+    """Return `checked_rows` of a scene, which the caller must not change; they are kept.
 
-    The result has the arrays of `_from_scene` by name, as `checked_rows` returns them. `merged` is
-    the tuple of the constant torque, the sines and the cosines after `with_merged_rows`. The
-    arrays of the last scenes are kept, because for few bodies their conversion takes longer than
-    the solution.
+    `merged` has the torque after `with_merged_rows`. For few bodies the conversion takes longer
+    than the solution.
     """
     # Equal scenes may differ in the signs of zeros. Hence an entry holds for one object only, and
     # keeps it alive so that no other object gets its identity.
@@ -154,11 +127,9 @@ def rows_of_scene(scene: Scene) -> dict[str, Any]:
 
 
 def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
-    """Return the arrays of `solve_many` as float arrays with one row per body, or one shared row.
+    """Return the arrays of `solve_many` as float arrays with one row per body, or one for all.
 
-    `given` contains a user's arrays, or those of scenes, by name. The result contains no array for
-    an attitude of None. Raise InputError for an array of another shape, or whose elements are not
-    real numbers.
+    Raise InputError for another shape, or elements that are not real numbers.
     """
     rows = {}
     for name, convert in _CONVERSIONS.items():
@@ -169,10 +140,7 @@ def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
 
 
 def check_alike(scenes: Sequence[Scene]) -> None:
-    """Raise InputError if only some of the scenes have an attitude, or if their step sizes differ.
-
-    One call of `solve_many` can't solve such scenes.
-    """
+    """Raise InputError if only some scenes have an attitude, or if step sizes differ."""
     if len({each.step_size for each in scenes}) > 1:
         raise InputError("the scenes have different step sizes; allowed: one step size for all")
     if len({each.attitude is None for each in scenes}) > 1:
@@ -182,10 +150,9 @@ def check_alike(scenes: Sequence[Scene]) -> None:
 
 
 def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
-    """Return the quantities of scenes as a dict of the arrays of `solve_many`, a row per scene.
+    """Return the arrays of `solve_many` for scenes, a row each.
 
-    Raise InputError if `scenes` is empty, or if one call of the kernel can't solve all scenes. The
-    latter is the case if step sizes differ, or if only some scenes have an attitude or moments.
+    Raise InputError if there is none, or if one call of the kernel can't solve all.
     """
     if not scenes:
         raise InputError("the sequence of scenes is empty; give at least one scene")
@@ -200,10 +167,7 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 
 def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return a dict of arrays with one row for each body, from one dict for each body.
-
-    `rows` contains the dicts of the bodies, all with moments or all with coefficients.
-    """
+    """Return arrays with one row for each of the dicts `rows`."""
     found: dict[str, Any] = {"attitude0": None}
     for name in ("moments", "coefficients", "omega0", "torque_constant", "torque_rate"):
         if name in rows[0]:

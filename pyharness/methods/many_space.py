@@ -1,8 +1,7 @@
 """Conversion of many bodies, given by arrays, to one scene each, for `solve_many`.
 
-This is needed for torques about the axes of space or that depend on the state, and for full inertia
-matrices. Bodies under such torques are also solved in this module, one after the other, by prepared
-solvers.
+Torques about the axes of space or that depend on the state, and full inertia matrices, need this.
+Bodies under such torques are solved here, one after the other, by prepared solvers.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,14 +31,10 @@ NO_ATTITUDE = "the torque needs the initial attitude; give attitude0, or scenes 
 
 
 def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
-    """Return whether each body must be solved alone, because no kernel takes several of its kind.
+    """Return whether no kernel takes several bodies under this torque, or of changing inertia.
 
-    This is the case if the torque depends on the state or is about the axes of space, or if the
-    inertia changes with time. `arrays`
-    contains the torque arrays of `solve_many` by name, and None for an array that was not given.
-    The components in the arrays are about the axes, of the body or of space, that the `frame` of
-    the scene's torque names. Raise InputError if an array is given beside a torque that depends on
-    the state.
+    `arrays` are those of the torque, about the axes that the scene's `frame` names; None means not
+    given. Raise InputError for one beside a torque that depends on the state.
     """
     named = [name for name, each in arrays.items() if each is not None]
     if isinstance(scene.torque, StateTorque):
@@ -59,11 +54,9 @@ def solve_one_by_one(
 ) -> Ensemble:  # fmt: skip
     """Return the final states of many bodies, each of which is solved alone.
 
-    The arguments are the same as in `solve_many`, except that `arrays` contains its arrays by name.
-    The value None stands for an array that was not given; the scene then supplies the quantity. A
-    body whose numbers are not allowed has NaN and the status REFUSED, and all other bodies are
-    solved. Raise InputError if no initial attitude is given and the torque needs one, or if bodies
-    under a torque about the axes of space are given by coefficients.
+    The arguments are those of `solve_many`. A body whose numbers are not allowed is NaN and
+    REFUSED. Raise InputError if the torque needs an attitude that is not given, or a torque about
+    the axes of space acts on bodies given by coefficients.
     """
     check_torque(scene, method, attitude=True)
     check_prepared(scene, method)
@@ -136,10 +129,10 @@ _kept: dict[tuple[int, str, float, float, bool], tuple[Scene, Any]] = {}
 def _kept_solver(
     scene: Scene, method: str, tolerance: float, effort: float, with_attitude: bool
 ) -> Any:
-    """Return the prepared solver of a scene at rest, which is kept for further calls.
+    """Return the prepared solver of a scene at rest, kept for further calls.
 
-    For few bodies the preparation takes longer than the solution. An entry holds for one object
-    only, and keeps it alive so that no other object gets its identity.
+    For few bodies the preparation takes longer than the solution. An entry keeps its scene alive,
+    so that no other object gets its identity.
     """
     key = id(scene), method, tolerance, effort, with_attitude
     if key not in _kept:
@@ -152,11 +145,7 @@ def _kept_solver(
 
 
 def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
-    """Return a scene for each of many bodies, or None for a body whose numbers are not allowed.
-
-    `arrays` maps names of arguments of `solve_many` to arrays of bodies and torques, or to None for
-    an array that was not given. The given scene supplies every quantity without an array.
-    """
+    """Return a scene for each body, or None for one whose numbers are not allowed."""
     rows = rows_of_bodies(arrays)
     found: list[Scene | None] = []
     for i in range(count_bodies(rows)):
@@ -168,11 +157,7 @@ def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
 
 
 def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return the arrays among `arrays` that describe bodies and torques, with checked shapes.
-
-    `arrays` maps names of arguments of `solve_many` to their values. Other arguments and values of
-    None are omitted.
-    """
+    """Return those of `arrays` that describe bodies and torques, with checked shapes."""
     shapes = {"moments": (3,), "inertia": (3, 3), "torque_constant": (3,), "torque_rate": (3,)}
     rows = {}
     for name, values in arrays.items():
@@ -184,12 +169,7 @@ def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:
 
 
 def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
-    """Return the scene of body `i`, in which row `i` of each array replaces a quantity of `scene`.
-
-    `rows` maps names of arguments of `solve_many`, such as `moments` and `omega0`, to arrays. An
-    array of one row is shared by all bodies. Raise InputError if the numbers of the body are not
-    allowed.
-    """
+    """Return `scene` with the quantities of body `i`; raise InputError if they are not allowed."""
     own = {name: row_of(each, i) for name, each in rows.items()}
     torque: dict[str, Any] = {
         name.removeprefix("torque_"): own.pop(name)

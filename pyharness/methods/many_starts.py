@@ -16,11 +16,8 @@ def many_starts(
 ) -> tuple[Array, NDArray[np.int8]]:
     """Solve one scene from n initial omegas, and return the n final omegas and statuses.
 
-    `packed` is the array of the scene and its method that `packed_scene` returns. `omega0` contains
-    the initial omegas (rad/s), shape (n, 3), and `t_end` the final time (s) or n final times. The
-    final omegas have shape (n, 3), rad/s, and are written into the keyword argument `out` if it is
-    not None. The statuses are integers of `pyharness.model.codes.Statuses`, shape (n,). Raise
-    InputError if an array has another shape.
+    Omegas (rad/s) have shape (n, 3), statuses and times (s) shape (n,); one time may serve all.
+    Raise InputError for another shape.
     """
     starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
     n = len(starts)

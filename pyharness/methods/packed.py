@@ -11,13 +11,9 @@ from pyharness.model.trajectory import Array
 
 
 def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
-    """Return a scene and its method's settings as one array, for the kernel of a prepared solver.
+    """Return a scene and its method's settings as one array, in the order of `Places`.
 
-    A prepared solver, which `prepare` returns, solves one scene for many initial omegas.
-    `pyharness.model.codes.Places` defines the order of the elements. `code` is the integer of
-    `pyharness.model.codes.Methods` that selects the method. `tolerance` is the largest allowed
-    error, relative to the largest |omega|. `effort` multiplies the work limit. Raise InputError if
-    the torque is opaque.
+    `code` selects the method. Raise InputError if the torque is opaque.
     """
     packed = np.zeros(Places.WAVES)
     packed[Places.METHOD] = code

@@ -40,9 +40,9 @@ _PERIODIC = {OMEGA0, "moments", "coefficients", "inertia", _CONSTANT}
 def checked_names(
     scene: Scene, names: Iterable[str], method: str, attitude: bool
 ) -> tuple[str, ...]:
-    """Return the names of parameters that a user gives, each once.
+    """Return the given names of parameters, each once.
 
-    Raise InputError if a name is unknown, or if the sensitivities can't be computed.
+    Raise InputError if one is unknown, or its sensitivities can't be computed.
     """
     place = "sensitivities"
     if method not in _METHODS:
@@ -77,9 +77,8 @@ def sensitivities_at(
 ) -> dict[str, Array]:
     """Return the derivatives of the solution `found` at its times, by the name of each parameter.
 
-    An array has the shape (n, 3, m), or (n, 7, m) with the attitude, where m is the number of
-    values of the parameter. `tolerance` is relative to the largest derivative of a column so far.
-    `effort` multiplies the work limit. Raise InputError if this limit is exceeded, or if a
+    They have shape (n, 3, m), or (n, 7, m) with the attitude, for m values; `tolerance` is relative
+    to the largest in a column so far. Raise InputError if the work limit is exceeded, or a
     derivative overflows.
     """
     if not names:
@@ -124,9 +123,9 @@ def _by_series(
 
 
 def _period(scene: Scene) -> float:
-    """Return the period of omega (s) of a scene without torque; 0 if it has none, or a torque.
+    """Return the period of omega (s) without torque; 0 if there is none, or hardly any change.
 
-    It is 0 too if omega is so nearly constant that the period's derivatives would have few digits.
+    The derivatives of the period of a nearly constant omega would have few digits.
     """
     # A function that is 0 now, and has a parameter of this name, may depend on time.
     period = 0.0 if getattr(scene.torque, "named", None) else period_of(scene)
@@ -150,11 +149,11 @@ def _by_periods(
     """Return the columns of each name, and all derivatives of a periodic omega, shape (n, 3, m).
 
     The equations of the derivatives have periodic coefficients (Floquet's theorem). A perturbation
-    of the initial omega changes the period, and therefore grows by the same multiple of the slope
-    of omega in every period: M = I + N is the matrix of one period, where N has rank 1, and N N =
-    0. Therefore k periods add up to M^k = I + k N, and the part that the parameters cause, F in the
-    first period, to k F + k (k - 1)/2 N F. The moments change the period once and for all, so that
-    their N F is 0.
+    of the initial omega changes the period, and grows by the same multiple of the slope of omega in
+    every period: M = I + N is the matrix of one period, where N has rank 1, and N N = 0. Therefore
+    k periods add up to M^k = I + k N, and the part F that the parameters cause in the first period
+    to k F + k (k - 1)/2 N F. The moments change the period once and for all, so that their N F is
+    0.
     """
     whole = np.floor(times / period)
     rest = times - whole * period

@@ -24,8 +24,7 @@ _MARGIN = 1e-6
 def are_of_omega(functions: Sequence[EventFunction]) -> bool:
     """Return whether functions are known to depend on omega and its derivative alone.
 
-    A function is called once with symbols. What it does with them is unknown if it can't be
-    recorded.
+    Each is called once with symbols, and unknown if it can't be recorded.
     """
     return all(map(_is_of_omega, functions))
 
@@ -44,8 +43,8 @@ def _is_of_omega(g: EventFunction) -> bool:
 def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
     """Return the times of events until `end`, and how many of them are those of `times`.
 
-    The times (s) are those in the first PERIODS periods, in ascending order. Raise InputError, with
-    `where` in front of the message, if there are too many events.
+    `times` (s) are those of the first PERIODS periods, ascending. Raise InputError, after `where`,
+    for too many events.
     """
     # An event at the end of a period may be found on either side of it, and is not lost here.
     margin = _MARGIN * period
@@ -73,10 +72,7 @@ def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array
 def improved(
     g: EventFunction, times: Array, values: Callable[[EventFunction, Array], Array], period: float
 ) -> Array:
-    """Return the times (s) of events, corrected by one step of Newton's method.
-
-    `values` is a function of the times that returns those of an event's function.
-    """
+    """Return the times (s) of events, corrected by one step of Newton's method."""
     found, probe = times.copy(), _PROBE * period
     for begin in range(0, len(times), _BLOCK):
         block = times[begin : begin + _BLOCK]

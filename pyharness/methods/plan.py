@@ -22,11 +22,7 @@ _FEW_DIGITS = 1e-9
 
 @dataclass(frozen=True)
 class Decision:
-    """The decision whether one part of a computation is carried out, with the reason.
-
-    `part` is the name of the part, for example ``torque`` or ``attitude``. `kept` is true if the
-    part is computed, and `why` is the reason as text.
-    """
+    """The decision whether a part, such as ``torque``, is computed, and why."""
 
     part: str
     kept: bool
@@ -37,10 +33,9 @@ class Decision:
 class Plan:
     """The choices that are made before a scene is solved: the method and the computed quantities.
 
-    `method` is the name of the method that solves `scene`. `closed_form` is the kind of closed
-    form, such as ``sphere``, if one is used, else None. `fallback` is the name of the method that
-    is used if `method` can't solve the scene, or None. `velocity` and `rows` state whether the
-    translational velocity and output at intermediate times are requested.
+    `closed_form` is the kind of closed form, such as ``sphere``, or None; `fallback` the method if
+    `method` can't solve the scene, or None. `velocity` and `rows` request the translational
+    velocity and intermediate output.
     """
 
     scene: Scene
@@ -52,15 +47,12 @@ class Plan:
 
     @cached_property
     def decisions(self) -> tuple[Decision, ...]:
-        """Return a decision for each part of the scene's solution, such as a term of the equations.
-
-        A decision states whether the part is computed, and the reason.
-        """
+        """Return a decision for each part of the scene's solution."""
         return tuple(_decisions(self))
 
     @property
     def skipped(self) -> frozenset[str]:
-        """Return the names of the parts of the solution that are not computed, such as `torque`."""
+        """Return the names of the parts that are not computed."""
         return frozenset(each.part for each in self.decisions if not each.kept)
 
 
@@ -71,13 +63,10 @@ def plan(
     velocity: bool = False,
     rows: bool = False,
 ) -> Plan:
-    """Return the plan for a scene: the method that solves it and the parts that are computed.
+    """Return the plan for a scene; `auto` lets it choose the method.
 
-    `method` is a name in the registry of methods. The name `auto` requests that the plan chooses
-    the method. `tolerance` is the largest allowed error, relative to the largest |omega|; None
-    means the method's default. `velocity` requests the translational velocity, and `rows` requests
-    output at intermediate times. Raise InputError if the method can't solve the scene, or if the
-    tolerance is out of range.
+    `velocity` requests the translational velocity, `rows` intermediate output. Raise InputError if
+    the method can't solve the scene, or if the tolerance is out of range.
     """
     tolerance = requested_tolerance(method, tolerance)
     finest = REGISTRY["quick"].finest if method == "quick" else FINEST

@@ -1,8 +1,7 @@
 """Preparation of a solver for many calls with one scene.
 
-`prepare` validates the scene, chooses the method, and packs the scene into an array for the
-compiled kernel. A call of the prepared solver then only checks its two or three arguments and calls
-the kernel. Therefore it takes little longer than the kernel itself.
+`prepare` validates the scene, chooses the method, and packs the scene for the compiled kernel, so
+that a call takes little longer than the kernel itself.
 """
 
 from dataclasses import replace
@@ -52,39 +51,37 @@ def prepare(
     Parameters
     ----------
     scene : Scene
-        The scene. Its step size is used by Gauss collocation and by the methods with a fixed step.
-        A scene with a full inertia matrix is solved about principal axes; each call then takes some
-        microseconds more.
+        The scene. Gauss collocation and the methods with a fixed step use its step size. With a
+        full inertia matrix, a call takes some microseconds more.
     method : str
-        A name in `pyharness.methods.solver.PREPARED`; the name `auto` selects the fastest method
-        that meets the tolerance.
+        A name in `pyharness.methods.solver.PREPARED`; `auto` selects the fastest method that meets
+        the tolerance.
     tolerance : float
-        Largest allowed error of any component of omega at the end, relative to the largest |omega|
-        from 0 to the end. The default depends on the method, as in `solve`. Methods with a fixed
-        step ignore it, and Gauss collocation does not choose its step by it. If the motion
-        amplifies perturbations by a factor K, no method has a relative error below some 1e-15 K.
+        Largest allowed error of a component of omega at the end, relative to the largest |omega|
+        from 0 to the end. The default is as in `solve`. Methods with a fixed step ignore it, and
+        Gauss collocation does not choose its step by it. If the motion amplifies perturbations by a
+        factor K, no method has a relative error below some 1e-15 K.
     effort : float
-        Factor on the work limit of a call; 1 means some ten seconds. A call that exceeds the limit
-        has the status `gave up`.
+        Factor on the work limit of a call; 1 means some ten seconds. A call that exceeds it has the
+        status `gave up`.
     attitude : bool
-        Whether calls return the attitude too. A torque that depends on the attitude, or is about
-        the axes of space, requires it.
+        Whether calls return the attitude too. A torque that depends on it, or is about the axes of
+        space, requires it.
 
     Returns
     -------
     Solver or AttitudeSolver
-        A callable. ``solver(omega0, t_end)`` returns omega (rad/s, shape (3,)) at `t_end` (s). If
-        `attitude` is true, it returns two arrays: omega, and a quaternion from body to space,
-        scalar first, shape (4,). If the inertia changes with time, a call raises InputError if a
-        moment reaches 0 before `t_end`. Under a torque that depends on the state, an initial omega
-        above 2**300 rad/s or below 2**-300 rad/s has the status `refused`; `solve` takes any.
+        A callable. ``solver(omega0, t_end)`` returns omega (rad/s, shape (3,)) at `t_end` (s), with
+        `attitude` also a quaternion from body to space, scalar first, shape (4,). Under a torque
+        that depends on the state, an initial omega above 2**300 rad/s or below 2**-300 rad/s has
+        the status `refused`; `solve` takes any.
 
     Raises
     ------
     InputError
         If the method is unknown, or can't take the scene or propagate its attitude; if a torque
-        that needs the attitude comes without `attitude`; if the tolerance or the effort is out of
-        range. A call raises it if a moment that changes with time reaches 0 before `t_end`.
+        comes without the attitude it needs; if the tolerance or effort is out of range. A call
+        raises it if a moment that changes with time reaches 0 before `t_end`.
     NotBuiltError
         If the extension is not built.
 

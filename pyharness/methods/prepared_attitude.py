@@ -35,23 +35,21 @@ else:
 class AttitudeSolver(LastCall, BoundAttitudeKernel):
     """A solver of omega and attitude of a scene, prepared for one method.
 
-    Call it as ``solver(omega0, t_end)`` or ``solver(omega0, t_end, attitude0)``. `omega0` is the
-    initial angular velocity, three numbers (rad/s). `t_end` is the final time in seconds, positive,
-    negative or 0. `attitude0` is the attitude at time 0, a quaternion from body to space, scalar
-    first. By default it is the scene's attitude. If the scene has none, it is (1, 0, 0, 0), so that
-    the body's axes are parallel to the axes of space at time 0.
+    Call it as ``solver(omega0, t_end)`` or ``solver(omega0, t_end, attitude0)``: three numbers
+    (rad/s), the final time (s), positive, negative or 0, and a quaternion from body to space,
+    scalar first, by default the scene's or (1, 0, 0, 0).
 
-    A call returns two new arrays: omega (rad/s), shape (3,), and the attitude, shape (4,), at
-    `t_end`. If the kernel could not finish, both are NaN and `status` states the reason. An
-    argument of another type or shape raises an InputError. Calls are fastest with arrays of floats
-    and a unit quaternion. Threads may share a solver, and a solver can be copied and pickled.
+    It returns two new arrays: omega (rad/s), shape (3,), and the attitude, shape (4,), at `t_end`;
+    both are NaN if the kernel could not finish, and `status` has the reason. Other arguments raise
+    an InputError. Calls are fastest with arrays of floats and a unit quaternion. Threads may share
+    a solver; it can be copied and pickled.
 
     Attributes
     ----------
     plan : Plan
-        The chosen method, and the parts of the computation that are carried out, with reasons.
+        The chosen method, and the parts that are computed, with reasons.
     many : callable
-        A function that solves the scene from many initial omegas and attitudes in one call.
+        A function that solves from many initial omegas and attitudes in one call.
     """
 
     _with_attitude = True
@@ -59,12 +57,7 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
     _code: int
 
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
-        """Create a solver and pack the data that all calls share; users call `prepare` instead.
-
-        `chosen` is the plan: the scene, and the chosen method. `tolerance` is the largest allowed
-        error, relative to the largest |omega|. `asked` is the name of the requested method, such as
-        `auto`. `effort` multiplies the work limit of a call.
-        """
+        """Create a solver, with the arguments of `Solver`; users call `prepare` instead."""
         scene, code = chosen.scene, Methods.TAYLOR
         attitude = scene.attitude or IDENTITY
         if is_recorded(scene):
@@ -89,23 +82,18 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
     def many(self) -> Callable[..., tuple[Array, Array, NDArray[np.int8]]]:
         """Return the function that solves many initial omegas and attitudes in one call.
 
-        Call it as ``solver.many(omega0, t_end, attitude0=None, threads=1, out=None)``. `omega0`
-        (rad/s) has shape (n, 3). `t_end` (s) is one number or has shape (n,). `attitude0` has shape
-        (n, 4) or (4,), and by default it is the scene's attitude, as in a call of the solver. A
-        call returns three arrays: omega at `t_end` (rad/s), shape (n, 3); the attitudes, shape (n,
-        4); and the statuses, int8, shape (n,), with the values that `Ensemble` documents. They are
-        written into the Ensemble or the array of omega that is passed as `out`, if it is not None.
-        The result of a row does not depend on the other rows or on the number of threads. An
-        argument of another type or shape raises an InputError.
+        Call it as ``solver.many(omega0, t_end, attitude0=None, threads=1, out=None)``, with
+        arguments as in `Solver.many` and quaternions of shape (n, 4) or (4,). It returns omega
+        (rad/s), shape (n, 3), the attitudes, shape (n, 4), and the statuses, int8, shape (n,), in
+        the Ensemble `out` if that is not None; `out` may also be an array for omega.
         """
         return partial(many_attitudes, self, self._code)
 
     @cached_property
     def packed_for_lanes(self) -> Array:
-        """Return the data of the scene for the kernel that solves several bodies side by side.
+        """Return the scene for the kernel that solves bodies side by side under recorded torques.
 
-        This kernel takes recorded torques. A torque about the axes of space is therefore recorded
-        as a function of time and attitude, unless it has too many terms.
+        A torque about the axes of space is recorded, unless it has too many terms.
         """
         if self._code != Methods.SPACE_TORQUE:
             return self.packed
@@ -118,22 +106,14 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
 
 
 def prepared_attitude(scene: Scene, method: str, tolerance: float, effort: float) -> AttitudeSolver:
-    """Return a solver of omega and attitude, prepared for many calls with the same scene.
-
-    `method` is a name in `pyharness.methods.solver.PREPARED`. `tolerance` limits the error of
-    omega, relative to the largest |omega|, and the error of the attitude's angle (rad). `effort`
-    multiplies the work limit of a call, some ten seconds. Raise InputError if the method can't
-    propagate attitudes.
-    """
+    """Return a solver of omega and attitude; raise InputError if the method has no attitude."""
     return AttitudeSolver(attitude_plan(scene, method, tolerance), tolerance, method, effort)
 
 
 def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
-    """Return the plan for omega and attitude of a scene: the method, and the computed parts.
+    """Return the plan for omega and attitude, by default from the attitude (1, 0, 0, 0).
 
-    `method` is the name of the requested method, and `tolerance` is the largest allowed error,
-    relative to the largest |omega|. If the scene has no attitude, its attitude at time 0 is (1, 0,
-    0, 0). Raise InputError if the method can't propagate attitudes.
+    Raise InputError if the method can't propagate attitudes.
     """
     check_attitude(method)
     return plan(replace(scene, attitude=scene.attitude or IDENTITY), method, tolerance, rows=True)
@@ -142,12 +122,9 @@ def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
 def _check(
     usual: Quaternion, omega0: object, t_end: object, attitude0: object
 ) -> tuple[tuple[float, ...], float]:
-    """Convert the arguments of a solver call if the C function can't read their types.
+    """Return omega and quaternion at 0 in one tuple, and `t_end` (s), for types unknown to C.
 
-    Return two values. The first is a tuple of the three numbers of `omega0` (rad/s) and the four
-    numbers of the initial quaternion. The second is `t_end` (s) as a float. The initial quaternion
-    is `attitude0`, or `usual` if `attitude0` is None. Raise InputError for a wrong type or number
-    of values.
+    `usual` replaces an `attitude0` of None. Raise InputError for a wrong type or number of values.
     """
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     attitude = usual if attitude0 is None else unit_quaternion("attitude0", attitude0)[0]

@@ -19,10 +19,7 @@ from pyharness.model.values import Number, Numbers, number
 
 
 class ChangingSolver(Solver):
-    """A solver of omega, which is called in the same way as a `Solver`.
-
-    A call raises InputError if a principal moment reaches 0 before the final time.
-    """
+    """A `Solver` whose calls raise InputError if a principal moment reaches 0 before the end."""
 
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array:
         """Return omega (rad/s) at `t_end` (s), shape (3,); see `Solver` for the arguments."""
@@ -31,10 +28,9 @@ class ChangingSolver(Solver):
 
     @property
     def many(self) -> Any:
-        """Return the function that solves the scene from many initial omegas in one call.
+        """Return the function ``solver.many(omega0, t_end)``, as `Solver.many` describes.
 
-        Call it as ``solver.many(omega0, t_end)``; `Solver.many` describes its arguments. A row is
-        NaN, with the status REFUSED, if a moment reaches 0 before its time.
+        A row is NaN and REFUSED if a moment reaches 0 before its time.
         """
         return self._many
 
@@ -50,10 +46,7 @@ class ChangingSolver(Solver):
 
 
 class ChangingAttitudeSolver(AttitudeSolver):
-    """A solver of omega and attitude, which is called in the same way as an `AttitudeSolver`.
-
-    A call raises InputError if a principal moment reaches 0 before the final time.
-    """
+    """An `AttitudeSolver` with the same errors."""
 
     def __call__(
         self, omega0: Numbers, t_end: Number, attitude0: Numbers | Rotation | None = None
@@ -66,10 +59,7 @@ class ChangingAttitudeSolver(AttitudeSolver):
 def prepared_changing(
     scene: Scene, method: str, tolerance: float, effort: float, attitude: bool
 ) -> ChangingSolver | ChangingAttitudeSolver:
-    """Return a solver of a scene whose inertia changes, prepared for many calls with it.
-
-    The arguments are those of `prepare`.
-    """
+    """Return a solver of a scene whose inertia changes, with the arguments of `prepare`."""
     if attitude:
         chosen = attitude_plan(scene, method, tolerance)
         return ChangingAttitudeSolver(chosen, tolerance, method, effort)

@@ -1,8 +1,7 @@
 """Prepared solvers of scenes with a full inertia matrix.
 
-A call transforms its arguments to principal axes, solves the scene about these axes, and transforms
-the result back. The transformations are in Python, whereas a solver of a scene with principal
-moments calls the kernel directly from C.
+A call transforms its arguments to principal axes, solves there, and transforms the result back, in
+Python; a solver of a scene with principal moments calls the kernel from C.
 """
 
 from dataclasses import replace
@@ -34,12 +33,9 @@ def _no_compiled_call(solver: object) -> Any:
 
 
 class InertiaSolver(Solver):
-    """A solver, made by `prepare`, of one scene with a full inertia matrix.
+    """A `Solver` whose omegas are about the axes of the inertia matrix.
 
-    It is called in the same way as a `Solver`. The omegas that a call takes and returns are about
-    the axes of the inertia matrix. The attribute `plan` has the chosen method and the scene about
-    principal axes. The attribute `growth` is the error amplification: the largest norm of the
-    state-transition matrices of omega about principal axes.
+    `plan` has the scene about principal axes; `growth` is the error amplification about these axes.
     """
 
     ctypes = capsule = property(_no_compiled_call)
@@ -48,12 +44,10 @@ class InertiaSolver(Solver):
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
         scene: Scene | None = None,
     ) -> Self:  # fmt: skip
-        """Create a solver of the scene about principal axes; users call `prepare` instead.
+        """Create a solver; users call `prepare` instead.
 
-        `chosen` is the plan: the scene about principal axes, and the chosen method. `scene` is the
-        scene with the inertia matrix. `tolerance` is the largest allowed error, relative to the
-        largest |omega|. `asked` is the name of the requested method, such as `auto`. `effort`
-        multiplies the work limit of a call.
+        `chosen` has the scene about principal axes, `scene` the matrix; `asked` is the requested
+        method.
         """
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
@@ -65,15 +59,11 @@ class InertiaSolver(Solver):
     _axes: Array  # the principal axes, in columns
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and the arguments from which `copy` and `pickle` recreate the solver."""
+        """Return the class and the arguments with which `copy` and `pickle` recreate the solver."""
         return type(self), (self.plan, *self._given, self._scene)
 
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array:
-        """Return omega (rad/s) at `t_end` (s), shape (3,), about the axes of the inertia matrix.
-
-        `omega0` is the initial omega (rad/s), about the same axes. If the keyword argument `out`,
-        an array of three floats, is not None, the result is written into it and `out` is returned.
-        """
+        """Return omega (rad/s) at `t_end` (s), shape (3,), in `out` if it is not None."""
         start = np.array(three_floats("omega0", omega0))
         if out is not None and (found := no_buffer(out)):
             raise InputError(
@@ -87,10 +77,7 @@ class InertiaSolver(Solver):
 
     @property
     def many(self) -> Any:
-        """Return the function that solves the scene from many initial omegas in one call.
-
-        Call it as ``solver.many(omega0, t_end)``; `Solver.many` describes its arguments.
-        """
+        """Return the function ``solver.many(omega0, t_end)``, as `Solver.many` describes."""
         return self._many
 
     def _many(
@@ -109,12 +96,7 @@ class InertiaSolver(Solver):
 
 
 class InertiaAttitudeSolver(AttitudeSolver):
-    """A solver, made by `prepare`, of omega and attitude of a scene with a full inertia matrix.
-
-    The solver is called in the same way as an `AttitudeSolver`. The omegas that a call takes and
-    returns are about the axes of the inertia matrix. The quaternions rotate from these axes to
-    space.
-    """
+    """An `AttitudeSolver` whose omegas and attitudes are about the axes of the inertia matrix."""
 
     ctypes = capsule = property(_no_compiled_call)
 
@@ -122,13 +104,7 @@ class InertiaAttitudeSolver(AttitudeSolver):
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
         scene: Scene | None = None,
     ) -> Self:  # fmt: skip
-        """Create a solver of the scene about principal axes; users call `prepare` instead.
-
-        `chosen` is the plan: the scene about principal axes, and the chosen method. `scene` is the
-        scene with the inertia matrix. `tolerance` is the largest allowed error, relative to the
-        largest |omega|. `asked` is the name of the requested method, such as `auto`. `effort`
-        multiplies the work limit of a call.
-        """
+        """Create a solver, with the arguments of `InertiaSolver`."""
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
         solver._scene = scene
@@ -140,18 +116,15 @@ class InertiaAttitudeSolver(AttitudeSolver):
     _turn: Quaternion  # from principal axes to the axes of the inertia matrix
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and the arguments from which `copy` and `pickle` recreate the solver."""
+        """Return the class and the arguments with which `copy` and `pickle` recreate the solver."""
         return type(self), (self.plan, *self._given, self._scene)
 
     def __call__(
         self, omega0: Numbers, t_end: Number, attitude0: Numbers | Rotation | None = None
     ) -> tuple[Array, Array]:
-        """Return omega (rad/s), shape (3,), and the attitude, shape (4,), at `t_end` (s).
+        """Return omega (rad/s), shape (3,), and the quaternion, shape (4,), at `t_end` (s).
 
-        Omega is about the axes of the inertia matrix, and the attitude is a quaternion from these
-        axes to space, scalar first. `omega0` is the initial omega (rad/s), and `attitude0` the
-        initial quaternion. The default quaternion is the scene's, or (1, 0, 0, 0) if the scene has
-        none.
+        The default `attitude0` is the scene's, or (1, 0, 0, 0).
         """
         start = np.array(three_floats("omega0", omega0))
         attitude = self._scene.attitude or IDENTITY
@@ -168,22 +141,15 @@ class InertiaAttitudeSolver(AttitudeSolver):
 
 
 def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:
-    """Return the principal axes of a scene's inertia matrix, as a matrix and as a quaternion.
-
-    The columns of the matrix, shape (3, 3), are the axes. The quaternion, scalar first, is the same
-    rotation. Both transform components about principal axes to components about the axes of the
-    inertia matrix.
-    """
+    """Return the principal axes, as columns of a matrix, shape (3, 3), and as a quaternion."""
     about_principal, axes = principal(replace(scene, attitude=IDENTITY))
     return axes, about_principal.attitude or IDENTITY
 
 
 def rotated(vectors: Array, matrix: Array) -> Array:
-    """Return the product of a matrix and each of n vectors, shape (n, 3), or of a single vector.
+    """Return the products of matrices, shape (3, 3) or (n, 3, 3), and vectors, (3,) or (n, 3).
 
-    `vectors` has shape (n, 3), or (3,) for a single vector; the result has the same shape. `matrix`
-    has shape (3, 3), or shape (n, 3, 3) with one matrix for each vector. The products are summed in
-    a fixed order, so that the result of a vector is bit-for-bit identical for any n.
+    They are summed in a fixed order, so that a result is bit-for-bit the same for any n.
     """
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack(
@@ -193,12 +159,9 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Convert attitudes of the principal axes to attitudes of the axes of the inertia matrix.
+    """Convert attitudes of principal axes to attitudes of the axes of the inertia matrix.
 
-    `attitudes` has shape (n, 4), or (4,) for a single attitude; the result has the same shape.
-    `turn` is the quaternion of the rotation from principal axes to the axes of the inertia matrix.
-    It has shape (4,), or (n, 4) with one quaternion for each attitude. Quaternions are scalar
-    first.
+    Shapes are (4,) or (n, 4); `turn` rotates from principal axes to those of the matrix.
     """
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
@@ -207,12 +170,7 @@ def turned_back(attitudes: Array, turn: Any) -> Array:
 
 
 def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float) -> InertiaSolver:
-    """Return a solver of omega, prepared for many calls with the same scene.
-
-    The scene must have a full inertia matrix, and the attitude is not computed. `method` is a name
-    in `pyharness.methods.solver.PREPARED`. `tolerance` is the largest allowed error, relative to
-    the largest |omega|. `effort` multiplies the work limit of a call, some ten seconds.
-    """
+    """Return a solver of omega for a scene with a full inertia matrix."""
     from pyharness.methods.plan import plan
 
     about_principal = with_merged_waves(principal(replace(scene, attitude=None))[0])
@@ -222,12 +180,7 @@ def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float)
 def prepared_inertia_attitude(
     scene: Scene, method: str, tolerance: float, effort: float
 ) -> InertiaAttitudeSolver:
-    """Return a solver of omega and attitude, prepared for many calls with the same scene.
-
-    The scene must have a full inertia matrix. `method` is a name in
-    `pyharness.methods.solver.PREPARED`. `tolerance` is the largest allowed error, relative to the
-    largest |omega|. `effort` multiplies the work limit of a call, some ten seconds.
-    """
+    """Return a solver of omega and attitude for a scene with a full inertia matrix."""
     from pyharness.methods.prepared_attitude import attitude_plan
 
     about_principal, _ = principal(replace(scene, attitude=scene.attitude or IDENTITY))

@@ -1,8 +1,4 @@
-"""Conversion of a scene to arguments of the modern kernels, and of their results to a trajectory.
-
-The modern kernels are Fortran procedures that implement this project's own methods, in contrast to
-the programs of the thesis.
-"""
+"""Conversion of a scene to arguments of the Fortran kernels, and of results to a trajectory."""
 
 import math
 from collections.abc import Sequence
@@ -23,24 +19,19 @@ _NOT_FINITE = (
 
 
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
-    """Return the coefficients and torques of a scene as five arrays, for the modern kernels.
+    """Return the coefficients A, B, C, and the torque over the moments, as five arrays.
 
-    The first array contains the coefficients A, B, C of Euler's equations. The second is the
-    constant torque (1/s2), and the third the rate of the linear torque (1/s3). The last two contain
-    the sine and the cosine terms, shape (4, n). Each column is a term: three components of its
-    amplitude (1/s2), and its frequency (rad/s). Torques are divided by the moments. Raise
-    InputError if a value is not finite.
+    The torque is constant (1/s2), rate (1/s3), sines and cosines, shape (4, n), with columns of
+    three amplitudes (1/s2) and the frequency (rad/s). Raise InputError if a value is not finite.
     """
     return _over(scene, scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0)))
 
 
 def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
-    """Return six arrays of a scene, for the kernel that solves torques about the axes of space.
+    """Return the coefficients, the largest moment over each, and the torque over the largest.
 
-    The first array contains the coefficients A, B, C of Euler's equations, and the second the
-    largest moment over each moment. The last four are the constant, linear, sine and cosine terms
-    of the torque, as in `normalized`, but divided by the largest moment. The scene must have
-    moments. Raise InputError if a value is not finite.
+    It is for torques about the axes of space, in the form of `normalized`, and moments are needed.
+    Raise InputError if a value is not finite.
     """
     moments = np.array(scene.moments)
     largest = moments.max()
@@ -68,11 +59,10 @@ def _over(scene: Scene, law: TorqueLaw, moments: Array) -> tuple[Array, Array, A
 
 
 def remainders(scene: Scene) -> Triple:
-    """Return the exact coefficients A, B, C of a scene minus their values in binary64.
+    """Return the exact coefficients A, B, C minus their values in binary64.
 
-    The closed form adds these rounding errors to the coefficients. Otherwise a phase of 1e6 radians
-    would have an error of 1e-10 rad. The remainders are 0 if the body is given by coefficients.
-    They are also 0 if a torque acts, because no kernel uses them in this case.
+    Without them, a closed form would have an error of 1e-10 rad after 1e6 rad. They are 0 for a
+    body given by coefficients, and under a torque, where no kernel uses them.
     """
     found, moments = scene.euler_coefficients, scene.exact_moments
     if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
@@ -85,10 +75,7 @@ def remainders(scene: Scene) -> Triple:
 
 
 def known(estimate: float) -> float | None:
-    """Return an estimate that a kernel reported, or None if it is negative.
-
-    A kernel reports an unknown error or error amplification as a negative number.
-    """
+    """Return a kernel's estimate, or None for a negative one, which means unknown."""
     return float(estimate) if estimate >= 0.0 else None
 
 
@@ -103,14 +90,10 @@ def trajectory_of(
     growth: float | None = None,
     attitudes: Array | None = None,
 ) -> Trajectory:
-    """Return a trajectory that contains the results of a kernel at `times` (s).
+    """Return a trajectory of the results of a kernel at `times` (s).
 
-    `rows` is omega (rad/s), shape (3, n), with one column for each time. `attitudes` are
-    quaternions, shape (4, n), or None. Only the first `n_rows` columns are results. `status` is an
-    integer of `pyharness.model.codes.Statuses`. `steps` and `evaluations` are the numbers of steps
-    and of evaluations of the right-hand side. `error` is the estimated relative error, and `growth`
-    the error amplification. The error and the error amplification are omitted if the kernel did not
-    reach the last time.
+    Of `rows`, omega (rad/s), shape (3, n), and `attitudes`, shape (4, n), the first `n_rows`
+    columns are results. `error` and `growth` are omitted if the last time was not reached.
     """
     ended = ENDS[status] if ENDS[status] in WITH_ALL_ROWS else "overflow"
     more = {"error": error, "growth": growth} if ended in WITH_ALL_ROWS else {}
@@ -123,22 +106,16 @@ def trajectory_of(
 def rows_trajectory(
     times: Sequence[float], omega: Array, evaluations: int, steps: int, ended: str, **more: Any
 ) -> Trajectory:
-    """Return a trajectory from omega (rad/s, shape (n, 3)) at `times` (s), without velocity.
-
-    Its `recorded_time`, which differs from the true time only for programs of the thesis, is equal
-    to its `time`. `evaluations` is the number of evaluations of the right-hand side, and `steps`
-    the number of steps. `ended` states how the integration ended, for example ``complete``, and
-    `more` are other attributes of the trajectory.
-    """
+    """Return a trajectory from omega (rad/s, shape (n, 3)) at `times` (s), without velocity."""
     time = np.array(times, dtype=float)
     return Trajectory(time, time, omega, None, steps, evaluations, ended, **more)
 
 
 def closed_form(scene: Scene) -> str | None:
-    """Return the kind of closed form that solves a scene, or None if the scene has none.
+    """Return the kind of closed form of a scene, or None.
 
-    The kinds are ``sphere`` (A = B = C = 0), ``symmetric`` (a body with two equal moments) and
-    ``elliptic`` (elliptic functions, for three unequal moments).
+    It is ``sphere`` (A = B = C = 0), ``symmetric`` (two equal moments) or ``elliptic`` (three
+    unequal moments).
     """
     law = scene.torque
     if not isinstance(law, TorqueLaw) or law.in_space or scene.changing is not None:

@@ -24,8 +24,8 @@ def crosses(
     terminal : bool or int
         Whether the first event ends the integration; a number n says that the n-th does.
     direction : {-1, 0, 1}
-        1 for increasing values, -1 for decreasing values, 0 for both, in the direction of
-        integration. With 0, an extremum that equals the value is an event too.
+        1 for increasing values, -1 for decreasing ones, in the direction of integration; 0 for
+        both, and for an extremum that equals the value.
 
     Returns
     -------
@@ -58,23 +58,22 @@ def crosses(
 def flip(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Event:
     """Return the event that a component of omega changes its sign.
 
-    A component that reaches 0 without a change of sign, or that is 0 at the ends of the
-    integration, is no event.
+    A 0 without a change of sign, or at the ends of the integration, is no event.
 
     Parameters
     ----------
     axis : {1, 2, 3}
         The body axis of the component.
     terminal : bool or int
-        Whether the first event ends the integration; a number n says that the n-th does.
+        As in `crosses`.
     direction : {-1, 0, 1}
-        1 for changes to a positive sign, -1 for changes to a negative sign, 0 for both, in the
-        direction of integration.
+        1 for changes to a positive sign, -1 to a negative one, in the direction of integration; 0
+        for both.
 
     Returns
     -------
     Event
-        The event, for the argument `events` of `pyharness.solve`.
+        The event.
 
     Raises
     ------
@@ -103,23 +102,22 @@ def flip(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Even
 def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Event:
     """Return the event that a component of omega has a maximum or a minimum.
 
-    Its derivative is 0 there. The derivative is computed by the equations of motion.
+    Its derivative, from the equations of motion, is 0 there.
 
     Parameters
     ----------
     axis : {1, 2, 3}
         The body axis of the component.
     terminal : bool or int
-        Whether the first event ends the integration; a number n says that the n-th does.
+        As in `crosses`.
     direction : {-1, 0, 1}
-        The sign change of the derivative with respect to time, in the direction of integration: -1
-        for the maxima of an integration forward in time, 1 for its minima, 0 for both. Backward in
-        time, -1 is for the minima.
+        Sign change of the derivative in the direction of integration: forward in time, -1 for
+        maxima and 1 for minima; backward, the reverse; 0 for both.
 
     Returns
     -------
     Event
-        The event, for the argument `events` of `pyharness.solve`.
+        The event.
 
     Raises
     ------
@@ -131,8 +129,7 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
     >>> from pyharness import Scene, solve
     >>> from pyharness.events import extremum
     >>> wing_nut = Scene("wing nut", omega=(0.01, 5.0, 0.0), moments=(1.0, 2.0, 3.0))
-    >>> found = solve(wing_nut, 6.0, events=extremum(3))
-    >>> found.t_events[0].round(3)
+    >>> solve(wing_nut, 6.0, events=extremum(3)).t_events[0].round(3)
     array([2.633])
     """
     k = _axis("events: extremum", axis)
@@ -151,23 +148,21 @@ def rest(value: Number, *, terminal: bool | int = False, direction: int = -1) ->
     Parameters
     ----------
     value : float
-        The value (rad/s), greater than 0. A damped body approaches the value 0, but does not reach
-        it.
+        The value (rad/s), above 0, which a damped body does not reach.
     terminal : bool or int
-        Whether the first event ends the integration; a number n says that the n-th does.
+        As in `crosses`.
     direction : {-1, 0, 1}
-        -1 for falling magnitudes, 1 for rising magnitudes, 0 for both, in the direction of
-        integration.
+        -1 for falling magnitudes, 1 for rising ones, in the direction of integration; 0 for both.
 
     Returns
     -------
     Event
-        The event, for the argument `events` of `pyharness.solve`.
+        The event.
 
     Raises
     ------
     InputError
-        If `value` is no finite number greater than 0.
+        If `value` is no finite number above 0.
 
     Examples
     --------
@@ -207,25 +202,24 @@ def tilt(
     axis : {1, 2, 3}
         The body axis.
     toward : three numbers
-        The direction in space; its length does not matter.
+        The direction in space, of any length.
     angle : float
         The angle (rad), from 0 to pi.
     terminal : bool or int
-        Whether the first event ends the integration; a number n says that the n-th does.
+        As in `crosses`.
     direction : {-1, 0, 1}
-        1 for increasing angles, -1 for decreasing angles, 0 for both, in the direction of
-        integration.
+        1 for increasing angles, -1 for decreasing ones, in the direction of integration; 0 for
+        both.
 
     Returns
     -------
     Event
-        The event, for the argument `events` of `pyharness.solve`.
+        The event.
 
     Raises
     ------
     InputError
-        If `axis` is none of the three, `toward` is not three finite numbers or is 0, or `angle` is
-        not from 0 to pi.
+        If `axis`, `toward` or `angle` is not as stated.
 
     Examples
     --------
@@ -257,7 +251,7 @@ def tilt(
 
 
 def _component(unit: list[float], k: int, attitude: Any) -> Any:
-    """Return the component along body axis number k, from 0, of a direction `unit` in space."""
+    """Return the component of a direction `unit` in space along body axis k, from 0."""
     scalar, vector = attitude[0], attitude[1:]
     i, j = (k + 1) % 3, (k + 2) % 3
     # Column k of the rotation matrix of a unit quaternion.

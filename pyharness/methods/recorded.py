@@ -27,10 +27,7 @@ _KINDS = {
 
 
 def system(scene: Scene) -> Tape:
-    """Return the equations of motion of a scene with a recorded torque as a tape.
-
-    Raise InputError for an opaque torque.
-    """
+    """Return the equations of motion as a tape; raise InputError for an opaque torque."""
     torque = scene.torque
     if not isinstance(torque, StateTorque) or torque.tape is None:
         raise InputError(
@@ -44,8 +41,8 @@ def system(scene: Scene) -> Tape:
 def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
     """Return a tape as the array that the kernel reads; fortran/modern/tape.f90 describes it.
 
-    The last `n_unknowns` outputs, by default all of them, are the derivatives of the unknowns.
-    Sine and cosine of one angle become one operation, because each recurrence needs the other.
+    The last `n_unknowns` outputs, by default all, are the derivatives. Sine and cosine of one angle
+    become one operation, because each recurrence needs the other.
     """
     places = {slot: slot + 1 for slot in range(tape.n_inputs)}
     n_slots = tape.n_inputs

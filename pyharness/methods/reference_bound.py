@@ -12,10 +12,9 @@ from pyharness.truth.bounded import ErrorBound, error_bound
 
 
 def trajectory_bound(scene: Scene, found: Trajectory, effort: float = 1.0) -> ErrorBound | None:
-    """Return a statement on the error of the rows of a trajectory by the method `reference`.
+    """Return the proved or estimated error of a trajectory by `reference`, or None.
 
-    `scene` is the scene that was solved, and `effort` is a factor on the work limit of the proof.
-    The result is None if there is neither a proof nor an estimate.
+    `effort` is a factor on the work limit of the proof.
     """
     start = None if found.attitude is None else scene.attitude or IDENTITY
     scene = replace(scene, attitude=start)

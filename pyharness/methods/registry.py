@@ -30,11 +30,7 @@ _DEFAULT = 1e-12
 
 @dataclass(frozen=True)
 class Method:
-    """The properties of one method, which solves a scene and returns its trajectory.
-
-    A method is a solver of this project or of SciPy. The three programs in the appendix of the
-    thesis are not methods.
-    """
+    """The properties of one method, of this project or SciPy, which returns a trajectory."""
 
     name: str
     title: str
@@ -95,9 +91,7 @@ def _no_rows(*given: object) -> Trajectory:
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
     """Return a function that solves scenes, and imports its module when it is first called.
 
-    `room` is the name of a module of `pyharness.methods`, and `name` is the name of a function in
-    this module. Without further arguments, the function `name` solves scenes itself. With further
-    arguments, the function `name` is called with them and returns the function that solves scenes.
+    It is `name` in the module `room`, or what `name` returns for the arguments.
     """
 
     def solve(*given: Any) -> Trajectory:
@@ -227,10 +221,9 @@ SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if meth
 
 
 def requested_tolerance(method: str, tolerance: Number | None) -> float:
-    """Return the requested tolerance as a float, or the method's default if it is None.
+    """Return the requested tolerance, or the method's default; its range is not checked.
 
-    `method` is a name in the registry of methods. Raise InputError if the tolerance is not a
-    number. Whether the tolerance is in the method's range is not checked.
+    Raise InputError if it is not a number.
     """
     chosen = REGISTRY[method]
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
@@ -246,8 +239,7 @@ def check_attitude(method: str) -> None:
 def check_prepared(scene: Scene, method: str) -> None:
     """Raise InputError if no solver can be prepared for a scene and the method with this name.
 
-    Under a torque that depends on the state, and for an inertia that changes with time, only Taylor
-    series have a prepared solver.
+    Torques of the state and changing inertia have only prepared Taylor series.
     """
     if is_recorded(scene) and method not in PREPARED_FOR_STATE:
         what = "an inertia that changes" if scene.changing else "a torque that depends on the state"
@@ -260,10 +252,8 @@ def check_prepared(scene: Scene, method: str) -> None:
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
     """Raise InputError if the method with this name can't solve a scene because of its torque.
 
-    Not every method takes a torque about the axes of space, one that depends on omega or attitude,
-    or any torque together with an inertia that changes with time. The error is also raised if the
-    torque depends on the attitude and `attitude` is false, which means that the attitude is not
-    computed.
+    That depends on its axes, on its dependence on omega or attitude, on changing inertia, and on
+    whether the attitude is computed.
     """
     torque, chosen = scene.torque, REGISTRY[method]
     kind = "a torque about the axes of space"

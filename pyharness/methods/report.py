@@ -49,11 +49,9 @@ def trajectory_report(
 ) -> Report:
     """Return the report of one trajectory of a scene, with a table of its rows and a picture.
 
-    `method` is the name of the method or program, and `title` is the line under the scene's
-    heading. `listing` is the program with a choice of its defects, or None for a method. `word` is
-    the name of the arithmetic of a program that did not run in binary64, else None. `form` is the
-    form in which an attitude is shown: ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `bound`
-    is the bound of the error of the method `reference`, else None.
+    `listing` is the program with a choice of its defects, `word` its arithmetic if not binary64,
+    and `form` that of the attitude: ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `bound` is
+    for the method `reference`.
     """
     columns = [*_TIMES, *_OMEGA]
     parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]
@@ -129,10 +127,9 @@ def _shown(attitude: Array, form: str) -> Array:
 
 
 def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
-    """Return a picture of the components of omega over time, and of the attitude if there is one.
+    """Return a picture of omega, and of the attitude if there is one, over time.
 
-    `title` is the title of the picture, and `numbers` is the table that is saved with it. If the
-    trajectory ends before the last requested time, a note in the title states the reason.
+    The title has a note if the trajectory ends early.
     """
     from matplotlib.figure import Figure
 
@@ -160,10 +157,9 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
 
 
 def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
-    """Mark the last value of component `row` (0 to 2) of omega by a cross in the diagram `axes`.
+    """Mark the last value of component `row` (0 to 2) of omega by a cross in a diagram.
 
-    `axes` is a matplotlib object. If the value is outside the limits of the diagram, the cross is
-    at the edge of the diagram. The limits do not change.
+    A value outside its limits, which do not change, is marked at the edge.
     """
     bottom, top = axes.get_ylim()
     axes.plot(trajectory.time[-1:], np.clip(trajectory.omega[-1:, row], bottom, top), **_END)
@@ -171,11 +167,7 @@ def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
 
 
 def plan_report(scene: Scene, plan: "Plan") -> Report:
-    """Return the report of a plan: the chosen method, and a table of the parts of the computation.
-
-    `plan` is the plan for `scene`, made before the scene is solved. The table states for each part,
-    such as the torque, whether it is computed, and why.
-    """
+    """Return the report of a plan: the method, and which parts are computed, and why."""
     table = Table(
         words("part computed why"),
         [[each.part, "yes" if each.kept else "no", each.why] for each in plan.decisions],

@@ -1,10 +1,9 @@
 """The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is first used.
 
-SciPy controls the local error of each step, whereas a tolerance of this project limits the error at
-the requested times. A preliminary integration with few digits supplies three quantities from which
-the local tolerance is chosen. The first is the largest |omega|, to which both errors are relative.
-The second is the phase of the motion, because local errors add up in proportion to it. The third is
-the error amplification.
+SciPy controls the local error of a step, whereas our tolerance limits the error at the requested
+times. A preliminary integration with few digits supplies the largest |omega|, the phase of the
+motion, in proportion to which local errors add up, and the error amplification; the local tolerance
+follows from these.
 """
 
 import math
@@ -61,12 +60,7 @@ _RADAU_SHARE = 2
 
 
 class _Ahead(NamedTuple):
-    """The results of a preliminary integration with few digits, which set the local tolerance.
-
-    The local tolerance is the tolerance of one step. The preliminary integration determines the
-    largest |omega|, the phase of the motion and of the torque waves, the error amplification, and
-    the angle by which the body rotates.
-    """
+    """The results of the preliminary integration; phases of torque waves count as the motion's."""
 
     largest: float  # largest abs(omega) of any component from 0 to the end, rad/s
     # Integral over time of the largest coefficient times |omega|, plus the phases of the torque
@@ -79,20 +73,15 @@ class _Ahead(NamedTuple):
 def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
     """Return a bound of the ratio of a SciPy method's error at the end to its error per step.
 
-    `name` is SciPy's name of the method, such as DOP853. `radians` is the phase of the motion and
-    of its torque waves (rad). `growth` is the error amplification until the end. `turned` is the
-    angle (rad) by which the body rotates, or 0 if its attitude is not requested.
+    `radians` is the phase (rad), `growth` the error amplification, and `turned` the angle (rad) by
+    which the body rotates, or 0 without attitude.
     """
     found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
     return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)
 
 
 def finest_tolerance(name: str, scene: Scene, time: float) -> float:
-    """Return the smallest tolerance that a method of SciPy can meet from 0 to `time` (s).
-
-    `name` is SciPy's name of the method, such as DOP853. The tolerance is for the error of omega at
-    `time`, relative to the largest |omega|.
-    """
+    """Return the smallest tolerance that SciPy's method `name` can meet from 0 to `time` (s)."""
     if isinstance(scene.torque, StateTorque):
         return max(FINEST[name], finest_of_state(name, scene, time, _most(name, 1.0)))
     ahead = _Run(scene, time, name).ahead()
@@ -100,11 +89,7 @@ def finest_tolerance(name: str, scene: Scene, time: float) -> float:
 
 
 def scipy_method(name: str) -> Integrator:
-    """Return a function that solves a scene by the method `name` of SciPy's `solve_ivp`.
-
-    The returned function chooses the tolerance per step (the local tolerance of `solve_ivp`) so
-    that the error at the requested times meets the requested tolerance.
-    """
+    """Return an integrator by SciPy's method `name`, which chooses the local tolerance."""
 
     def solve(
         scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
@@ -168,16 +153,14 @@ def scipy_method(name: str) -> Integrator:
 
 
 def state_of(scene: Scene) -> tuple[float, ...]:
-    """Return omega (rad/s) at time 0, followed by the initial quaternion if the scene has one."""
+    """Return omega (rad/s) at time 0, and the initial quaternion if the scene has one."""
     return (*scene.omega, *(scene.attitude or ()))
 
 
 def with_attitude(slopes: RightHandSide) -> RightHandSide:
-    """Return the right-hand side of the equations of omega and attitude together.
+    """Return the right-hand side for omega and attitude, from that for omega alone.
 
-    The unknowns are the three components of omega and the four of the attitude. `slopes` is the
-    right-hand side of the equations of omega alone. The attitude is a quaternion q, scalar first.
-    Its derivative is q' = q (0, omega)/2 with Hamilton's product.
+    The quaternion q, scalar first, has q' = q (0, omega)/2 with Hamilton's product.
     """
 
     def both(time: float, state: Sequence[float]) -> list[float]:
@@ -194,16 +177,12 @@ def with_attitude(slopes: RightHandSide) -> RightHandSide:
 
 
 def _most(name: str, effort: float) -> float:
-    """Return the work limit of a method for a torque without waves, in right-hand sides."""
+    """Return the work limit, in right-hand sides, under a torque without waves."""
     return effort * _MOST_EVALUATIONS / (_RADAU_SHARE if name == "Radau" else 1)
 
 
 class _Run(Run):
-    """The integrations of one scene with a torque law from 0 to `end` (s) by `solve_ivp`.
-
-    `name` is SciPy's name of the method of the main integration, and `effort` multiplies the work
-    limit.
-    """
+    """The integrations under a torque law from 0 to `end` (s) by SciPy's method `name`."""
 
     def __init__(self, scene: Scene, end: float, name: str, effort: float = 1.0) -> None:
         self.scene = scene
@@ -212,16 +191,13 @@ class _Run(Run):
         super().__init__(scene.omega, scene.right_hand_side(), rate, end, name, effort, most)
 
     def add_attitude(self) -> None:
-        """Add the attitude to the unknowns of later integrations, if the scene has an attitude."""
+        """Add the scene's attitude, if any, to the unknowns of later integrations."""
         if self.scene.attitude is not None:
             self.start = state_of(self.scene)
             self.slopes = with_attitude(self.slopes)
 
     def _scale_by_torque(self) -> float:
-        """Return a bound of the |omega| (rad/s) that the torque alone can cause until the end time.
-
-        The result is 1 if the bound is not finite.
-        """
+        """Return a bound of the |omega| (rad/s) by the torque alone, or 1 if it is not finite."""
         bound = omega_by_torque(self.scene, self.end)
         return bound if math.isfinite(bound) else 1.0
 
@@ -229,13 +205,10 @@ class _Run(Run):
     def ahead(self) -> _Ahead:
         """Integrate with few digits, and return the quantities that set the local tolerance.
 
-        The absolute tolerance is a fraction of an estimate of the largest |omega|. The first
-        estimate is the initial |omega|; for a body at rest it follows from the torque. If the
-        |omega| of the solution is much smaller than the estimate, the integration is repeated with
-        a smaller estimate. If omega grows without bound, there is no largest |omega|. The result
-        then contains, in its place, the larger of the estimate and the omega that torque alone
-        would cause. In this case the phase and the error amplification are unknown and have their
-        least values, 0 and 1.
+        The absolute tolerance is a fraction of the estimated largest |omega|, at first |omega| at 0
+        or, at rest, from the torque; the integration is repeated if the solution is much smaller.
+        If omega grows without bound, the larger of the estimate and the omega by the torque alone
+        replaces the largest, and phase and amplification have their least values, 0 and 1.
         """
         scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()
         if scale == 0.0:
@@ -267,11 +240,9 @@ class _Run(Run):
 
 
 def _pushes(scene: Scene) -> list[tuple[float, float]]:
-    """Return two numbers for each torque wave: the size of its amplitude, and its frequency.
+    """Return size and frequency (rad/s) of each torque wave.
 
-    Each of the three components of the amplitude is divided by its moment of inertia. The first
-    number is the largest absolute value of these quotients (1/s2). The second is the absolute value
-    of the frequency (rad/s).
+    The size (1/s2) is the largest component of the amplitude, divided by its moment.
     """
     moments = scene.moments or (1.0, 1.0, 1.0)
     return [
@@ -283,8 +254,7 @@ def _pushes(scene: Scene) -> list[tuple[float, float]]:
 def _turned(scene: Scene, span: float, largest: float) -> float:
     """Return the sum of the phases (rad) of all torque waves over the time `span` (s).
 
-    The phase of a wave counts at most as the omega that the wave can add, divided by `largest`, the
-    largest |omega| (rad/s). Therefore a wave that hardly changes omega hardly contributes.
+    The phase of a wave is at most the omega that it can add, relative to `largest` (rad/s).
     """
     found = 0.0
     for push, frequency in _pushes(scene):

@@ -30,17 +30,15 @@ _ALONE = {"LSODA": threading.RLock()}
 
 
 class NoNumberError(Exception):
-    """The exception for an integration that can't continue, for example with a NaN in Radau."""
+    """The exception for an integration that can't continue, as with a NaN in Radau."""
 
 
 class Run:
     """The integrations of one problem from 0 to `end` (s) by `solve_ivp`, with one work limit.
 
-    Preliminary integrations with few digits precede the main integration. The work limit applies to
-    the number of evaluations of the right-hand side in all of them. It is `most`, which includes
-    the factor `effort`. `start` is the state at time 0, and `slopes` is the right-hand side. The
-    first three components of the state are omega (rad/s). `rate` is the largest Euler coefficient;
-    its product with omega and time is the phase (rad). `name` is SciPy's name of the main method.
+    `most` limits the right-hand sides of preliminary and main integrations together. The first
+    components of the state `start` are omega (rad/s). `rate` is the largest Euler coefficient;
+    times omega and time it is the phase (rad).
     """
 
     def __init__(
@@ -61,9 +59,9 @@ class Run:
         self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Do nothing; a subclass may record the time (s) and the state of each accepted step.
+        """Do nothing; a subclass may record the time (s) and state of each accepted step.
 
-        The method is also called at the beginning, and at times inside the last step.
+        It is also called at the beginning, and at times inside the last step.
         """
 
     def solved(
@@ -78,11 +76,9 @@ class Run:
     ) -> Any:
         """Integrate by SciPy's method `name` and return SciPy's result object.
 
-        `relative` and `absolute` are the tolerances `rtol` and `atol` of `solve_ivp`, and `longest`
-        is the longest allowed step (s). The result contains the solution at `times` (s), or dense
-        output if `times` is None. Times in the result are in the unit of time `self.unit`, which is
-        a number of seconds. The integration begins with `state`, if given, at the time `begin`
-        (s). Raise NoNumberError if Radau's linear algebra refuses a number, or the time is NaN.
+        `relative` and `absolute` are its `rtol` and `atol`, `longest` and `begin` are in s, but
+        times in the result in `self.unit` seconds. Without `times`, it has dense output. Raise
+        NoNumberError if Radau's linear algebra refuses a number, or the time is NaN.
         """
         from scipy.integrate import solve_ivp
 
@@ -122,10 +118,7 @@ class Run:
                 ) from None
 
     def phase_error(self, time: float) -> TimedError:
-        """Return the exception for an integration that stopped at the largest phase.
-
-        `time` is the time at which it stopped, in the unit of time `self.unit`.
-        """
+        """Return the exception for the largest phase, reached at `time` in `self.unit`."""
         return TimedError(
             f"{self.label} stopped at t = {{time}} s: beyond {LARGEST_PHASE:.0e} radians the phase "
             "has hardly a digit left; use a shorter time",
@@ -159,11 +152,9 @@ class Run:
 def rows_of(
     times: Sequence[float], rows: Array, evaluations: int, steps: int, ended: str
 ) -> Trajectory:
-    """Return a trajectory from rows of omega, shape (n, 3), or of omega and attitude, (n, 7).
+    """Return a trajectory from rows of omega, shape (n, 3), or omega and attitude, (n, 7).
 
-    `times` (s) are the times of the rows. `evaluations` is the number of evaluations of the
-    right-hand side, and `steps` the number of steps. `ended` states how the integration ended, for
-    example ``complete``. The attitudes are normalised to unit quaternions.
+    Attitudes are normalised.
     """
     attitude = None
     if rows.shape[1] > 3:

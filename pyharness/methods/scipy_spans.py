@@ -1,8 +1,7 @@
 """The Taylor series of a recorded torque, beside an integration of it by SciPy.
 
-SciPy's methods see a torque only where they evaluate it, and may pass a short change of it. Where
-their results differ from the series, its steps, which are as short as the torque demands, bound
-theirs.
+SciPy's methods may pass a short change of the torque. Where their results differ from the series,
+its steps bound theirs.
 """
 
 import math
@@ -49,10 +48,7 @@ def bounds_of(scene: Scene, end: float) -> list[float]:
 
 
 def series_beside(scene: Scene, times: Sequence[float], tolerance: float) -> Beside | None:
-    """Return the series of a scene with a recorded torque; None if it does not reach the end.
-
-    `times` (s) are in order away from 0.
-    """
+    """Return the series of a recorded torque at `times` (s); None if it does not reach the end."""
     end, bounds = times[-1], bounds_of(scene, times[-1])
     attitude = scene.attitude is not None
     rows = [[*scene.omega, *(scene.attitude or ())]] if times[0] == 0.0 else []

@@ -2,10 +2,9 @@
 
 DOP853 is compiled if the torque is a compiled function.
 
-SciPy controls the local error of each step, whereas a tolerance of this project limits the error at
-the requested times. How a torque of the state adds up and amplifies local errors is unknown.
-Therefore the scene is integrated repeatedly with smaller and smaller local tolerances, until the
-difference of two integrations shows that the second meets the tolerance.
+How such a torque adds up and amplifies local errors is unknown. Therefore the scene is integrated
+with smaller and smaller local tolerances, until the difference of two integrations shows that the
+second meets the tolerance.
 """
 
 import math
@@ -70,7 +69,7 @@ _COMPILED_WORK = 0.05
 
 
 class _Rows(NamedTuple):
-    """The results of one integration: the state at the first times, as far as it was computed."""
+    """The states at the first of the requested times, as far as one integration reached."""
 
     state: Array  # shape (n, 3) or (n, 7): omega, and the attitude as a unit quaternion
     is_complete: bool  # whether there is a row for each time
@@ -85,17 +84,16 @@ def solve_state(
     effort: float,
     most: float,
 ) -> Trajectory:
-    """Return the trajectory of a scene whose torque depends on the state, by a method of SciPy.
+    """Return the trajectory of a scene whose torque depends on the state, by SciPy's `name`.
 
-    `name` is SciPy's name of the method, such as DOP853. The error at `times` (s), estimated from
-    the difference of two integrations, is at most `tolerance`: omega relative to the largest
-    |omega|, and the attitude as an angle (rad). `effort` is the factor on the work limit, and
-    `most` is the limit in right-hand sides of a body without torque. The trajectory ends early,
-    with the ending ``overflow``, before a time at which omega grows without bound or the torque is
-    singular. Its ending is ``unchecked`` if the series of a recorded torque, with which it is
-    compared, does not reach the last time. Raise InputError if an opaque function raises an
-    exception, if the torque needs an attitude that the scene does not have, or if the tolerance or
-    the work limit can't be met.
+    The error at `times` (s), from the difference of two integrations, is at most `tolerance`: omega
+    relative to the largest |omega|, the attitude as an angle (rad). `most` is the work limit, in
+    right-hand sides of a body without torque, to be multiplied by `effort`.
+
+    The trajectory ends with ``overflow`` before omega grows without bound or the torque is
+    singular, and is ``unchecked`` if the series of a recorded torque does not reach the last time.
+    Raise InputError if an opaque function fails, the attitude is missing, or the tolerance or work
+    limit can't be met.
     """
     run = _StateRun(scene, times[-1], name, effort, most)
     nothing = np.empty((0, len(run.start)))
@@ -151,11 +149,7 @@ def _check_attitude(scene: Scene) -> None:
 
 
 def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
-    """Return an estimate of the smallest tolerance that a method of SciPy can meet until `time`.
-
-    The torque of the scene depends on the state, and `time` is in s. `name` and `most` are those of
-    `solve_state`. The estimate is 0 if the method does not reach the end.
-    """
+    """Return an estimate of the smallest tolerance to `time` (s); 0 if the end is not reached."""
     run = _StateRun(scene, time, name, 1.0, most)
     scale = 0.0 if run.is_singular() else run.expected_omega()
     if scale == 0.0:
@@ -169,8 +163,8 @@ def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
 def _refined(run: "_StateRun", times: Sequence[float], tolerance: float, scale: float) -> _Rows:
     """Return the results of an integration whose estimated error is at most `tolerance`.
 
-    `scale` is an estimate of the largest |omega| (rad/s). Raise InputError if no local tolerance
-    is small enough.
+    `scale` is the largest |omega| (rad/s), estimated. Raise InputError if no local tolerance
+    suffices.
     """
     local = max(tolerance / _FIRST[run.name], _RATIO * FINEST_STEP)
     before, ratio = run.rows(times, local, scale), _RATIO
@@ -204,10 +198,7 @@ def _allowed(error: float) -> str:
 
 
 def _difference(before: _Rows, after: _Rows) -> float:
-    """Return the largest difference of two integrations at the times that both reached.
-
-    Omega is relative to the largest |omega|, and the attitude is an angle (rad).
-    """
+    """Return the largest difference at common times, omega relative, attitude as an angle (rad)."""
     n = min(len(before.state), len(after.state))
     return float(_differences(before, after, n).max(initial=0.0))
 
@@ -236,10 +227,7 @@ def _agreeing(before: _Rows, after: _Rows, tolerance: float) -> _Rows:
 
 
 class _StateRun(Run):
-    """The integrations of one scene with a torque that depends on the state.
-
-    The time reached and the largest |omega| are recorded after each step.
-    """
+    """The integrations of one scene; time reached and largest |omega| are kept after each step."""
 
     def __init__(self, scene: Scene, end: float, name: str, effort: float, most: float) -> None:
         torque = scene.torque
@@ -285,7 +273,7 @@ class _StateRun(Run):
     def _guarded(self, slopes: RightHandSide, is_compiled: bool) -> RightHandSide:
         """Return a right-hand side that raises InputError if an opaque function fails.
 
-        It records the time of a NaN, which is no failure if SciPy passes it by shorter steps.
+        It keeps the time of a NaN, which is no failure if SciPy passes it by shorter steps.
         """
 
         def guarded(time: float, state: Sequence[float]) -> list[float]:
@@ -331,10 +319,7 @@ class _StateRun(Run):
                 self._undefined = None
 
     def is_singular(self) -> bool:
-        """Return whether a rate at time 0 is not finite.
-
-        SciPy's choice of the first step would then not return.
-        """
+        """Return whether a rate at time 0 is not finite; SciPy's first step would never end."""
         self.evaluations += 1
         with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
             return not all(map(math.isfinite, self.slopes(0.0, self.start)))
@@ -342,8 +327,8 @@ class _StateRun(Run):
     def expected_omega(self) -> float:
         """Integrate with few digits, and return an estimate of the largest |omega| (rad/s).
 
-        If the integration does not reach the end, the estimate is the initial |omega|, or that
-        which the initial torque causes. The result is 0 for a body that remains at rest.
+        Where that ends early, it is the initial |omega|, or what the initial torque causes; 0 at
+        rest.
         """
         scale = max(map(abs, self.start[:3])) or self._pushed()
         for _ in range(_MOST_GUESSES):
@@ -365,10 +350,9 @@ class _StateRun(Run):
         return omega if 0.0 < omega < math.inf else 1.0
 
     def rows(self, times: Sequence[float], local: float, scale: float) -> _Rows:
-        """Return the state at `times` (s), integrated with the local tolerance `local`.
+        """Return the state at the first of `times` (s), by the local tolerance `local`.
 
-        The local tolerance is relative to `scale` (rad/s) for omega. There are fewer rows if the
-        integration ends before the last time.
+        It is relative to `scale` (rad/s) for omega.
         """
         self._integrations += 1
         sizes = [local * scale] * 3 + [local] * (len(self.start) - 3)

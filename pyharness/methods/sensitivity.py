@@ -29,13 +29,10 @@ _LITTLE_WORK = 5e-3
 
 
 def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
-    """Return whether rounding errors, amplified by the motion, are too large for the tolerance.
+    """Return whether amplified rounding errors exceed 0.3 times the tolerance.
 
-    The amplified rounding error is the unit roundoff times `growth` times (1 + `noise`). It is too
-    large if it exceeds 0.3 times `tolerance`, the largest allowed error relative to the largest
-    |omega|. `growth` is the error amplification of the motion, and `noise` is the rounding error of
-    the torque divided by the rounding error of omega. If `growth` is None, which means unknown, the
-    result is False.
+    They are the unit roundoff times `growth` times (1 + `noise`), the ratio of the rounding error
+    of the torque to that of omega. An unknown `growth` of None gives False.
     """
     return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
 
@@ -49,14 +46,11 @@ def torque_noise(
 ) -> float:
     """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
 
-    The rounding error of such terms is relative to each term, not to their small sum. The ratio is
-    therefore estimated as a quotient of two angular velocities. The numerator is the sum of those
-    that each term of the torque law alone would cause until `t_end` (s). It includes a contribution
-    for the rounding of the terms in each of `steps` steps. The denominator is `scale`, the largest
-    |omega| (rad/s). If `scale` is None, the denominator is the larger of the initial |omega|, from
-    `omega0` (rad/s), and the omega that the whole torque causes. If the terms do not nearly cancel,
-    the result is 0. It is also 0 if the torque depends on the state, because the terms of such a
-    torque are unknown.
+    The rounding error is relative to each term, not to their small sum. The ratio is that of the
+    omegas which the terms would cause alone until `t_end` (s), with their rounding in each of
+    `steps` steps, to `scale`, the largest |omega| (rad/s), by default the initial |omega| or that
+    by the whole torque. It is 0 if the terms do not nearly cancel, and under a torque that depends
+    on the state, whose terms are unknown.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0
@@ -72,11 +66,9 @@ def closed_form_estimate(
 ) -> tuple[float | None, float | None]:
     """Return the estimated error of a closed form at `t_end` (s), and the error amplification.
 
-    `omega0` is the initial omega (rad/s). The error of omega is relative to the largest |omega|
-    from 0 to `t_end`. For a scene with an attitude the estimate includes the error of the
-    attitude's angle (rad). `noise` is the rounding error of the torque divided by the rounding
-    error of omega, as `torque_noise` returns it. If the error amplification is unknown, for example
-    because the scene has no closed form, both results are None.
+    The error is that of omega relative to the largest |omega| so far, with an attitude also that of
+    its angle (rad). `noise` is that of `torque_noise`. Both are None if the amplification is
+    unknown.
     """
     growth: float | None = 1.0
     # A sphere does not amplify perturbations.
@@ -93,13 +85,10 @@ def closed_form_estimate(
 
 
 def motion_growth(scene: Scene, t_end: float) -> float | None:
-    """Return the error amplification of a scene's motion from time 0 to `t_end` (s).
+    """Return the error amplification of a motion from time 0 to `t_end` (s), or None if unknown.
 
-    The error amplification is a property of the motion and does not depend on the method that
-    solves the scene. It is the largest norm of the state-transition matrices, the derivatives of
-    omega at the end with respect to omega at any earlier time. It is computed from the closed form
-    if the scene has one, else by a Taylor series with few digits. The result is None if neither can
-    determine it.
+    It is the largest norm of the derivatives of the last omega with respect to an earlier one, from
+    the closed form, else from a Taylor series with few digits.
     """
     if isinstance(scene.torque, StateTorque):
         return _recorded_growth(scene, t_end)

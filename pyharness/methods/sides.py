@@ -22,12 +22,10 @@ def in_reverse(found: Trajectory) -> Trajectory:
 
 
 def joined(before: Trajectory, after: Trajectory) -> Trajectory:
-    """Return the results of a backward and a forward integration from time 0 as one trajectory.
+    """Return a backward and a forward integration from time 0 as one trajectory.
 
-    `before` is the trajectory at negative times, with its rows in ascending order of time, and
-    `after` is the trajectory from time 0. Steps and evaluations are added. The error and the error
-    amplification are the larger of the two values, and the ending is the worse of the two, where an
-    overflow is the worst.
+    `before` is in ascending order of time. Steps and evaluations are added; error and amplification
+    are the larger, and the ending is the worse, an overflow the worst.
     """
     both = before, after
     rows: dict[str, Any] = {

@@ -20,8 +20,7 @@ _UNBOUNDED = 1e6
 class SingularError(TimedError):
     """The exception for a time at which no step of a series is short enough.
 
-    `what` says which operation of the torque is not defined; it is None if omega or the torque
-    becomes infinite.
+    `what` is the undefined operation; None if omega or the torque becomes infinite.
     """
 
     def __init__(self, what: str | None, time: float) -> None:
@@ -41,9 +40,8 @@ def undefined_operation(
 ) -> str | None:
     """Return what is not defined at the end of an integration, and what to write instead.
 
-    `begin` and `end` are the inputs of the tape where the integration begins and where it ends, and
-    `before` those where its last step began. The result is None if omega or a quotient becomes
-    infinite.
+    The three are inputs of the tape where the integration begins, where its last step began, and at
+    the end. The result is None if omega or a quotient becomes infinite.
     """
     first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))
     if last > _UNBOUNDED * (first or 1.0):

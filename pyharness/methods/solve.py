@@ -1,7 +1,7 @@
 """The function `solve`, which computes the trajectory of a scene at given times by any method.
 
-It sorts the times, so that a method integrates from time 0 in one direction only. It also rescales
-time, so that products of two components of omega neither overflow nor underflow.
+It integrates from time 0 in each direction, and rescales time, so that products of two components
+of omega neither overflow nor underflow.
 """
 
 import itertools
@@ -65,63 +65,55 @@ def solve(
     Parameters
     ----------
     scene : Scene
-        The scene to solve. Only methods with a fixed step use its step size.
+        The scene. Only methods with a fixed step use its step size.
     times : float or iterable of float, shape (n,)
-        Times of the results (s), strictly monotonic. If there are times on both sides of 0, the
-        scene is solved twice, from 0 backward and from 0 forward.
+        Times of the results (s), strictly monotonic, on one or both sides of 0.
     method : str
         A name in `pyharness.methods.registry.METHODS`.
     tolerance : float
-        Largest allowed error of any component of omega at `times`, relative to the largest
-        component from 0 to the last time. The default depends on the method (`Method.default` in
-        the registry); it is 1e-12 for `auto`. The trajectory's `tolerance` reports the value. A
-        method with a fixed step takes no tolerance.
+        Largest allowed error of a component of omega at `times`, relative to the largest component
+        from 0 to the last time. The default depends on the method, 1e-12 for `auto`; the
+        trajectory's `tolerance` reports it. A method with a fixed step takes none.
     effort : float
         Factor on the work limit; 1 means some ten seconds.
     attitude : bool
-        Whether the attitude is computed too. At time 0 it is the attitude of the scene. If the
-        scene has none, the body's axes are parallel to the axes of space at time 0. The tolerance
-        then also applies to the attitude's angle (rad). A torque that depends on the attitude, or
-        is about the axes of space, requires the attitude.
+        Whether the attitude is computed too, from that of the scene, or from axes parallel to those
+        of space. The tolerance then also applies to its angle (rad). A torque that depends on the
+        attitude, or is about the axes of space, requires it.
     dense_output : bool
-        Whether the attribute `sol` of the trajectory is the solution as a function of time, from 0
-        to the last of `times` on each side of 0. The tolerance then also applies between `times`.
-        The function consists of polynomials through more results of the method, which take further
-        integrations. For a method with a fixed step it is a cubic polynomial on each step.
+        Whether `sol` of the trajectory is the solution as a function of time, from 0 to the last of
+        `times` on each side of 0, within the tolerance. It consists of polynomials, which take
+        further integrations; with a fixed step, of a cubic on each step.
     events : callable, Event, or list of these
         Functions of `(t, omega)` or `(t, omega, attitude)`, whose roots from time 0 to the last of
-        `times` on each side of 0 are found; ready ones are in `pyharness.events`. A function may
-        have the attributes `terminal` and `direction`, as in SciPy's `solve_ivp`. It is called with
-        arrays of many times if it accepts them. The attributes `t_events` and `y_events` of the
-        trajectory are the events. Rows after a terminal event are removed.
+        `times` on each side of 0 become `t_events` and `y_events`; ready ones are in
+        `pyharness.events`. The attributes `terminal` and `direction` are those of SciPy's
+        `solve_ivp`; rows after a terminal event are removed. Functions that accept arrays of many
+        times are called with them.
     sensitivities : iterable of str
-        Names of parameters; the attribute `sensitivities` of the trajectory has the derivatives of
-        omega, and of the attitude's quaternion if it is computed, with respect to each. Names are
-        `omega0`, the initial omega; `moments`, `coefficients`, or `inertia`, whose columns are I11,
-        I22, I33, I12, I13, I23; `attitude`, small rotations (rad) of the initial attitude about the
-        three body axes; and for the torque, `torque.NAME`. NAME is a constant of the expressions in
-        a scene file, or a keyword argument of a function, with a number as its default, or
-        `constant`, `rate`, `sines`, `cosines` of a TorqueLaw; a wave has four columns, its
-        amplitude and its frequency. They are computed by Taylor series for the methods `auto`,
-        `taylor` and `closed-form`.
+        Names of parameters; `sensitivities` of the trajectory has the derivatives of omega, and of
+        the quaternion, with respect to each: `omega0`; `moments`, `coefficients`, or `inertia`
+        (columns I11, I22, I33, I12, I13, I23); `attitude`, small initial rotations (rad) about the
+        body axes; `torque.NAME`, with NAME a constant of a scene file's expressions, a keyword
+        argument of a function with a number as its default, or `constant`, `rate`, `sines`,
+        `cosines` of a TorqueLaw (four columns a wave: amplitude, frequency). They need the method
+        `auto`, `taylor` or `closed-form`.
 
     Returns
     -------
     Trajectory
-        One row per time, in the order of `times`. If omega overflows at a positive or negative
-        time, there are no rows beyond the overflow in that direction. `steps` and `evaluations`
-        are totals of the integrations in both directions. Under a torque about the axes of space,
-        `error` is estimated from the difference of two integrations, and `growth` is None.
+        One row per time, in the order of `times`, none beyond an overflow. `steps` and
+        `evaluations` are totals. Under a torque about the axes of space, `error` is the difference
+        of two integrations, and `growth` is None.
 
     Raises
     ------
     InputError
         If the method is unknown, or can't take the scene or propagate its attitude; if a torque
-        that needs the attitude comes without it; if the times are not in order; if a moment that
-        changes with time reaches 0 before a time; if the method can't meet the tolerance, or needs
-        more work for it than `effort` allows; if dense output would need too many polynomials; if
-        an event is not a function with the right arguments, or does not return finite numbers; if a
-        parameter is unknown, or sensitivities can't be computed.
+        comes without the attitude it needs; if the times are not in order; if a moment that changes
+        with time reaches 0; if the method can't meet the tolerance within `effort`; if dense output
+        needs too many polynomials; if an event has other arguments or results; if a parameter is
+        unknown, or sensitivities can't be computed.
     NotBuiltError
         If the method needs the extension, and it is not built.
 
@@ -208,18 +200,15 @@ def solve(
 def _more_rows(
     scene: Scene, method: str, effort: float, attitude: bool, times: Array, tolerance: float
 ) -> Trajectory:
-    """Return a trajectory of a scene; a tolerance of 1 is that of a method with a fixed step."""
+    """Return a trajectory; a tolerance of 1 stands for a method with a fixed step."""
     return solve(scene, times, method, tolerance, effort=effort, attitude=attitude)
 
 
 def finest(method: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method of the registry can meet from 0 to `time` (s).
 
-    For most methods this tolerance does not depend on the scene and is the constant `Method.finest`
-    of the registry. Methods of SciPy's `solve_ivp` accept no local tolerance below some 2e-14.
-    Their smallest tolerance exceeds this constant if many local errors add up or if the motion
-    amplifies them. Raise InputError if too many steps would be needed to determine their smallest
-    tolerance.
+    It is `Method.finest`, but for SciPy's methods more if many local errors, none below some 2e-14,
+    add up or are amplified. Raise InputError if to find it takes too many steps.
     """
     claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:
@@ -232,11 +221,9 @@ def finest(method: str, scene: Scene, time: float) -> float:
 def by_plan(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the trajectory at `times` (s) by the method that `plan` chooses for the scene.
+    """Return the trajectory at `times` (s) by the method that `plan` chooses, or by its fallback.
 
-    This function is the method `auto`. If the chosen method raises InputError, the second method
-    that `plan` names (`fallback`) solves the scene. `tolerance` is the largest allowed error,
-    relative to the largest |omega|. `effort` multiplies the work limit of some ten seconds.
+    This is the method `auto`. The fallback is used if the first method raises InputError.
     """
     chosen = plan(scene, "auto", tolerance, rows=True)
     method = METHODS[chosen.method]
@@ -256,13 +243,7 @@ def by_plan(
 def _integrate(
     chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float
 ) -> Trajectory:
-    """Return the trajectory by the method `chosen` at `times` (s), all on one side of 0.
-
-    If necessary, the scene is solved in another unit of time, in which products of two components
-    of omega neither overflow nor underflow. The trajectory is converted back to seconds.
-    `tolerance` is the largest allowed error, relative to the largest |omega|. `effort` multiplies
-    the work limit of some ten seconds.
-    """
+    """Return the trajectory at `times` (s), on one side of 0, solved in a suitable unit of time."""
     if not chosen.is_fixed_step and not is_ordinary(scene.omega):
         # The method does not use the step size, but in the new unit it might not be finite.
         scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
@@ -281,10 +262,9 @@ def _integrate(
 
 
 def _ascending(times: object) -> tuple[list[float], bool]:
-    """Return a user's times (s) in ascending order, and whether they had to be reversed.
+    """Return a user's times (s) in ascending order, and whether they were reversed.
 
-    `times` is a number or an iterable of numbers. Raise InputError unless the numbers are finite
-    and strictly monotonic, and at least one is given.
+    Raise InputError unless they are finite, strictly monotonic, and at least one.
     """
     if _are_ascending_floats(times):
         return times.tolist(), False  # type: ignore[attr-defined]
@@ -312,10 +292,7 @@ def _ascending(times: object) -> tuple[list[float], bool]:
 
 
 def _are_ascending_floats(times: object) -> bool:
-    """Return whether times are an array that needs no further check.
-
-    Dense output requests many times in such arrays.
-    """
+    """Return whether times are an array, as dense output requests, that needs no further check."""
     return (
         isinstance(times, np.ndarray)
         and (times.dtype, times.ndim) == (np.float64, 1)

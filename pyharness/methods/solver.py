@@ -48,31 +48,26 @@ _FEW_WAVES = 16  # fewer waves than this take less time than releasing the GIL
 class Solver(LastCall, BoundKernel):
     """A solver of a scene, prepared for one method by `prepare`.
 
-    Call it as ``solver(omega0, t_end)``. `omega0` is the initial angular velocity, three real
-    numbers (rad/s). `t_end` is the final time in seconds, positive, negative or 0. A call returns
-    the angular velocity at `t_end` (rad/s) as a new array of shape (3,).
-    ``solver(omega0, t_end, out=array)`` writes the result into a contiguous array of three floats,
-    which may be `omega0` itself, and returns this array. An argument of another type or shape
-    raises an InputError, and `out` is not changed. Calls are fastest if `omega0` is an array of
-    floats.
+    Call it as ``solver(omega0, t_end)``: three numbers (rad/s), and the final time (s), positive,
+    negative or 0. It returns omega at `t_end` (rad/s) as a new array of shape (3,), or in the
+    contiguous array `out` of three floats, which may be `omega0`. Other arguments raise an
+    InputError and leave `out` unchanged. Calls are fastest with an array of floats.
 
-    If the kernel could not finish, the result is NaN and `status` states the reason. The same
-    applies if `omega0` or `t_end` is not finite. `error`, `growth` and `digits` report the accuracy
-    of the last result.
+    If the kernel could not finish, or an argument is not finite, the result is NaN and `status` has
+    the reason.
 
-    Threads may share a solver and call it at the same time. The kernel releases the interpreter's
-    lock (GIL), unless the solution takes less time than releasing the lock, as a closed form does.
-    Solvers can be copied and pickled. A copy does not contain the status of the last call.
+    Threads may share a solver. The kernel releases the interpreter's lock (GIL), unless the
+    solution takes less time than that. Solvers can be copied and pickled, without the status of the
+    last call.
 
     Attributes
     ----------
     plan : Plan
-        The chosen method, and the parts of the computation that are carried out, with reasons.
+        The chosen method, and the parts that are computed, with reasons.
     status, error, growth, digits, steps, method
-        Reports on this thread's last call: how it ended, its estimated error, its error
-        amplification, its number of correct digits, its number of steps and its method.
+        Reports on this thread's last call.
     many : callable
-        A function that solves the scene from many initial angular velocities in one call.
+        A function that solves from many initial angular velocities in one call.
 
     Examples
     --------
@@ -90,11 +85,9 @@ class Solver(LastCall, BoundKernel):
     # The base class binds a kernel to its data in C. A call goes from the interpreter into the
     # kernel without Python code in between, which would take as long as an easy solution.
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
-        """Create a solver and pack the data that all calls share; users call `prepare` instead.
+        """Create a solver and pack what all calls share; users call `prepare` instead.
 
-        `chosen` is the plan: the scene, and the chosen method. `tolerance` is the largest allowed
-        error, relative to the largest |omega|. `asked` is the name of the requested method, such as
-        `auto`. `effort` multiplies the work limit of a call.
+        `asked` is the name of the requested method, such as `auto`.
         """
         kernel = extension().solve_packed
         packed = packed_scene(chosen.scene, _code(chosen), tolerance, effort)
@@ -114,14 +107,11 @@ class Solver(LastCall, BoundKernel):
     def many(self) -> "ManyStarts":
         """Return the function that solves many initial omegas in one call.
 
-        Call it as ``solver.many(omega0, t_end, threads=1, out=None)``. `omega0` (rad/s) has shape
-        (n, 3). `t_end` (s) is one number or has shape (n,). A call returns two arrays. The first is
-        omega at `t_end` (rad/s), shape (n, 3), which is written into `out` if that is not None. The
-        second contains the statuses, int8, shape (n,), with the values that `Ensemble` documents.
-        The result of a row depends only on its own initial omega and time, and not on the other
-        rows or on the number of threads. It meets the same tolerance as a call of the solver, but
-        its rounding errors differ, even if there is only one row. An argument of another type or
-        shape raises an InputError.
+        Call it as ``solver.many(omega0, t_end, threads=1, out=None)``, with `omega0` (rad/s) of
+        shape (n, 3), and `t_end` (s) a number or of shape (n,). It returns omega (rad/s), shape (n,
+        3), in `out` if that is not None, and the statuses, int8, shape (n,), as in `Ensemble`. A
+        row does not depend on the others or on the number of threads; it meets the tolerance, but
+        its rounding differs from a single call's. Other arguments raise an InputError.
         """
         from pyharness._many import ManyStarts
 
@@ -132,9 +122,8 @@ class Solver(LastCall, BoundKernel):
     def method(self) -> str:
         """Return the name of the method that solved the scene in this thread's last call.
 
-        It is the method for which the solver was prepared (`plan.method`), with two exceptions. The
-        kernel may have chosen between the methods `quick` (Runge-Kutta) and `taylor`. Or the closed
-        form did not apply to the motion, and the kernel used the method `plan.fallback`.
+        It is `plan.method`, unless the kernel chose between `quick` and `taylor`, or used
+        `plan.fallback` because the closed form did not apply.
         """
         steps = self._counted()
         if not steps:
@@ -145,11 +134,9 @@ class Solver(LastCall, BoundKernel):
 
 
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
-    """Convert the arguments of a solver call if the C function can't read their types.
+    """Return `omega0` (rad/s) and `t_end` (s) as floats if the C function can't read their types.
 
-    Return the three numbers of `omega0` (rad/s) as floats, and `t_end` (s) as a float. Raise
-    InputError if `omega0` is not three real numbers, if `t_end` is not a real number, or if three
-    floats can't be written into `out`.
+    Raise InputError if they, or `out`, are of a wrong type or shape.
     """
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     if out is not None and (found := no_buffer(out)):
@@ -158,10 +145,7 @@ def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
 
 
 def no_buffer(out: object) -> str:
-    """Return the reason why three floats can't be written into `out`; empty if they can.
-
-    The reason is a text that describes `out` for a message, for example by its type and shape.
-    """
+    """Return a text that describes `out` if three floats can't be written into it, else ""."""
     if not isinstance(out, np.ndarray):
         try:
             return reprlib.repr(out)
@@ -176,11 +160,7 @@ def no_buffer(out: object) -> str:
 
 
 def _code(chosen: Plan) -> int:
-    """Return the integer that selects the chosen method in the compiled kernel.
-
-    `chosen` is the plan, which names the method. The integers are defined in
-    `pyharness.model.codes.Methods`.
-    """
+    """Return the integer of `pyharness.model.codes.Methods` for the chosen method."""
     if is_recorded(chosen.scene):
         return Methods.TAPE
     if chosen.closed_form == "sphere":

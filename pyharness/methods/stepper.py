@@ -32,36 +32,34 @@ class Stepper:
     """A motion that is computed step by step by Taylor series.
 
     It is for simulations in which something happens between the steps: a controller changes its
-    torque, a mass is released, an impact changes omega. If nothing does, `pyharness.solve` is
-    faster, and estimates its error.
+    torque, a mass is released, an impact changes omega. Otherwise `pyharness.solve` is faster, and
+    estimates its error.
 
     Parameters
     ----------
     scene : Scene
-        The body, its torque and its omega at time 0. Its moments or its inertia do not change with
-        time, and its torque is not opaque.
+        The body, its torque and its omega at time 0. Moments or inertia do not change with time,
+        and the torque is not opaque.
     tolerance : float, optional
         The largest error of a step: of a component of omega, relative to the largest |omega| so
         far, and of the attitude's angle (rad). Default is 1e-9.
     attitude : bool, optional
-        Whether the attitude is computed too. It begins with that of the scene, or with (1, 0, 0,
-        0). A torque that depends on the attitude, or is about the axes of space, requires it.
+        Whether the attitude is computed, from the scene's or (1, 0, 0, 0). A torque that depends on
+        it, or is about the axes of space, requires it.
 
     Attributes
     ----------
     time : float
         The time (s); 0 at first.
     omega : ndarray, shape (3,)
-        The angular velocity (rad/s) at this time. It may be set.
+        The angular velocity (rad/s). It may be set.
     attitude : ndarray, shape (4,), or None
-        The quaternion from body to space at this time, scalar first. It may be set.
+        The quaternion from body to space, scalar first. It may be set.
     held_torque : ndarray, shape (3,)
-        A torque about the body axes (N m) that is added to that of the scene and held until it is
-        set again, even if the scene is; 0 at first. For a scene with Euler coefficients instead of
-        moments it is an angular acceleration (1/s^2).
+        A torque about the body axes (N m; with Euler coefficients an acceleration, 1/s^2), added to
+        that of the scene and held until it is set again, even if the scene is; 0 at first.
     scene : Scene
-        The scene. Another one may be set, with another torque or body; time, omega and attitude
-        continue.
+        The scene. Another one may be set; time, omega and attitude continue.
     steps : int
         The number of steps so far.
 
@@ -141,7 +139,7 @@ class Stepper:
 
     @property
     def attitude(self) -> Array | None:
-        """The quaternion from body to space, scalar first, shape (4,); None if not computed."""
+        """The quaternion from body to space, scalar first, shape (4,), or None."""
         return _fixed(self._state[3:7]) if self._n == 7 else None
 
     @attitude.setter
@@ -162,9 +160,9 @@ class Stepper:
     def step(self, longest: float = math.inf) -> float:
         """Take one step, as long as the tolerance allows, and return the new time (s).
 
-        `longest` is the longest step that is allowed (s); a negative one leads to earlier times. A
-        step ends where a table of the torque changes. Raise InputError if `longest` is too small to
-        change the time, or not a number, and if the motion or its torque is singular.
+        `longest` is the longest step (s); a negative one leads to earlier times. A step ends where
+        a table of the torque changes. Raise InputError if `longest` is too small to change the
+        time, or not a number, and if the motion or its torque is singular.
         """
         longest = number("longest", longest)
         end = self._time + longest
@@ -208,10 +206,7 @@ class Stepper:
             scale, self._trial = reached, abs(taken.h)
 
     def until(self, time: float) -> None:
-        """Take steps until `time` (s), which is later or earlier than now.
-
-        Raise InputError if `time` is not a finite number, and as `step` does.
-        """
+        """Take steps to `time` (s), later or earlier; raise InputError as `step` does."""
         end = finite("time", time)
         while self._time != end:
             self.step(end - self._time)
@@ -220,11 +215,10 @@ class Stepper:
                 self._time = end
 
     def at(self, times: float | Sequence[float] | Array) -> Array:
-        """Return the state at times (s) within the last step.
+        """Return the state at times (s) within the last step, before anything was set.
 
-        One time gives omega (rad/s), shape (3,), or omega and the quaternion, shape (7,). n times
-        give one column for each time. What was set after the step is not included. Raise
-        InputError for a time outside the last step.
+        It is omega (rad/s), shape (3,), or with the quaternion, shape (7,); one column for each of
+        n times. Raise InputError for a time outside the step.
         """
         try:
             given: Array = np.asarray(times, dtype=float)
@@ -293,9 +287,9 @@ class Stepper:
 def steps_to(
     scene: Scene, attitude: bool, end: float, tolerance: float, most: int = _MOST_STEPS
 ) -> Iterator[tuple[float, Stepper]]:
-    """Yield the time (s) at which a step of a Taylor series begins, and the stepper after it.
+    """Yield the time (s) at which each step from 0 to `end` begins, and the stepper after it.
 
-    The steps go from time 0 to `end`. They end before a singularity, and after `most` steps.
+    They end before a singularity, and after `most` steps.
     """
     stepper = Stepper(with_constant_body(scene), max(tolerance, _FINEST), attitude=attitude)
     with suppress(SingularError):
@@ -308,7 +302,7 @@ def steps_to(
 def step_lengths(
     scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
 ) -> dict[float, float]:
-    """Return the lengths (s) of the steps of a Taylor series from time 0 to `end`, by their ends.
+    """Return the lengths (s) of the steps from 0 to `end`, by their ends.
 
     Steps that end at one of the `bounds`, which may have cut them, are not included.
     """
@@ -321,7 +315,7 @@ def step_lengths(
 
 
 def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
-    """Return a trajectory from 0 to `end` (s), with the reason if its torque is not defined."""
+    """Return a trajectory to `end` (s), with the reason if its torque is not defined."""
     if found.ended != "overflow" or not is_recorded(scene):
         return found
     try:
@@ -337,9 +331,9 @@ def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
 
 
 def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
-    """Return the equations of motion as a tape.
+    """Return the tape of the equations of motion.
 
-    Their unknowns are omega, the attitude if it is computed, and a further torque, which is held.
+    Its unknowns are omega, the attitude if computed, and the held torque.
     """
     n = 7 if attitude else 3
     recorder = Recorder(2 * MOST_OPERATIONS, n + 4)
@@ -366,12 +360,12 @@ def _three(name: str, values: object) -> tuple[float, ...]:
 
 
 def _fixed(values: Array) -> Array:
-    """Return a copy that can't be changed, because a change of it would not change the motion."""
+    """Return a copy that can't be changed; a change would not change the motion."""
     found = values.copy()
     found.setflags(write=False)
     return found
 
 
 def _normalised(q: Array) -> Array:
-    """Return quaternions with norm 1, shape (4,) or (4, n); or none of them, shape (0,)."""
+    """Return quaternions with norm 1, shape (4,) or (4, n); for no attitude, shape (0,)."""
     return q / np.sqrt(np.sum(q * q, axis=0)) if len(q) else q

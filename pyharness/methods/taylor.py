@@ -18,17 +18,11 @@ from pyharness.model.trajectory import Array, Trajectory
 def taylor(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the trajectory of a scene at `times` (s) by Taylor series.
+    """Return the trajectory of a scene at `times` (s) by Taylor series, repeated if inaccurate.
 
-    The attitude is computed too if the scene has one. `tolerance` is the largest allowed error,
-    relative to the largest |omega|. `effort` multiplies the work limit of some ten seconds. If the
-    error of the first integration is too large, the scene is integrated again.
-
-    In the trajectory, `steps` is the number of steps of the last integration. `evaluations` is the
-    number of steps of all integrations, because each step computes one Taylor series. Under a
-    torque about the axes of space there are at least two integrations, the later ones with a
-    smaller local tolerance. The difference of the integrations is the estimate of the error, and
-    the error amplification (`growth`) is unknown.
+    `steps` are those of the last integration, `evaluations` those of all, one series each. Under a
+    torque about the axes of space, two or more integrations with decreasing local tolerances differ
+    by the estimated error, and `growth` is unknown.
 
     Raise InputError for an opaque torque, and if the work limit is exceeded.
     """
@@ -59,9 +53,7 @@ def taylor(
 def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:
     """Return the name of the kernel that solves a scene by Taylor series, and its first arguments.
 
-    The arguments are arrays of the body's coefficients and of the torque. The kernel depends on
-    whether the torque depends on the state, or else on the axes that it is about. Raise InputError
-    for an opaque torque.
+    Raise InputError for an opaque torque.
     """
     if isinstance(scene.torque, StateTorque):
         return "tape_rows", (kernel_tape(system(scene)),)

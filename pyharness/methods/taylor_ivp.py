@@ -38,42 +38,39 @@ class Taylor(OdeSolver):  # type: ignore[misc]
     """Integrate an ordinary differential equation y' = fun(t, y) by its Taylor series.
 
     It is a method of `scipy.integrate.solve_ivp`: ``solve_ivp(fun, t_span, y0, method=Taylor)``.
-    `fun` is called twice, with symbols in place of numbers, and its arithmetic is recorded; the
-    series are then computed by compiled code. The order, which follows from the tolerances, is
-    between 8 and 28. The dense output is the series itself.
+    `fun` is called twice, with symbols, and its arithmetic is recorded; compiled code computes the
+    series, whose order, 8 to 28, follows from the tolerances. The dense output is the series.
 
     Parameters
     ----------
     fun : callable
-        The right-hand side ``fun(t, y)``, where `t` is a number and `y` has shape (n,). It returns
-        n numbers. Its arithmetic is + - * /, integer powers, and sqrt, sin, cos, tan, exp, sinh,
-        cosh and tanh of NumPy, without any branch that depends on `t` or `y`. Up to 20,000
-        operations are recorded.
+        The right-hand side ``fun(t, y)``, with `y` of shape (n,), which returns n numbers. It
+        consists of + - * /, integer powers, and sqrt, sin, cos, tan, exp, sinh, cosh and tanh of
+        NumPy, without branches on `t` or `y`; up to 20,000 operations.
     t0 : float
         The time of the initial state.
     y0 : array_like, shape (n,)
-        The initial state, which is real.
+        The initial state, real.
     t_bound : float
-        The time at which the integration ends, before or after `t0`.
+        The end, before or after `t0`.
     max_step : float, optional
-        The longest step. Default is inf. Events are found between the ends of steps, so that two
-        roots of an event function within a step are missed, unless the step is made shorter.
+        The longest step. Default is inf. Events are found between the ends of steps; shorter ones
+        do not miss two roots within a step.
     rtol, atol : float or array_like, shape (n,), optional
-        Relative and absolute tolerances. The largest local error of component k of y in a step is
-        below ``atol[k] + rtol[k] * abs(y[k])``. A component that is 0 is compared with the largest
-        if `atol` is 0. Defaults are 1e-3 and 1e-6.
+        The local error of component k of y is below ``atol[k] + rtol[k] * abs(y[k])``. A component
+        that is 0 is compared with the largest if `atol` is 0. Defaults are 1e-3 and 1e-6.
     vectorized : bool, optional
-        Ignored, because `fun` is called only once.
+        Ignored.
     first_step : float, optional
-        The longest first step. By default it is chosen by the method.
+        The longest first step. By default the method chooses it.
     **extraneous : dict
-        Options of other methods, such as `jac`. They are ignored, with a warning.
+        Options of other methods, such as `jac`, ignored with a warning.
 
     Raises
     ------
     InputError
-        If `fun` can't be recorded or does not return n numbers, or if an option is not allowed. It
-        is a ValueError.
+        If `fun` can't be recorded or does not return n numbers, or an option is not allowed. It is
+        a ValueError.
     ValueError
         If `y0` is complex or not one-dimensional.
 
@@ -202,10 +199,7 @@ class _Series(DenseOutput):  # type: ignore[misc]
 
 
 def recorded_equation(fun: Callable[..., Any], n: int) -> Tape:
-    """Return the right-hand side ``fun(t, y)`` of n equations as a tape.
-
-    Raise InputError if it can't be recorded, or does not return n numbers.
-    """
+    """Return ``fun(t, y)`` of n equations as a tape; raise InputError if it can't be recorded."""
 
     def record(recorder: Recorder) -> Tape:
         time, *state = recorder.inputs()

@@ -15,9 +15,8 @@ LONGEST_TRIAL = 1e3
 class Step(NamedTuple):
     """A step that was taken, or tried: its length `h` is 0 if no step is short enough.
 
-    The sum of the time at its beginning and `h` is not rounded. `terms` are the terms of the
-    series, shape (order + 1, n); a term includes its power of `h`. `state` is their sum, the state
-    at the end, shape (n,). `expansions` counts the series that were computed for it.
+    `terms` are those of the series, shape (order + 1, n), with powers of `h`; `state` is their sum.
+    `expansions` counts the series that were computed.
     """
 
     h: float
@@ -37,10 +36,9 @@ def taylor_step(
 ) -> Step:
     """Return a step of the equation y' = tape(t, y) from the time `t` and the state, shape (n,).
 
-    `tape` is the array that `kernel_tape` returns. The step is as long as `tolerances` allow, shape
-    (n,): the largest errors of the components in this step. `relative` is the relative tolerance
-    that decides the order. `trial` is a first guess of the step, with the sign of `longest`, the
-    longest step that is allowed. A step as long as that ends at t + longest, which is rounded.
+    It is as long as `tolerances`, the largest errors of the components, allow; `relative` decides
+    the order. `trial` is a first guess, with the sign of the `longest` step, which ends at t +
+    longest, rounded.
     """
     h, terms, end, order, expansions, status = extension().tape_step(
         tape, t, state, tolerances, relative, trial, longest, _N_TERMS

@@ -1,6 +1,6 @@
 """Checks of a user's arrays for many bodies: shape, type, values and number of rows.
 
-All functions that take such arrays call these checks, so that they have the same error messages.
+An array has one row per body, or one row for all. Each InputError begins with `where`.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,13 +26,10 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 
 
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
-    """Return user values as a float array with one row per body, or one row that all bodies share.
+    """Return user values as a float array, a single row as an array of one row.
 
-    The further arguments `shape` are the shape of one row, in which a letter such as "k" stands for
-    any length. If `values` is a single row, the result has one row. The keyword argument `rule` is
-    a test that every number must pass, with a phrase that names the allowed numbers. Raise
-    InputError, with `where` in front of the message, for another shape, an element that is not a
-    real number, or a number that fails the test.
+    `shape` is that of a row, where a letter such as "k" stands for any length. `rule` has a test
+    that every number must pass, and a phrase that names those which do. Raise InputError otherwise.
     """
     if type(values) is float and not shape and rule is None:
         return np.array([values])
@@ -51,10 +48,9 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
 
 
 def numbers_of(where: str, values: object) -> Array:
-    """Return user values as a float64 array of the same shape, which may be any shape.
+    """Return user values as a float64 array of the same, any, shape.
 
-    Raise InputError, with `where` in front of the message, if an element is not a real number.
-    Fractions, decimals, and integers beyond 64 bits are accepted as real numbers.
+    Raise InputError if one is not a real number; fractions, decimals and long integers are.
     """
     try:
         found = np.asarray(values)
@@ -76,22 +72,13 @@ def numbers_of(where: str, values: object) -> Array:
 
 
 def waves_of(where: str, values: object) -> Array:
-    """Return user values as an array of k torque waves for each of n bodies, shape (n, k, 4).
-
-    A wave consists of three amplitudes, one for each axis, and a frequency (rad/s). n is 1 if all
-    bodies share the waves. Raise InputError, with `where` in front of the message, for values that
-    have another shape or are not real numbers.
-    """
+    """Return user values as k waves, three amplitudes and a frequency (rad/s), (n, k, 4)."""
     found = numbers_of(where, values)
     return rows_of(where, found, "k", 4) if found.size else np.empty((1, 0, 4))
 
 
 def count_bodies(rows: Mapping[str, Array]) -> int:
-    """Return the number of bodies for which several arrays have rows.
-
-    `rows` maps the name of each array to the array. An array has one row for each body, or a single
-    row that all bodies share. Raise InputError if the arrays disagree about the number of bodies.
-    """
+    """Return the number of bodies; raise InputError if the arrays disagree."""
     counts = {len(each) for each in rows.values()}
     n = 0 if 0 in counts else max(counts, default=1)
     if not counts <= {1, n}:
@@ -101,21 +88,20 @@ def count_bodies(rows: Mapping[str, Array]) -> int:
 
 
 def check_rows(name: str, array: Array, n: int) -> None:
-    """Raise InputError unless the array called `name` has one row, or `n` rows, one per body."""
+    """Raise InputError unless the array called `name` has one row or `n`."""
     if len(array) not in (1, n):
         raise InputError(f"{name}: {len(array)} rows; allowed: 1, or {n}, the number of bodies")
 
 
 def row_of(array: Array, i: int) -> Any:
-    """Return the row of `array` for body `i` (from 0), or the single row that all bodies share."""
+    """Return the row of body `i` (from 0), or the shared one."""
     return array[0 if len(array) == 1 else i]
 
 
 def only_one(given: Mapping[str, object]) -> str:
-    """Return the name of the one argument that is not None, or an empty string if all are None.
+    """Return the name of the one argument that is not None, or "".
 
-    `given` maps the names of alternative arguments to their values. Raise InputError if several
-    values are not None.
+    Raise InputError if several are not None.
     """
     names = [name for name, value in given.items() if value is not None]
     if len(names) > 1:
@@ -124,7 +110,7 @@ def only_one(given: Mapping[str, object]) -> str:
 
 
 def threads_of(threads: object) -> int:
-    """Return a user's number of threads; raise InputError if it is no integer from 1 to 1024."""
+    """Return a user's number of threads, 1 to 1024, or raise InputError."""
     found = integer("threads", threads)
     if not 1 <= found <= _MOST_THREADS:
         raise InputError(f"threads is {found}; allowed: 1 to {_MOST_THREADS}")
@@ -132,11 +118,10 @@ def threads_of(threads: object) -> int:
 
 
 def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
-    """Return the user's output array unchanged if a compiled kernel can write its results to it.
+    """Return the user's output array if a compiled kernel can write to it.
 
-    The array must have `shape` and the NumPy type character `kind`, as in "d". It must be writable,
-    contiguous and aligned. Raise InputError, with `where` in front of the message, for any other
-    value of `array`.
+    Raise InputError unless it has `shape` and type character `kind`, as "d", and is writable,
+    contiguous and aligned.
     """
     right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype.char == kind
     if not (right and array.flags.c_contiguous and array.flags.writeable and array.flags.aligned):
@@ -147,17 +132,14 @@ def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
 
 
 def spread(rows: Array, n: int) -> Array:
-    """Return `rows` as an array with one row for each of `n` bodies; a single row is repeated."""
+    """Return `rows` with a single row repeated for each of `n` bodies."""
     if len(rows) == n:
         return rows
     return np.ascontiguousarray(np.broadcast_to(rows, (n, *rows.shape[1:])))
 
 
 def unit_quaternions(rows: Array) -> Array:
-    """Return quaternions, shape (n, 4), divided by their norms.
-
-    A quaternion that can't be normalised, such as four zeros, becomes NaN.
-    """
+    """Return quaternions, shape (n, 4), divided by their norms; NaN where that is impossible."""
     with np.errstate(all="ignore"):
         found = rows / np.abs(rows).max(axis=1, keepdims=True)
         units: Array = found / np.sqrt((found * found).sum(axis=1, keepdims=True))

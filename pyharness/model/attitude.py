@@ -1,9 +1,8 @@
 """Attitudes as unit quaternions from body to space, scalar first, with Hamilton's product.
 
-If a vector has the components v about the body axes, it has the components q v q* about the axes of
-space. Here q is the quaternion and q* its conjugate. The quaternion satisfies the equation
-q' = q (0, omega)/2, and is integrated. Angles and matrices are only other forms of it, for input
-(angles) and output (angles and matrices).
+A vector with components v about the body axes has q v q* about those of space, with the quaternion
+q and its conjugate q*. The equation q' = q (0, omega)/2 is integrated; angles and matrices are only
+other forms.
 """
 
 import math
@@ -20,7 +19,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 class Rotation(Protocol):
-    """A rotation from body to space that has a quaternion, such as SciPy's `Rotation`."""
+    """A rotation from body to space, such as SciPy's `Rotation`."""
 
     def as_quat(self) -> Any:
         """Return the quaternion, scalar last."""
@@ -36,17 +35,16 @@ _ROUNDED = 2.0**-51  # deviation of a norm from 1 that normalisation cannot redu
 def scalar_first(values: object) -> Any:
     """Return the quaternions, scalar first, of a SciPy `Rotation`, and anything else as it is.
 
-    A `Rotation` is recognised by its method `as_quat`, so that SciPy is not imported.
+    SciPy is not imported: a `Rotation` has the method `as_quat`.
     """
     as_quat = getattr(values, "as_quat", None)
     return values if as_quat is None else np.asarray(as_quat())[..., [3, 0, 1, 2]]
 
 
 def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
-    """Return four numbers as a normalised quaternion, and their norm before normalisation.
+    """Return four numbers, or a SciPy `Rotation`, as a unit quaternion, and their norm.
 
-    `values` may also be a SciPy `Rotation` from body to space. Raise InputError, with `where` in
-    front of the message, unless `values` are four finite numbers, not all 0.
+    Raise InputError, beginning with `where`, unless they are finite and not all 0.
     """
     allowed = "allowed: four finite numbers, scalar first, not all 0"
     given = [finite(where, each) for each in number_list(where, scalar_first(values), allowed)]
@@ -65,12 +63,10 @@ def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
 
 
 def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
-    """Return the attitude that results from three successive rotations about body axes.
+    """Return the attitude after three successive rotations about body axes, from those of space.
 
-    At first the body axes are parallel to the axes of space. `angles_deg` are the three angles in
-    degrees. `sequence` names the axes of the rotations by number, as in "3-1-3". Raise
-    InputError, with `where` in front of the message, unless `angles_deg` are three finite numbers
-    and `sequence` is one of `SEQUENCES`.
+    `sequence` numbers the axes, as in "3-1-3". Raise InputError, beginning with `where`, for one
+    not in `SEQUENCES`, or angles that are not three finite numbers.
     """
     if not isinstance(sequence, str) or sequence not in SEQUENCES:
         name = sequence if isinstance(sequence, str) else kind_of(sequence)
@@ -85,10 +81,7 @@ def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
 
 
 def product(p: Iterable[Any], q: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
-    """Return Hamilton's product p q of two quaternions, scalar first.
-
-    The components may be numbers of any kind, or arrays.
-    """
+    """Return Hamilton's product p q of quaternions, whose components are numbers or arrays."""
     (a, b, c, d), (e, f, g, h) = p, q
     return (
         a * e - b * f - c * g - d * h,
@@ -99,11 +92,7 @@ def product(p: Iterable[Any], q: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
 
 
 def quaternion_rates(omega: Iterable[Any], q: Iterable[Any]) -> list[Any]:
-    """Return the rates of the attitude quaternion q, which satisfies q' = q (0, omega)/2.
-
-    `omega` (rad/s) and `q` are numbers, arrays, symbols of a recorded function, or other
-    expressions.
-    """
+    """Return the rates q' = q (0, omega)/2 for numbers, arrays, symbols or other expressions."""
     (x, y, z), (a, b, c, d) = omega, q
     return [
         -0.5 * (b * x + c * y + d * z),
@@ -114,13 +103,11 @@ def quaternion_rates(omega: Iterable[Any], q: Iterable[Any]) -> list[Any]:
 
 
 def angles(attitude: Array, sequence: str) -> Array:
-    """Return n attitudes as angles (degrees) of three successive rotations, shape (n, 3).
+    """Return n attitudes, (n, 4), as angles (degrees) of three successive rotations, (n, 3).
 
-    `attitude` is an array of n quaternions, shape (n, 4). `sequence` names the body axes of the
-    rotations, and is one of `SEQUENCES`. A pole is an attitude at which the axes of the first and
-    the last rotation are parallel in space. At a pole only the sum or the difference of the first
-    and the last angle is determined, and the last angle is set to 0. The angles are computed from
-    arc tangents of half angles, which are accurate even near a pole.
+    At a pole, where the first and last axes are parallel in space, only the sum or difference of
+    their angles is determined, and the last is set to 0. Arc tangents of half angles are accurate
+    even near a pole.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":
@@ -142,10 +129,7 @@ def angles(attitude: Array, sequence: str) -> Array:
 
 
 def matrices(attitude: Array) -> Array:
-    """Return n attitudes, quaternions of shape (n, 4), as rotation matrices, shape (n, 3, 3).
-
-    A matrix transforms a vector from the body axes to the axes of space.
-    """
+    """Return n attitudes, (n, 4), as rotation matrices from body to space, (n, 3, 3)."""
     w, x, y, z = attitude.T
     rows = [
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
@@ -156,11 +140,9 @@ def matrices(attitude: Array) -> Array:
 
 
 def angle_between(attitude: Array, other: Array) -> Array:
-    """Return the angle (rad) of the rotation between each pair of attitudes, shape (n,).
+    """Return the angle (rad) between each pair of attitudes, (n, 4), shape (n,).
 
-    The first attitude of a pair is in `attitude`, the second in `other`; both are arrays of
-    quaternions, shape (n, 4). The angle between a quaternion and its negative is 0, because both
-    represent the same attitude.
+    It is 0 between a quaternion and its negative, the same attitude.
     """
     a, b, c, d = attitude.T
     e, f, g, h = other.T
@@ -174,7 +156,7 @@ def angle_between(attitude: Array, other: Array) -> Array:
 
 
 def quaternion_of_axes(axes: Array) -> Quaternion:
-    """Return the attitude of a right-handed frame, whose axes are the columns of a 3 x 3 array."""
+    """Return the attitude of a right-handed frame, the columns of a 3 x 3 array."""
     # SciPy is imported here, because only a full inertia matrix needs it.
     from scipy.spatial.transform import Rotation
 

@@ -12,16 +12,16 @@ MARKS = {
 
 @dataclass(frozen=True)
 class Basis:
-    """The reason why a limit has its value; it is defined once, beside the limit.
+    """The reason why a limit has its value, defined once, beside the limit.
 
     Attributes
     ----------
     mark : str
-        A key of `MARKS`. A limit with several parts has the weakest mark of its parts.
+        A key of `MARKS`, the weakest of the parts.
     limit : str
-        The quantity that is limited, and the terms of the limit.
+        The quantity that is limited, and its terms.
     source : str
-        The theorem, the place of the derivation, or the command of the runs, in Markdown.
+        The theorem, the derivation, or the command of the runs, in Markdown.
     """
 
     mark: str
@@ -29,6 +29,6 @@ class Basis:
     source: str
 
     def __post_init__(self) -> None:
-        """Raise ValueError if the mark is unknown, or if the limit or the source is not given."""
+        """Raise ValueError if the mark is unknown, or a text empty."""
         if self.mark not in MARKS or not self.limit or not self.source:
             raise ValueError(f"not a basis of a limit: {self}")

@@ -19,10 +19,9 @@ class BatchResult:
     Attributes
     ----------
     omega : ndarray, shape (n, ..., 3)
-        Angular velocity about the body axes, rad/s; NaN for a body without result. The axis between
-        n and 3, if there is one, is for the times of the results.
+        Angular velocity about the body axes, rad/s, at one or more times; NaN without result.
     status : ndarray of int8, shape (n,)
-        How the computation of each body ended, as an integer of `pyharness.model.codes.Statuses`.
+        The integers of `pyharness.model.codes.Statuses`.
     """
 
     omega: Array
@@ -32,10 +31,10 @@ class BatchResult:
 
     @property
     def ended(self) -> NDArray[np.str_]:
-        """The status of each body as text, for example "complete" or "overflow"; shape (n,)."""
+        """The statuses as text, as "complete"; shape (n,)."""
         return np.array(ENDS)[self.status]
 
     @property
     def has_result(self) -> NDArray[np.bool_]:
-        """Whether all results of a body are present, for each body: boolean array, shape (n,)."""
+        """Whether all results of each body are present, shape (n,)."""
         return np.isin(self.status, _RESULTS)

@@ -38,12 +38,7 @@ _LEVELS = ("plain", "avx2", "avx512")
 
 @dataclass(frozen=True)
 class Build:
-    """The versions, the Fortran compiler and the compiler flags of one installation.
-
-    `extension` is the path of the compiled extension module. If the extension is not built,
-    `extension`, `compiler` and `flags` are None. `numpy` and `scipy` are None if the package is
-    missing.
-    """
+    """The versions, the Fortran compiler and its flags; None for what is missing."""
 
     version: str
     compiler: str | None
@@ -56,10 +51,7 @@ class Build:
 
 
 def build() -> Build:
-    """Return the versions, the Fortran compiler and the compiler flags of this installation.
-
-    A value is None if the extension, which records the compiler, or a package is missing.
-    """
+    """Return the versions, the compiler and its flags of this installation."""
     compiler = flags = extension = None
     try:
         from pyharness import _build, _kernels
@@ -83,15 +75,11 @@ def build() -> Build:
 
 @dataclass(frozen=True)
 class Installation:
-    """The installation and the machine, for a bug report, beside the build.
+    """The installation and the machine, for a bug report; None for what is missing.
 
-    `folder` is the folder of the package, and `installer` the program that installed it, with the
-    word ``editable`` for an editable installation. `processor` is the name of the processor,
-    `cores` the number of cores that this process may use, and `instructions` the set of
-    instructions that the kernels use. `arithmetic` says what disturbs the arithmetic of the
-    kernels, else ``as written``. Both are None if the extension is not built. `packages` has the
-    version of each package, None if it is missing. `environment` has the variables of `INFLUENCES`
-    that are set.
+    `installer` has the word ``editable`` for an editable installation. `cores` may be used by this
+    process, and the kernels use `instructions`. `arithmetic` says what disturbs that of the
+    kernels, else ``as written``. `environment` has the variables of `INFLUENCES` that are set.
     """
 
     folder: str
@@ -105,7 +93,7 @@ class Installation:
 
 
 def installation() -> Installation:
-    """Return how pyharness was installed, the machine, and the versions of other packages."""
+    """Return how pyharness was installed, the machine, and the versions of packages."""
     folder = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     return Installation(
         folder=folder,
@@ -163,11 +151,7 @@ def _arithmetic() -> str | None:
 
 
 def machine(packages: Iterable[str]) -> dict[str, str]:
-    """Return a description of this machine: processor, number of cores, and installed packages.
-
-    The result is a dictionary with the keys "processor" and "cores". For each installed package
-    among `packages` it also has the name of the package as a key, with the version as its value.
-    """
+    """Return "processor", "cores", and the versions of those of `packages` that are installed."""
     found = {"processor": _processor(), "cores": str(os.cpu_count())}
     return found | {name: text for name in packages if (text := _version(name)) is not None}
 
@@ -195,12 +179,7 @@ def _version(package: str) -> str | None:
 
 
 def doctor_report(build: Build, here: Installation) -> Report:
-    """Return the report of the subcommand `doctor` about this installation.
-
-    It shows the versions, the compiler and the compiler flags in `build`, and the machine, the
-    packages and the variables of the environment in `here`. For each optional package it shows
-    what the package is needed for.
-    """
+    """Return the report of the subcommand `doctor`, with the use of each optional package."""
     rows = {
         "pyharness": build.version,
         "installed by": here.installer,

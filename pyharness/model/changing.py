@@ -26,7 +26,7 @@ class Changing:
 
     @property
     def elements(self) -> Sequence[Sequence[Polynomial]]:
-        """The polynomials of the elements of the inertia matrix: three rows of three."""
+        """The polynomials of the inertia matrix: three rows of three."""
         raise NotImplementedError
 
     @property
@@ -43,11 +43,11 @@ class Changing:
             )
 
     def matrix(self, time: Any) -> list[list[Any]]:
-        """Return the inertia matrix (kg m2) at a time (s), which may be a symbol or an array."""
+        """Return the inertia matrix (kg m2) at a time (s), a symbol or an array."""
         return self._values(self.elements, time)
 
     def matrix_rate(self, time: Any) -> list[list[Any]]:
-        """Return the derivative of the inertia matrix (kg m2/s) at a time (s), also a symbol."""
+        """Return its derivative (kg m2/s)."""
         return self._values([[derivative(each) for each in row] for row in self.elements], time)
 
     def _values(self, elements: Sequence[Sequence[Polynomial]], time: Any) -> list[list[Any]]:
@@ -57,20 +57,14 @@ class Changing:
     def momentum(
         self, times: NDArray[np.float64], omega: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the angular momentum (kg m2/s) of n rows, shape (n, 3), about the body axes.
-
-        `times` (s) has shape (n,), and `omega` (rad/s) has shape (n, 3).
-        """
+        """Return the angular momentum (kg m2/s) about the body axes, shape (n, 3), of n rows."""
         matrix = self.matrix(times)
         rows = [sum(each * omega[:, k] for k, each in enumerate(row)) for row in matrix]
         return np.stack([np.asarray(row) for row in rows], axis=-1)
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """The times (s) before and after 0 between which the matrix is positive definite.
-
-        They are infinite if no principal moment reaches 0.
-        """
+        """The times (s) around 0, or infinities, between which the matrix is positive definite."""
         # Imported only here, because the programs need no exact numbers.
         from pyharness.model.exact_zeros import determinant, first_zeros
 
@@ -97,23 +91,22 @@ class Changing:
 class ChangingMoments(Changing):
     """Principal moments of inertia that are polynomials of time.
 
-    A scene with these moments is a body whose mass moves relative to its axes, for example along
-    booms that extend, or a body that uses propellant. The principal axes remain fixed in the body.
-    Mass that moves within the body is assumed to have no angular momentum relative to its axes, and
-    mass that leaves the body none about the centre of mass. The equations of motion are then
-    I omega' = N - I' omega - omega x (I omega), with the moments I and the torque N.
+    Mass moves relative to the axes of the body, as with booms or propellant, but the principal axes
+    are fixed in it. Mass that moves within the body has no angular momentum relative to its axes,
+    and mass that leaves none about the centre of mass. With the moments I and the torque N, I
+    omega' = N - I' omega - omega x (I omega).
 
     Parameters
     ----------
     polynomials : three lists of numbers
-        The polynomial of each principal moment: its coefficients in ascending order of the powers
-        of time (s), at most ten. Their units are kg m2, kg m2/s, kg m2/s2, and so on.
+        For each moment at most ten coefficients in ascending powers of time (s): kg m2, kg m2/s,
+        and so on.
 
     Raises
     ------
     InputError
-        If the polynomials are not three lists of finite numbers, if a moment is not above 0 at
-        time 0, or if the numbers are the rows of a symmetric matrix.
+        If these are not three lists of finite numbers, if a moment is not above 0 at time 0, or if
+        the numbers are the rows of a symmetric matrix.
 
     Examples
     --------
@@ -135,10 +128,7 @@ class ChangingMoments(Changing):
         def __init__(self, polynomials: Iterable[Numbers]) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the polynomials, and convert their coefficients to floats.
-
-        Raise InputError for an invalid value.
-        """
+        """Check the polynomials, and convert coefficients to floats."""
         where = "[body] moments"
         given = _items(where, self.polynomials, 4, _POLYNOMIALS)
         if len(given) != 3:
@@ -161,7 +151,7 @@ class ChangingMoments(Changing):
 
     @property
     def elements(self) -> Sequence[Sequence[Polynomial]]:
-        """The polynomials of the elements of the inertia matrix; those of zeros are empty."""
+        """The polynomials of the inertia matrix; those of zeros are empty."""
         first, second, third = self.polynomials
         return (first, (), ()), ((), second, ()), ((), (), third)
 
@@ -173,22 +163,20 @@ class ChangingMoments(Changing):
 
 @dataclass(frozen=True)
 class ChangingInertia(Changing):
-    """An inertia matrix that is a polynomial of time.
+    """An inertia matrix about the body axes that is a polynomial of time.
 
-    The matrix is about the axes of the body. Its principal axes may rotate relative to the body.
-    The assumptions and the equations of motion are those of `ChangingMoments`.
+    Its principal axes may rotate in the body. Assumptions and equations are those of
+    `ChangingMoments`.
 
     Parameters
     ----------
     matrices : one to ten matrices, each of three rows of three numbers
-        The symmetric coefficients of the polynomial, in ascending order of the powers of time (s).
-        Their units are kg m2, kg m2/s, kg m2/s2, and so on.
+        The symmetric coefficients in ascending powers of time (s): kg m2, kg m2/s, and so on.
 
     Raises
     ------
     InputError
-        If a matrix is not symmetric or has a number that is not finite, or if the inertia is not
-        positive definite at time 0.
+        If a matrix is not symmetric or not finite, or the inertia at time 0 not positive definite.
 
     Examples
     --------
@@ -211,10 +199,7 @@ class ChangingInertia(Changing):
         def __init__(self, matrices: Iterable[Iterable[Numbers]]) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the matrices, and convert their elements to floats.
-
-        Raise InputError for an invalid value.
-        """
+        """Check the matrices, and convert elements to floats."""
         # Imported only here, because the programs need no exact numbers.
         from pyharness.model.inertia import checked_inertia, symmetric_matrix
 
@@ -229,7 +214,7 @@ class ChangingInertia(Changing):
 
     @property
     def elements(self) -> Sequence[Sequence[Polynomial]]:
-        """The polynomials of the elements of the inertia matrix: three rows of three."""
+        """The polynomials of the inertia matrix."""
         return [
             [tuple(matrix[i][j] for matrix in self.matrices) for j in range(3)] for i in range(3)
         ]

@@ -1,7 +1,7 @@
 """Polynomials through values at Chebyshev points, on many intervals at once.
 
-The formulas are those of Trefethen 2013, Approximation Theory and Approximation Practice, chapters
-2 to 5.
+The formulas are in Trefethen 2013, Approximation Theory and Approximation Practice, chapters 2 to
+5.
 """
 
 import numpy as np
@@ -10,19 +10,13 @@ from pyharness.model.array_type import Array
 
 
 def points(count: int) -> Array:
-    """Return Chebyshev points of the second kind from -1 to 1, in ascending order.
-
-    They are symmetric about 0 to the last bit.
-    """
+    """Return Chebyshev points of the second kind, ascending, symmetric to the last bit."""
     found: Array = np.sin(np.pi * np.arange(1 - count, count, 2) / (2 * (count - 1)))
     return found
 
 
 def to_coefficients(count: int) -> Array:
-    """Return the matrix that multiplies values at the points.
-
-    The products are the coefficients of Chebyshev polynomials.
-    """
+    """Return the matrix from values at the points to Chebyshev coefficients."""
     # Angles up to pi have the smallest rounding errors.
     turns = np.outer(np.arange(count), np.arange(count)[::-1]) % (2 * count - 2)
     angles = np.pi * np.minimum(turns, 2 * count - 2 - turns) / (count - 1)
@@ -34,7 +28,7 @@ def to_coefficients(count: int) -> Array:
 
 
 def nodes(low: Array, high: Array, at: Array) -> Array:
-    """Return the points `at` of the intervals from `low` to `high`, one row for each interval."""
+    """Return the points `at` of intervals, one row for each."""
     middle, half = 0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low
     found: Array = middle[:, None] + half[:, None] * at
     found[:, 0], found[:, -1] = low, high

@@ -1,12 +1,11 @@
 """Integers and other constants that Python and the Fortran kernels share.
 
-The script fortran/make_codes.py writes each class as a Fortran module, so that the constants have
-the same values in both languages.
+The script fortran/make_codes.py writes each class as a Fortran module.
 """
 
 
 class Statuses:
-    """The integers, from 0, with which a compiled Fortran kernel reports how its run ended."""
+    """The integers with which a kernel reports how its run ended."""
 
     COMPLETE = 0  # all requested rows are present
     STOPPED = 1  # the Lipschitz test ended the run
@@ -20,11 +19,7 @@ class Statuses:
 
 
 class Methods:
-    """The integers that select a method in the compiled kernel of a prepared solver.
-
-    A prepared solver integrates one scene (body and torque) by one method, for many initial
-    conditions.
-    """
+    """The integers that select a method in the kernel of a prepared solver."""
 
     TAPE = 0  # the Taylor series of a recorded torque
     CLOSED_FORM = 1  # for scenes without torque
@@ -41,11 +36,7 @@ class Methods:
 
 
 class Places:
-    """Indices, from 0, into the array of parameters that a prepared solver passes to its kernel.
-
-    A prepared solver integrates one scene (body and torque) by one method, for many initial
-    conditions. Its kernel is a compiled Fortran routine.
-    """
+    """Indices, from 0, into the array of a prepared solver's kernel."""
 
     METHOD = 0
     TOLERANCE = 1  # relative; for methods that have a tolerance
@@ -63,7 +54,7 @@ class Places:
 
 
 class Series:
-    """Limits of the order and of the local tolerance (error per step) of the Taylor method."""
+    """Limits of the order and of the local tolerance of the Taylor method."""
 
     LEAST_ORDER = 12
     MOST_ORDER = 24
@@ -75,30 +66,19 @@ class Series:
 
 
 class Waves:
-    """The limit, as a power of 2, of the angles (rad) that our binary128 sine accepts.
-
-    This sine function is in the Fortran file `wide_functions.f90`. It returns NaN unless the
-    absolute angle is below the limit.
-    """
+    """The limit, as a power of 2, of angles (rad) of our binary128 sine, which is NaN beyond."""
 
     ANGLE_BITS = 60  # the angle must be below 2**ANGLE_BITS rad; otherwise its sine is NaN
 
 
 class Blocks:
-    """The number of bodies that a compiled program of the thesis integrates simultaneously.
-
-    The program treats these bodies as vectors, so that the compiler can use vector instructions.
-    """
+    """The number of bodies that a compiled program integrates in vector instructions."""
 
     LANE_COUNT = 32  # several vector registers, so that some compute while others wait
 
 
 class Operations:
-    """The operations of a tape, which records a torque that depends on the state.
-
-    The kernel evaluates the Taylor series of each operation in a slot of its own, except for those
-    that need further slots.
-    """
+    """The operations of a tape; the kernel has one slot for the series of each, or more."""
 
     LINEAR = 1  # a constant plus a sum of coefficients times slots
     PRODUCT = 2

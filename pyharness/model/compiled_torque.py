@@ -27,8 +27,7 @@ _PYTHON_API = 4
 class CompiledTorque:
     """A compiled function as the function of an opaque torque.
 
-    `address` and `data` are the addresses of the function and of the user's data, 0 for none. They
-    are valid as long as `owner` exists.
+    The addresses of function and user's data, or 0, are valid as long as `owner` exists.
     """
 
     address: int
@@ -36,7 +35,7 @@ class CompiledTorque:
     owner: object = field(compare=False, repr=False)
 
     def __call__(self, time: float, omega: Any, attitude: Any = (np.nan,) * 4) -> list[float]:
-        """Return the torque (N m) at `time` (s); without an attitude, the function is given NaN."""
+        """Return the torque (N m) at `time` (s); the default attitude is NaN."""
         torque = _numbers([0.0] * 3)
         function = _PROTOTYPE(self.address)
         function(time, _numbers(omega), _numbers(attitude), torque, self.data or None)
@@ -44,10 +43,7 @@ class CompiledTorque:
 
 
 def compiled_torque(function: Any) -> CompiledTorque | None:
-    """Return a user's compiled function, or None if it is not compiled.
-
-    Raise InputError if it has another signature than SIGNATURE.
-    """
+    """Return a compiled function, or None; raise InputError for another signature."""
     from scipy import LowLevelCallable
 
     given = getattr(function, "ctypes", function)  # a cfunc of numba has this attribute

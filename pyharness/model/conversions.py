@@ -55,12 +55,9 @@ class Conversions(SciPyNames):
         Returns
         -------
         pandas.DataFrame
-            One row for each time, with `time` (s) as its index. The columns `omega1` to `omega3`
-            are omega (rad/s), `velocity1` to `velocity3` the translational velocity (m/s), and `q0`
-            to `q3` the quaternion of the attitude. `recorded_time` (s) is the time in a program's
-            output file, and `ier` the error code of its linear solver. Columns without values are
-            left out, and so is `recorded_time` if it is the same as `time`. The frame's attribute
-            ``attrs["units"]`` has the unit of each column by its name.
+            With `time` (s) as its index, and columns `omega1` to `omega3` (rad/s), `velocity1` to
+            `velocity3` (m/s), `q0` to `q3`, `recorded_time` (s) and `ier`, if they have values of
+            their own. ``attrs["units"]`` has the units.
 
         Raises
         ------
@@ -94,10 +91,8 @@ class Conversions(SciPyNames):
         -------
         xarray.Dataset
             The variables `omega` and `velocity` with the dimensions `time` and `axis`, `attitude`
-            with `time` and `component`, and `recorded_time` and `ier` with `time`. Variables
-            without values are left out, and so is `recorded_time` if it is the same as `time`. Each
-            variable has the attributes `units` and `long_name`. The attributes of the dataset say
-            how the integration ended, with its estimates of the error.
+            with `time` and `component`, and `recorded_time` and `ier`, if they have values of their
+            own, with `units` and `long_name`. Attributes say how the integration ended.
 
         Raises
         ------
@@ -142,14 +137,13 @@ class Conversions(SciPyNames):
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            The diagram in which to draw. By default a new figure with one diagram is made.
+            The diagram in which to draw. The default is a new one.
 
         Returns
         -------
         matplotlib.axes.Axes
-            The diagram, with a legend and with units at its axes. Its lines connect the rows in
-            ascending order of time. With dense output they are smooth, from `sol.t_min` to
-            `sol.t_max`.
+            The diagram, with legend and units. Its lines connect the rows; with dense output they
+            are smooth, from `sol.t_min` to `sol.t_max`.
 
         Raises
         ------
@@ -188,11 +182,10 @@ class Conversions(SciPyNames):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
-        Every number of the restored trajectory is bit-for-bit identical, and so are the results of
-        its methods. The file is either written completely or not at all. Its format is that of
-        `numpy.savez`: arrays with the names of the attributes, the text `scene` of a scene file,
-        and the text `header` with the other attributes in JSON. A torque that was recorded from a
-        function is in the header too, as a list of operations.
+        All numbers and results are then bit-for-bit the same. The file is written completely or not
+        at all, in the format of `numpy.savez`: arrays by attribute, the text `scene` of a scene
+        file, and in JSON the text `header` with other attributes and the operations of a recorded
+        torque.
 
         Parameters
         ----------
@@ -202,8 +195,8 @@ class Conversions(SciPyNames):
         Raises
         ------
         InputError
-            If the file can't be written, if the torque is opaque, or if the trajectory is of a
-            program that ran in another arithmetic than binary64.
+            If the file can't be written, the torque is opaque, or a program did not run in
+            binary64.
 
         Examples
         --------

@@ -24,14 +24,14 @@ _WEIGHTS[[0, -1]] /= 2.0
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """A function of time that is a polynomial on each of several adjacent intervals.
+    """A function of time that is a polynomial on each of p adjacent intervals.
 
     Attributes
     ----------
     edges : ndarray, shape (p + 1,)
-        The ends of the intervals (s), in ascending order.
+        The ends of the intervals (s), ascending.
     values : ndarray, shape (p, NODES, m)
-        The values of the m components at the Chebyshev points of each interval.
+        The m components at the Chebyshev points of each interval.
     """
 
     edges: Array
@@ -73,11 +73,10 @@ class DenseOutput:
     Attributes
     ----------
     t_min, t_max : float
-        The times (s) between which the solution can be evaluated.
-    states : callable
-        The function that returns omega (rad/s), and the attitude if it was requested, in rows.
-    rates : callable
-        The function that returns the derivatives of these rows at given times.
+        The times (s) between which it can be evaluated.
+    states, rates : callable
+        Functions that return omega (rad/s), with the attitude if requested, and their derivatives
+        in rows.
 
     Examples
     --------
@@ -100,14 +99,13 @@ class DenseOutput:
         Parameters
         ----------
         t : float or array_like, shape (n,)
-            Times from `t_min` to `t_max` (s), in any order. A time up to 4 units in the last place
-            beyond an end is taken for the end.
+            Times from `t_min` to `t_max` (s), in any order; up to 4 units in the last place beyond
+            an end count as the end.
 
         Returns
         -------
         ndarray, shape (m,) or (m, n)
-            Omega (rad/s), and if the attitude was requested, the four components of its unit
-            quaternion, scalar first, so that m is 3 or 7. One number `t` gives shape (m,).
+            Omega (rad/s), and if requested the unit quaternion, scalar first: m is 3 or 7.
 
         Raises
         ------
@@ -118,18 +116,18 @@ class DenseOutput:
         return self._shaped(self._states(times), shape)
 
     def derivative(self, t: Any) -> Array:
-        """Return the derivative of the state at one or more times, by the equations of motion.
+        """Return the derivative of the state by the equations of motion.
 
         Parameters
         ----------
         t : float or array_like, shape (n,)
-            Times from `t_min` to `t_max` (s), in any order. Where a table of the torque changes,
-            the derivative is that just after the time.
+            Times as for the state. Where a table of the torque changes, the derivative is that just
+            after.
 
         Returns
         -------
         ndarray, shape (m,) or (m, n)
-            The derivatives (1/s) of the components that the dense output itself returns.
+            The derivatives (1/s) of the components.
 
         Raises
         ------

@@ -1,10 +1,9 @@
 """Diagonalisation of symmetric 3 x 3 matrices in integers, with high relative accuracy.
 
-In binary64 the error of every eigenvalue is about 1e-16 times the largest eigenvalue. A small
-eigenvalue then has few correct digits or none. Integers avoid this error. The elements of a matrix
-are binary64 numbers, and therefore integer multiples of one unit, a power of 2. Hence the
-absolute determinant of a regular matrix is at least the cube of the unit, and its smallest absolute
-eigenvalue also has a lower bound. This bound determines how many bits the integers need.
+In binary64 every eigenvalue has an error of about 1e-16 times the largest, so that a small one has
+few digits. The elements are integer multiples of a power of 2; hence the absolute determinant of a
+regular matrix is at least the cube of this unit, and its smallest absolute eigenvalue has a lower
+bound, which determines how many bits the integers need.
 """
 
 import math
@@ -30,10 +29,9 @@ class Diagonal:
     Attributes
     ----------
     values : tuple of three Fractions
-        The eigenvalues, each with a relative error of at most 2**-100. An eigenvalue that is 0 up
-        to rounding errors is returned as 0; the matrix is then singular.
+        The eigenvalues, with relative errors of at most 2**-100; 0 for a singular matrix.
     vectors : tuple of three tuples of three Fractions
-        `vectors[k]` is the eigenvector of the eigenvalue `values[k]`.
+        `vectors[k]` belongs to `values[k]`.
     """
 
     values: Row
@@ -41,10 +39,9 @@ class Diagonal:
 
 
 def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
-    """Return the eigenvalues and eigenvectors of a symmetric 3 x 3 matrix of finite floats.
+    """Return the eigenvalues and eigenvectors by Jacobi's method in integers.
 
-    The result is a `Diagonal`. The method is Jacobi's, in integers. If the matrix is already
-    diagonal, the eigenvalues are its diagonal elements, in their order.
+    Those of a diagonal matrix are in its order.
     """
     exponent = min((_last_bit(x) for row in matrix for x in row if x), default=0)
     whole = [[_in_unit(x, exponent) for x in row] for row in matrix]
@@ -69,11 +66,9 @@ def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
 
 
 def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: int) -> None:
-    """Apply a Jacobi rotation to `a` and `vectors` in place, which makes element p, q of `a` 0.
+    """Make element p, q of `a` 0 by a Jacobi rotation of `a` and the eigenvectors in place.
 
-    `a` is the symmetric matrix, and `vectors` are the approximate eigenvectors. The rotation is in
-    the plane of the axes p and q, by the smaller of the two possible angles (Rutishauser 1966). All
-    numbers are integers; the components in `vectors` have the unit 2**-bits.
+    It is by the smaller angle (Rutishauser 1966). `vectors` have the unit 2**-bits.
     """
     r = 3 - p - q
     gap, twice = a[q][q] - a[p][p], 2 * a[p][q]

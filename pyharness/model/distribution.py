@@ -7,26 +7,19 @@ DISTRIBUTION = "rigid-body-harness"
 
 
 def version() -> str:
-    """Return the version of the installed distribution of this project, as text."""
+    """Return the version of the installed distribution."""
     from importlib.metadata import version
 
     return version(DISTRIBUTION)
 
 
 def install_command(extra: str) -> str:
-    """Return the pip command that installs a named group of optional packages.
-
-    `extra` is the name of the group in pyproject.toml, for example ``plots``.
-    """
+    """Return the pip command for a group of optional packages, as ``plots``."""
     return f"pip install '{DISTRIBUTION}[{extra}]'"
 
 
 def check_package(name: str, what: str, command: str) -> None:
-    """Raise InputError if the optional package `name` is not installed.
-
-    The message names `what`, the option or function that needs the package, and `command`, which
-    installs the package.
-    """
+    """Raise InputError if an optional package, which `what` needs, is not installed."""
     from importlib import import_module
 
     try:

@@ -5,10 +5,7 @@ from typing import Any
 
 
 class Dual:
-    """A value, and its derivatives with respect to some unknowns.
-
-    They are floats, symbols of a recorded function, or numbers of another arithmetic.
-    """
+    """A value of any arithmetic, and its derivatives with respect to some unknowns."""
 
     def __init__(self, value: Any, slopes: Sequence[Any]) -> None:
         self.value, self.slopes = value, slopes
@@ -26,11 +23,11 @@ class Dual:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> "Dual":
-        """Return the difference from a number or a dual number."""
+        """Return the difference from a number or dual number."""
         return self.__add__(-1.0 * other)
 
     def __rsub__(self, other: Any) -> "Dual":
-        """Return the difference of a number and this one."""
+        """Return a number minus this one."""
         return self.__mul__(-1.0).__add__(other)
 
     def __mul__(self, other: Any) -> "Dual":
@@ -55,10 +52,10 @@ class Dual:
         return Dual(quotient, slopes)
 
     def __rtruediv__(self, other: Any) -> "Dual":
-        """Return the quotient of a number and this one."""
+        """Return a number divided by this one."""
         return dual(other, len(self.slopes)) / self
 
 
 def dual(value: Any, count: int) -> Dual:
-    """Return a number that is not a dual number as one, with `count` derivatives of 0."""
+    """Return a number as a dual number with `count` derivatives of 0."""
     return value if isinstance(value, Dual) else Dual(value, [0.0] * count)

@@ -1,8 +1,7 @@
 """Limits of the work of a computation, and the option `effort` that changes them.
 
-Work is counted, for example, in steps times torque waves. A limit is chosen so that a method
-reaches it after some ten seconds. The option `effort` is a factor by which all limits are
-multiplied.
+A method reaches its limit, for example in steps times torque waves, after some ten seconds. All
+limits are multiplied by `effort`.
 """
 
 import math
@@ -34,28 +33,19 @@ _MOST_STEPS_OF_ALL = 1e9
 
 
 class Integrator(Protocol):
-    """The type of a function that integrates a scene and returns a trajectory at requested times.
-
-    Its arguments are the scene, the times, the tolerance, and a factor on the limit of computing
-    work. The times (s) have one sign, and their distance from 0 increases. The tolerance is
-    relative to the largest component of the angular velocity omega.
-    """
+    """The type of a function that integrates a scene and returns a trajectory."""
 
     def __call__(
         self, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, /
     ) -> Trajectory:
-        """Return the trajectory of `scene` at `times` (s), or raise InputError if this fails.
+        """Return the trajectory at `times` (s), of one sign and away from 0, or raise InputError.
 
-        `tolerance` is relative to the largest component of omega. `effort` is the factor by which
-        the limit of computing work is multiplied.
+        `tolerance` is relative to the largest component of omega.
         """
 
 
 def checked_effort(effort: Number) -> float:
-    """Return `effort`, the user's factor on the limits of computing work, as a float.
-
-    Raise InputError unless it is a finite number above 0.
-    """
+    """Return `effort` as a float; raise InputError unless it is finite and above 0."""
     value = number("effort", effort)
     if not 0.0 < value < math.inf:
         raise InputError(f"effort: {value:g}; allowed: a finite number above 0")
@@ -63,11 +53,9 @@ def checked_effort(effort: Number) -> float:
 
 
 def advice(instead: str, effort: float, needed: float | None = None) -> str:
-    """Return the end of a message about an exceeded work limit, which says what the user can do.
+    """Return the end of a message about an exceeded work limit: what the user can do.
 
-    `instead` is a remedy that does not exceed the limit, as in "use fewer steps". `effort` is the
-    factor by which the limit has been multiplied. `needed` is an estimate of the factor with which
-    the computation completes, or None if there is no estimate.
+    `instead` is another remedy, as "use fewer steps"; `needed` estimates the factor that suffices.
     """
     factor = suggested(effort, needed)
     return f"{instead}, or allow more work: --effort {factor} (effort={factor} in Python)"
@@ -76,9 +64,7 @@ def advice(instead: str, effort: float, needed: float | None = None) -> str:
 def suggested(effort: float, needed: float | None = None) -> str:
     """Return, as text, a factor on the work limit with which a computation should complete.
 
-    `effort` is the present factor, which did not suffice. `needed` is an estimate of the factor
-    with which the computation completes. The result is twice this estimate, but at least `effort`.
-    Without an estimate it is ten times `effort`. The result is rounded up to two digits.
+    It is twice `needed`, at least the insufficient `effort`, or ten times that, to two digits.
     """
     factor = max(_SLACK * needed, effort) if needed else _UNFORESEEN * effort
     factor = min(1e300, factor)
@@ -88,10 +74,7 @@ def suggested(effort: float, needed: float | None = None) -> str:
 
 
 def waves(scene: Scene) -> int:
-    """Return the number of waves, which are sine and cosine terms, in the torque of a scene.
-
-    It is 0 if the torque depends on the state, because the terms of such a torque are unknown.
-    """
+    """Return the number of waves in the torque; 0 if it depends on the state and has no terms."""
     if isinstance(scene.torque, StateTorque):
         return 0
     return len(scene.law.sines) + len(scene.law.cosines)
@@ -100,9 +83,8 @@ def waves(scene: Scene) -> int:
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
     """Raise InputError if the run of a program on one scene would exceed its work limit.
 
-    The work is the number of steps, increased for each sine and cosine of the torque. `program` is
-    the name of the program, for the message. `implementation` selects the limit, as in "fortran",
-    "python" or "binary128". `effort` is the factor by which the limit is multiplied.
+    The work is the number of steps, increased for each wave; `implementation`, as "python", selects
+    the limit.
     """
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)
@@ -119,9 +101,7 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
     """Raise InputError if the run of a compiled program on many bodies would exceed the work limit.
 
-    The work is the product of `bodies`, the number of steps, and one plus the number of sines and
-    cosines in the torque. `program` is the name of the program, for the message. `bodies` is the
-    number of bodies, and `effort` the factor by which the limit is multiplied.
+    The work is `bodies` times steps times one plus the number of waves.
     """
     cost = 1.0 + _LIMITS["fortran"][1] * waves(scene)
     needed = bodies * scene.steps * cost / _MOST_STEPS_OF_ALL

@@ -10,13 +10,11 @@ _LONGEST = 900
 class InputError(ValueError):
     """The exception for an error in the user's input; a command that it ends has exit status 2.
 
-    The message is one line of printable characters, even if it quotes other text.
-
     Parameters
     ----------
     message : str
-        What is wrong, where, and what is allowed. White space is collapsed, and characters that are
-        not printable are escaped. A message of more than 900 characters is shortened in the middle.
+        What is wrong, where, and what is allowed, as one printable line; above 900 characters it is
+        shortened in the middle.
 
     Examples
     --------
@@ -37,11 +35,9 @@ class InputError(ValueError):
 
 
 class TimedError(InputError):
-    """An InputError of a method, whose message contains a time (s) of the integrated scene.
+    """An InputError whose message contains a time (s) of the integrated scene.
 
-    An example is the time at which the method reached its work limit. The integrated scene may be a
-    copy of the user's scene with rescaled time. The function `slower` then converts the time to
-    that of the user's scene.
+    If that is the user's scene with rescaled time, `slower` converts the time.
     """
 
     def __init__(self, message: str, time: float) -> None:
@@ -51,18 +47,11 @@ class TimedError(InputError):
         self._message = message
 
     def __reduce__(self) -> tuple[type["TimedError"], tuple[str, float]]:
-        """Return the class and the arguments that recreate the error, so that it can be pickled.
-
-        Python's multiprocessing pickles errors.
-        """
+        """Return the class and the arguments with which multiprocessing pickles the error."""
         return type(self), (self._message, self.time)
 
     def slower(self, factor: float) -> "TimedError":
-        """Return the same error with its time multiplied by `factor`.
-
-        The error was raised for a copy of the user's scene with rescaled time. `factor` converts
-        the time of this copy to that of the user's scene.
-        """
+        """Return the same error with its time multiplied by `factor`."""
         return TimedError(self._message, self.time * factor)
 
 
@@ -82,11 +71,7 @@ class NotBuiltError(RuntimeError):
 
 
 def printable(text: str, kept: str = "") -> str:
-    r"""Return `text` with its unprintable characters replaced by escape sequences.
-
-    Control characters are unprintable too. The characters in `kept`, for example ``"\n\t"``, are
-    not replaced.
-    """
+    r"""Return `text` with unprintable characters escaped, except those in `kept`, as ``"\n\t"``."""
     if text.translate(dict.fromkeys(map(ord, kept))).isprintable():
         return text
     return "".join(
@@ -95,10 +80,7 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def kind_of(value: object) -> str:
-    """Return the type of a value in words for an error message, for example "a list".
-
-    The words are the same for a value from a TOML file and the corresponding Python or NumPy value.
-    """
+    """Return the type of a value for a message, as "a list", alike for TOML, Python and NumPy."""
     kinds = {
         "text": (str, bytes, bytearray), "true or false": (bool,), "a whole number": (int,),
         "a number": (float,), "a complex number": (complex,), "a list": (list, tuple),
@@ -119,11 +101,9 @@ def kind_of(value: object) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return the InputError for a name that is not among the allowed names.
+    """Return the InputError for a name that is not allowed, with a similar one if there is any.
 
-    Its message lists the allowed names, and suggests one that is similar to `name`, if there is
-    one. `what` says what `name` should denote, as in "case". `where` is the option or key to which
-    the name was given, as in "--fix"; the message begins with it.
+    `what` is the kind of name, as "case", and the message begins with `where`, as "--fix".
     """
     import difflib
 

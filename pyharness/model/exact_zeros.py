@@ -31,9 +31,9 @@ def determinant(elements: Sequence[Sequence[Polynomial]]) -> list[Fraction]:
 
 
 def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
-    """Return the last time before 0, and the first after 0, at which a polynomial is 0.
+    """Return the last zero before time 0 and the first after, or infinities.
 
-    The polynomial is above 0 at time 0. A time is infinite if there is no zero on its side.
+    The polynomial is above 0 at time 0.
     """
     exact = [Fraction(c) for c in polynomial]
     backward = [-c if n % 2 else c for n, c in enumerate(exact)]
@@ -41,11 +41,10 @@ def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
 
 
 def _first_zero(polynomial: Sequence[Fraction]) -> float:
-    """Return the first time after 0 at which a polynomial is 0; infinity if there is none.
+    """Return the first zero of a polynomial after time 0, or infinity.
 
-    The polynomial is above 0 in an interval if all its coefficients in Bernstein's basis of the
-    interval are (Farouki 2012, Computer Aided Geometric Design 29). Any other interval is halved.
-    The arithmetic is exact, with integers that have a common factor.
+    It is above 0 in an interval if all its coefficients in Bernstein's basis are (Farouki 2012,
+    Computer Aided Geometric Design 29). Other intervals are halved, in integers.
     """
     if min(polynomial) >= 0:
         return math.inf
@@ -76,8 +75,8 @@ def _first_zero(polynomial: Sequence[Fraction]) -> float:
 def _bound(polynomial: Sequence[int]) -> int:
     """Return the exponent of a power of two that no positive zero of a polynomial exceeds.
 
-    The bound is that of Kioustelidis (1986, Journal of Computational and Applied Mathematics 16),
-    rounded up.
+    The bound is Kioustelidis' (1986, Journal of Computational and Applied Mathematics 16), rounded
+    up.
     """
     degree, last = len(polynomial) - 1, polynomial[-1]
     return 1 + max(
@@ -88,10 +87,7 @@ def _bound(polynomial: Sequence[int]) -> int:
 
 
 def _bernstein(polynomial: Sequence[int]) -> list[int]:
-    """Return the coefficients in Bernstein's basis of the interval 0 to 1, times a common factor.
-
-    The argument has the coefficients of the powers of the unknown.
-    """
+    """Return the coefficients in Bernstein's basis from 0 to 1, times a common factor."""
     degree = len(polynomial) - 1
     factor = math.lcm(*(math.comb(degree, j) for j in range(degree + 1)))
     parts = [c * (factor // math.comb(degree, j)) for j, c in enumerate(polynomial)]
@@ -102,10 +98,7 @@ def _bernstein(polynomial: Sequence[int]) -> list[int]:
 
 
 def _halves(row: list[int]) -> tuple[list[int], list[int]]:
-    """Return the Bernstein coefficients of the two halves of an interval (de Casteljau).
-
-    They have the common factor 2**degree, so that they are integers.
-    """
+    """Return the Bernstein coefficients of both halves, times 2**degree (de Casteljau)."""
     degree = len(row) - 1
     early, late = [row[0] << degree], [row[-1] << degree]
     for n in range(degree - 1, -1, -1):

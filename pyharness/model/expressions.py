@@ -1,8 +1,7 @@
 """Torques as text: three arithmetic expressions of time, omega and attitude, as in scene files.
 
-An expression is parsed to a syntax tree, and each node of the tree must be on a list of allowed
-nodes. The tree is evaluated with symbols, which record the operations. No text of a user is run as
-Python code.
+Only allowed nodes of the syntax tree are evaluated, with symbols, which record the operations. No
+text of a user is run as Python code.
 """
 
 import ast
@@ -45,24 +44,10 @@ _SUM: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
 def parsed(expressions: object, constants: object) -> StateTorque | TorqueLaw:
     """Return the torque of three expressions, the components about the body axes.
 
-    Parameters
-    ----------
-    expressions : list of three texts
-        Arithmetic of t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3 from body to space,
-        scalar first, pi, and the names in `constants`. Their value is in N m for a body with
-        moments or inertia, and in 1/s2 for a body with coefficients.
-    constants : mapping of text to number
-        Names, as in Python, and their finite values.
-
-    Returns
-    -------
-    StateTorque or TorqueLaw
-        A torque law if the expressions have the form of one, else the recorded torque.
-
-    Raises
-    ------
-    InputError
-        If a text is no such expression or a constant is invalid; the message names the place.
+    They have t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3 from body to space, pi, and
+    the names in `constants`, and are in N m, or in 1/s2 for a body with coefficients. The result is
+    a torque law if they have the form of one. Raise InputError, with the place, for an invalid text
+    or constant.
     """
     values = _checked_constants(constants)
     texts = _three_texts(expressions)
@@ -77,11 +62,7 @@ def parsed(expressions: object, constants: object) -> StateTorque | TorqueLaw:
 def components(
     texts: Mapping[str, str], inputs: Sequence[Any], constants: Mapping[str, Any]
 ) -> list[Any]:
-    """Return the values of three checked expressions; `texts` has them by place.
-
-    `inputs` are the time, omega and the attitude, in this order. They are symbols, and so may be
-    the values of `constants`.
-    """
+    """Return the values of three checked expressions by place, for eight symbols as `inputs`."""
     names = {**dict(zip(INPUTS, inputs, strict=True)), "pi": math.pi, **constants}
     return [_component(text, names, place) for place, text in texts.items()]
 
@@ -109,7 +90,7 @@ def _checked_constants(constants: object) -> dict[str, float]:
 
 
 def _three_texts(expressions: object) -> dict[str, str]:
-    """Return the expressions by place, each in one line."""
+    """Return the expressions by place."""
     where = "[torque] expression"
     given = list(itertools.islice(number_list(where, expressions, _THREE), 4))
     if len(given) != 3:
@@ -173,10 +154,7 @@ def _tree(text: str, place: str) -> ast.expr:
 
 
 def _nodes(text: str, place: str) -> list[ast.expr]:
-    """Return the nodes of the syntax tree of an expression, each after its parent.
-
-    Raise InputError if one of them is not allowed.
-    """
+    """Return the nodes of an expression, each after its parent; raise InputError for others."""
     nodes, waiting = [], [(_tree(text, place), 1)]
     while waiting:
         node, depth = waiting.pop()

@@ -20,7 +20,7 @@ ENDS = tuple(name.lower().replace("_", " ") for name in vars(Statuses) if name.i
 
 
 def extension() -> ModuleType:
-    """Return the compiled Fortran extension, a module; raise NotBuiltError if it is missing."""
+    """Return the compiled Fortran extension; raise NotBuiltError if it is missing."""
     try:
         from pyharness import _kernels
     except ImportError as error:
@@ -51,12 +51,7 @@ def _why_missing() -> str:
 
 
 def columns(waves: tuple[Wave, ...], kind: type = float) -> NDArray[Any]:
-    """Return n waves of a torque as an array for the compiled kernels, shape (4, n).
-
-    A wave is a sine or cosine term. Each column has the three amplitudes of a wave, one for each
-    axis, and its frequency (rad/s). `kind` is the type of the numbers in the array, whose elements
-    are in Fortran order.
-    """
+    """Return n waves, three amplitudes and a frequency (rad/s), in Fortran order, shape (4, n)."""
     columns: NDArray[Any] = np.empty((4, len(waves)), dtype=kind, order="F")
     for index, (amplitude, frequency) in enumerate(waves):
         columns[:3, index] = amplitude

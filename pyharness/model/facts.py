@@ -1,7 +1,4 @@
-"""Facts about the thesis from the TOML files in `pyharness/data`.
-
-Each file names the sources of its facts, and is read at most once in a process.
-"""
+"""Facts about the thesis, with their sources, from the TOML files in `pyharness/data`."""
 
 import tomllib
 from functools import cache
@@ -17,27 +14,20 @@ _FOLDER = _PACKAGE / "data"
 
 @cache
 def facts(name: str) -> dict[str, Any]:
-    """Return the content of the file ``data/<name>.toml`` of this package as a dictionary.
-
-    The dictionary is cached, so callers must not change it.
-    """
+    """Return the content of ``data/<name>.toml``, cached and not to be changed."""
     with open(_FOLDER / f"{name}.toml", "rb") as file:
         return tomllib.load(file)
 
 
 def facts_folder() -> Path:
-    """Return the path of the folder `data` of this package, which has the facts.
-
-    In an installed package the folder also contains the files and folders `SHIPPED`.
-    """
+    """Return the folder `data`, which in an installed package also has `SHIPPED`."""
     return _FOLDER
 
 
 def shipped(name: str) -> Path:
-    """Return the path of a file or folder that a checkout has beside the Python package.
+    """Return the path of what a checkout has beside the package, as ``fortran/original``.
 
-    `name` is ``docs``, one of `SHIPPED`, or a folder in one of them, as in ``fortran/original``. An
-    installed package contains these files and folders, except ``docs``, in its folder ``data``.
+    An installed package has it in `data`, except ``docs``.
     """
     installed = _FOLDER / name
     return installed if installed.exists() else _PACKAGE.parent / name

@@ -1,7 +1,6 @@
-"""Elementary functions of floats and of numbers in other floating-point formats.
+"""Elementary functions of floats, by the C library, and of numbers in other formats.
 
-For floats the functions call the C library. Numbers in other formats, such as that of the CDC, are
-instances of a class in `pyharness.original.word`. Its methods return the correctly rounded result.
+The latter are of a class in `pyharness.original.word`, whose methods round correctly.
 """
 
 import math
@@ -9,17 +8,17 @@ from typing import Any
 
 
 def is_finite(x: Any) -> bool:
-    """Return whether a number, in any floating-point format, is neither NaN nor infinite."""
+    """Return whether a number is neither NaN nor infinite."""
     return math.isfinite(x) if isinstance(x, float) else x.is_finite
 
 
 def square_root(x: Any) -> Any:
-    """Return the square root of a number in any format; raise ValueError for a float below 0."""
+    """Return the square root; raise ValueError for a float below 0."""
     return math.sqrt(x) if isinstance(x, float) else x.sqrt()
 
 
 def sine(angle: Any) -> Any:
-    """Return the sine of an angle (rad), or NaN if the angle is an infinite float."""
+    """Return the sine of an angle (rad), or NaN for an infinite float."""
     if not isinstance(angle, float):
         return angle.sin()
     # Python raises an error for an infinite angle; Fortran, like IEEE 754, returns NaN.
@@ -27,7 +26,7 @@ def sine(angle: Any) -> Any:
 
 
 def cosine(angle: Any) -> Any:
-    """Return the cosine of an angle (rad), or NaN if the angle is an infinite float."""
+    """Return the cosine of an angle (rad), or NaN for an infinite float."""
     if not isinstance(angle, float):
         return angle.cos()
     return math.cos(angle) if math.isfinite(angle) else math.nan

@@ -16,10 +16,9 @@ _ROUNDED = 2**50
 
 
 class ImpossibleBodyWarning(UserWarning):
-    """The warning that the moments of a body break the triangle inequality.
+    """The warning that the largest moment of a body exceeds the sum of the other two.
 
-    The largest moment of inertia exceeds the sum of the other two. The results are nevertheless
-    computed.
+    The results are nevertheless computed.
 
     Examples
     --------
@@ -39,20 +38,13 @@ class _Body(Protocol):
 
 
 def breaks_triangle(moments: Iterable[Any]) -> bool:
-    """Return whether the largest of three floats or Fractions exceeds the sum of the others.
-
-    A flat body, whose largest moment equals the sum, does not, however its numbers are rounded.
-    """
+    """Return whether the largest number exceeds the sum of the others, however it is rounded."""
     low, middle, high = sorted(moments)
     return bool((high - middle - low) * _ROUNDED > high)
 
 
 def warn_of_impossible(body: _Body) -> None:
-    """Warn if user code creates a scene whose moments of inertia break the triangle inequality.
-
-    `body` is the scene. The warning names the line of the user's code. Scenes that the package
-    itself creates cause no warning.
-    """
+    """Warn, at the line of user code, if it creates a scene with impossible moments."""
     frame, level = sys._getframe(), 1
     while frame.f_back is not None and frame.f_globals.get("__name__") in _BETWEEN:
         frame, level = frame.f_back, level + 1

@@ -22,18 +22,18 @@ _KEPT = 256  # number of matrices whose principal frames are cached
 
 @dataclass(frozen=True, eq=False)
 class PrincipalFrame:
-    """The principal moments of one body and the principal axes that they belong to.
+    """The principal moments and axes of one body.
+
+    Each axis is near to the body's own axis of its number; they form a right-handed frame.
 
     Attributes
     ----------
     moments, moments_low : tuple of three floats
-        The moments rounded to nearest (kg m2), and the exact moments minus the rounded ones.
+        The moments (kg m2) rounded to nearest, and the exact minus the rounded ones.
     axes : ndarray, shape (3, 3)
-        The axes in columns, rounded to nearest. They form a right-handed frame. Their order and
-        signs are chosen so that each axis is near to the body's own axis of the same number.
+        The axes in columns, rounded to nearest.
     exact_moments, exact_axes : tuples of Fractions
-        Moments (kg m2) and axes, correct to some 38 digits. Each axis is a tuple of its components
-        about the body's own axes.
+        Moments (kg m2) and axes, tuples of components, correct to some 38 digits.
     """
 
     moments: Triple
@@ -43,10 +43,7 @@ class PrincipalFrame:
     exact_axes: tuple[Exact, Exact, Exact]
 
     def into(self, vector: Exact) -> Exact:
-        """Return the components of a vector about the principal axes.
-
-        `vector` contains its components about the body's own axes. All components are Fractions.
-        """
+        """Return the exact components of a vector about the principal axes."""
         first, second, third = (
             sum((x * v for x, v in zip(axis, vector, strict=True)), Fraction(0))
             for axis in self.exact_axes
@@ -55,10 +52,10 @@ class PrincipalFrame:
 
 
 def checked_inertia(where: str, values: object) -> Matrix:
-    """Return a user's inertia matrix (kg m2) as a tuple of rows, made exactly symmetric.
+    """Return a user's inertia matrix (kg m2) as rows, made exactly symmetric.
 
-    Raise InputError, with `where` in front of the message, unless `values` are three rows of three
-    finite numbers, symmetric up to rounding, with positive principal moments.
+    Raise InputError, beginning with `where`, unless it is symmetric up to rounding, with positive
+    moments.
     """
     matrix = symmetric_matrix(where, values)
     least = min(principal_frame(matrix).exact_moments)
@@ -71,11 +68,7 @@ def checked_inertia(where: str, values: object) -> Matrix:
 
 
 def symmetric_matrix(where: str, values: object) -> Matrix:
-    """Return a user's symmetric matrix as a tuple of rows, made exactly symmetric.
-
-    Raise InputError, with `where` in front of the message, unless `values` are three rows of three
-    finite numbers, symmetric up to rounding.
-    """
+    """Return a user's symmetric matrix as rows, or raise InputError; moments are not checked."""
     allowed = "allowed: three rows of three finite numbers, kg m2"
     rows = list(number_list(where, values, allowed))
     if any(isinstance(converted(row), float) for row in rows):
@@ -98,11 +91,10 @@ def symmetric_matrix(where: str, values: object) -> Matrix:
 
 @lru_cache(maxsize=_KEPT)
 def principal_frame(inertia: Matrix) -> PrincipalFrame:
-    """Return the principal moments and axes of a symmetric inertia matrix (kg m2).
+    """Return the principal moments and axes of an inertia matrix (kg m2), which are cached.
 
-    The result is a `PrincipalFrame`, and is cached. The moments are not sorted by size, because
-    each principal axis has the number of the body axis that it is nearest to. Every moment is
-    accurate to its last digit, even if it is much smaller than the others.
+    Moments are not sorted; each is accurate to its last digit, even if much smaller than the
+    others.
     """
     found = diagonalised(inertia)
     order: list[int] = []
@@ -125,11 +117,7 @@ def principal_frame(inertia: Matrix) -> PrincipalFrame:
 
 
 def principal_axes(inertia: Matrix) -> tuple[Triple, Array]:
-    """Return the principal moments (kg m2) of an inertia matrix, and its principal axes.
-
-    The axes are the columns of a (3, 3) array. They form a right-handed frame. Their order and
-    signs are chosen so that each axis is near to the body's own axis of the same number.
-    """
+    """Return the principal moments (kg m2), and the axes as columns of a (3, 3) array."""
     found = principal_frame(inertia)
     return found.moments, found.axes.copy()
 
@@ -139,10 +127,7 @@ def _turned(axis: Exact) -> Exact:
 
 
 def _determinant(axes: list[Exact]) -> float:
-    """Return the determinant of three orthonormal axes, which is 1 or -1 up to rounding errors.
-
-    It is computed with floats, which suffice for its sign.
-    """
+    """Return the determinant of three orthonormal axes, 1 or -1 up to rounding errors."""
     (a, b, c), (d, e, f), (g, h, k) = ([float(x) for x in axis] for axis in axes)
     return a * (e * k - f * h) - b * (d * k - f * g) + c * (d * h - e * g)
 

@@ -1,6 +1,7 @@
 """Torque laws in symbols: the value of a law, its integral over time, and its derivative.
 
-A law here is any vector that has the form of a `TorqueLaw`: a torque, or a magnetic field.
+A law is any vector in the form of a `TorqueLaw`, also a magnetic field. Times and attitudes may be
+symbols.
 """
 
 from typing import Any
@@ -12,7 +13,7 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def law_value(law: TorqueLaw, time: Any) -> Array:
-    """Return the three components of a law at a time, which is a symbol, about the law's axes."""
+    """Return the three components of a law at a time, about the law's axes."""
     found: list[Any] = [c + r * time for c, r in zip(law.constant, law.rate, strict=True)]
     waves = [(amplitude, np.sin(frequency * time)) for amplitude, frequency in law.sines]
     waves += [(amplitude, np.cos(frequency * time)) for amplitude, frequency in law.cosines]
@@ -22,7 +23,7 @@ def law_value(law: TorqueLaw, time: Any) -> Array:
 
 
 def law_integral(law: TorqueLaw, time: Any) -> Array:
-    """Return the integral of a law from time 0 to a time, which is a symbol: three components."""
+    """Return the integral of a law from time 0: three components."""
     square = time * time
     found: list[Any] = [
         c * time + 0.5 * r * square for c, r in zip(law.constant, law.rate, strict=True)
@@ -41,20 +42,16 @@ def law_integral(law: TorqueLaw, time: Any) -> Array:
 
 
 def law_derivative(law: TorqueLaw) -> TorqueLaw:
-    """Return the derivative of a law with respect to time, about the same axes.
-
-    Raise InputError if the product of an amplitude and its frequency overflows.
-    """
+    """Return the derivative of a law, or raise InputError if an amplitude overflows."""
     sines = [([-f * a for a in amplitude], f) for amplitude, f in law.cosines]
     cosines = [([f * a for a in amplitude], f) for amplitude, f in law.sines]
     return TorqueLaw(law.rate, sines=sines, cosines=cosines, frame=law.frame)
 
 
 def to_body(vector: Any, attitude: Any) -> Array:
-    """Return a vector about the body axes, from its three components about the axes of space.
+    """Return a vector about the axes of space in components about the body axes.
 
-    `attitude` is a unit quaternion from body to space, scalar first. Both may be symbols. The
-    matrix of the rotation is written out, because terms of one torque then share its products.
+    The rotation matrix is written out, because terms of one torque then share its products.
     """
     u, v, w = vector
     a, x, y, z = attitude
@@ -67,6 +64,6 @@ def to_body(vector: Any, attitude: Any) -> Array:
 
 
 def body_torque(law: TorqueLaw, time: Any, attitude: Any) -> Array:
-    """Return the components about the body axes of a law at a time; all arguments are symbols."""
+    """Return the components of a law about the body axes."""
     value = law_value(law, time)
     return to_body(value, attitude) if law.in_space else value

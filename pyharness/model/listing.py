@@ -1,8 +1,8 @@
 """Listings: programs of the thesis with a choice of their defects, readings and conjectures.
 
-A card has one line of a program. A defect is a mistake of the printed program, and a reading is an
-interpretation of a doubtful card. A conjecture is an assumption about a statement for which no card
-exists.
+A card has one line of a program. A defect is a mistake of the printed program, active if not
+corrected; a reading an interpretation of a doubtful card other than the one that we adopt; a
+conjecture an assumption about a statement for which no card exists.
 """
 
 from collections.abc import Iterable, Set
@@ -27,19 +27,18 @@ class Listing:
     program : {"two-term", "four-term", "runge-kutta"}
         The name of the program.
     defects : frozenset of str
-        The active defects, which are mistakes of the printed program that are not corrected.
+        The active defects: mistakes of the printed program that are not corrected.
     readings : frozenset of str
-        The active readings, which are the ones that the program follows. A reading is an
-        interpretation of a doubtful original statement, other than the one that we adopt. A
-        corrected program has no readings, because no reading changes a corrected statement.
+        The active readings: interpretations of doubtful statements, other than the one that we
+        adopt. None changes a corrected program.
     conjectures : frozenset of str
-        The active assumptions about statements that are on no printed card. Names of conjectures
-        and readings are also accepted among `defects`.
+        The active assumptions about missing statements. `defects` accepts these names, and those of
+        readings, too.
 
     Raises
     ------
     InputError
-        For an unknown program, or for a name that the program does not have.
+        For an unknown program, or a name that it does not have.
 
     Examples
     --------
@@ -68,10 +67,7 @@ class Listing:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the given names, and assign each to its kind: defect, reading or conjecture.
-
-        Raise InputError for an unknown program, or for a name that the program does not have.
-        """
+        """Assign the names to their kinds; raise InputError for an unknown program or name."""
         _check_program(self.program)
         given = {field: _names(field, getattr(self, field)) for field in _FIELDS.values()}
         for kind in ("reading", "conjecture"):
@@ -87,12 +83,9 @@ class Listing:
 
     @property
     def label(self) -> str:
-        """The kind of listing, as text: `original`, `corrected` or `custom`.
+        """The kind of listing: `corrected` if nothing is active, `original`, or `custom`.
 
-        The label is `corrected` if no defect (mistake), reading (interpretation of a doubtful
-        statement) or conjecture (assumption about a missing statement) is active. It is `original`
-        if, apart from readings, exactly the defects and conjectures that `switches` returns are
-        active. It is `custom` otherwise.
+        Readings do not matter to `original`, but the defects and conjectures of `switches` do.
         """
         if not self.active:
             return "corrected"
@@ -102,72 +95,37 @@ class Listing:
 
     @property
     def active(self) -> frozenset[str]:
-        """The names of all active defects, readings and conjectures of the listing.
-
-        The listing is a program with a choice of these. A defect (mistake) is active if it is not
-        corrected. A reading (interpretation of a doubtful statement) or a conjecture (assumption
-        about a missing statement) is active if the program follows it.
-        """
+        """The names of all active defects, readings and conjectures."""
         return self.defects | self.readings | self.conjectures
 
     @property
     def flags(self) -> int:
-        """The active defects, readings and conjectures as a bit mask, an integer.
-
-        The compiled programs take this integer as an argument. A defect (mistake) is active if it
-        is not corrected. A reading (interpretation of a doubtful statement) or a conjecture
-        (assumption about a missing statement) is active if the program follows it.
-        """
+        """The active names as a bit mask, an argument of the compiled programs."""
         return sum(1 << entry["flag"] for entry in flagged() if entry["id"] in self.active)
 
     @classmethod
     def original(cls, program: str, readings: Iterable[str] = ()) -> "Listing":
-        """Return the listing of the original program, with all its defects active.
-
-        The conjectures (assumptions) that belong to the original, as `switches` says, are active
-        too. The given `readings`, which are interpretations of doubtful statements, are also
-        active.
-        """
+        """Return the listing with all defects, the conjectures of `switches`, and `readings`."""
         return cls(program, frozenset(switches(program)), frozenset(readings))
 
     @classmethod
     def corrected(cls, program: str) -> "Listing":
-        """Return the listing of the corrected program.
-
-        In this listing no defect (mistake), reading (interpretation of a doubtful statement) or
-        conjecture (assumption about a missing statement) is active.
-        """
+        """Return the listing in which nothing is active."""
         return cls(program, frozenset())
 
     def has(self, name: str) -> bool:
-        """Return whether the defect, reading or conjecture with this name is active.
-
-        A defect (mistake) is active if it is not corrected. A reading (interpretation of a doubtful
-        statement) or a conjecture (assumption about a missing statement) is active if the program
-        follows it.
-        """
+        """Return whether the defect, reading or conjecture is active."""
         return name in self.active
 
 
 def flagged() -> list[dict[str, Any]]:
-    """Return the entries of the critical apparatus that a listing can switch on or off.
-
-    A listing is a program with a choice of its defects (mistakes), readings (interpretations) and
-    conjectures (assumptions). The critical apparatus, the file `data/apparatus.toml`, has an entry
-    for each of them. The key "flag" of an entry is the number of its bit in `Listing.flags`.
-    """
+    """Return the switchable entries of `data/apparatus.toml`; "flag" is the bit of each."""
     return [entry for entry in facts("apparatus")["entry"] if "flag" in entry]
 
 
 @cache
 def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
-    """Return the names of all defects, of all readings or of all conjectures.
-
-    `kind` is "defect", "reading" or "conjecture". A defect is a mistake of a printed program, a
-    reading an interpretation of a doubtful statement, and a conjecture an assumption about a
-    statement that is on no card. If `program` is given, only the names that this program has are
-    returned.
-    """
+    """Return the names of a kind, "defect", "reading" or "conjecture", in one program or all."""
     return tuple(
         entry["id"]
         for entry in flagged()
@@ -176,24 +134,13 @@ def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
 
 
 def switchable(program: str | None = None) -> tuple[str, ...]:
-    """Return the names of all defects, readings and conjectures, in this order.
-
-    A defect is a mistake of a printed program, a reading an interpretation of a doubtful statement,
-    and a conjecture an assumption about a statement that is on no card. The options --fix and
-    --keep accept these names. If `program` is given, only the names that this program has are
-    returned.
-    """
+    """Return the names of all defects, readings and conjectures, which --fix and --keep accept."""
     return tuple(name for kind in _FIELDS for name in names_of(kind, program))
 
 
 @cache
 def switches(program: str) -> tuple[str, ...]:
-    """Return the names of the defects and conjectures that are active in the original program.
-
-    All its defects (mistakes) are active, which means that they are not corrected. A conjecture (an
-    assumption about a statement that is on no card) is active, which means that the program follows
-    it, if its entry in `data/apparatus.toml` has the key `in_original`, with the value true.
-    """
+    """Return the defects, and the conjectures with `in_original`, of the original program."""
     return tuple(
         entry["id"]
         for entry in flagged()
@@ -213,27 +160,23 @@ def subset(
 ) -> Listing:
     """Return a Listing: a program with a selection of its defects, readings and conjectures.
 
-    A defect is a mistake of the printed program, and a reading an interpretation of a doubtful
-    statement. The parameters correspond to the options --program, --listing (`base`), --fix,
-    --keep, --reading and --conjecture of the command line.
+    The parameters are those of the command line; `Listing` explains the three kinds.
 
     Parameters
     ----------
     program : {"two-term", "four-term", "runge-kutta"}
         The name of the program.
     base : {"original", "corrected"}, optional
-        The listing to start from. The default is `corrected` if `keep` has names and `fix` has no
-        names, else `original`.
+        The listing to start from. The default is `corrected` if only `keep` has names, else
+        `original`.
     fix, keep : iterable of str
-        Names of defects, readings or conjectures: those to correct, and those to keep active.
+        Names to correct, and names to keep active.
     readings : iterable of str
-        The readings to activate; an active reading replaces the adopted one. If the base is
-        `corrected`, only `keep` activates a reading, because a corrected statement has its intended
-        form under every reading.
+        The readings to activate. If the base is `corrected`, only `keep` activates one, because a
+        corrected statement is the same under every reading.
     conjectures : iterable of str, optional
-        The assumptions to make where no card exists, or ``none`` for no assumption. The default is
-        the conjectures of `Listing.original`. If the base is `corrected`, only
-        `keep` activates a conjecture.
+        The assumptions to make, or ``none``. The default is those of `Listing.original`; if the
+        base is `corrected`, only `keep` activates one.
 
     Returns
     -------
@@ -243,8 +186,8 @@ def subset(
     Raises
     ------
     InputError
-        For an unknown program or base, a name in both `fix` and `keep`, ``none`` together with
-        another conjecture, or a name that the program does not have.
+        For an unknown program, base or name, a name in both `fix` and `keep`, and ``none`` beside
+        another conjecture.
 
     Examples
     --------
@@ -284,7 +227,7 @@ def subset(
 
 
 def checked_listing(listing: object) -> Listing:
-    """Return the user's argument `listing`, or raise InputError if it is not a Listing."""
+    """Return the user's argument `listing`, or raise InputError."""
     if isinstance(listing, Listing):
         return listing
     raise InputError(f"listing is {kind_of(listing)}; it must be a Listing, as subset makes one")

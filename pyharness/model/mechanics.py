@@ -1,4 +1,8 @@
-"""The mechanical quantities of a trajectory: angular momentum, energy, power and work."""
+"""The mechanical quantities of a trajectory: angular momentum, energy, power and work.
+
+An inertia that changes with time is that at the time of the row. Where moments of inertia are
+needed, coefficients raise InputError.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -17,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Mechanics:
-    """A base class of trajectories, with the quantities that follow from omega and the body."""
+    """A base class of trajectories, with what follows from omega and the body."""
 
     time: Array
     omega: Array
@@ -32,7 +36,7 @@ class Mechanics:
         Returns
         -------
         scipy.spatial.transform.Rotation
-            One rotation for each row (time) of the trajectory.
+            One rotation for each row.
 
         Raises
         ------
@@ -44,9 +48,7 @@ class Mechanics:
         return Rotation.from_quat(self._attitudes()[:, [1, 2, 3, 0]])
 
     def angular_momentum(self, frame: str = "body") -> Array:
-        """Return the angular momentum in each of n rows, about the axes of the body or of space.
-
-        An inertia that changes with time is that at the time of the row.
+        """Return the angular momentum in each row, about the axes of the body or of space.
 
         Parameters
         ----------
@@ -61,8 +63,7 @@ class Mechanics:
         Raises
         ------
         InputError
-            If the body was specified without moments of inertia. Also for an unknown frame, or the
-            axes of space if the attitude was not requested.
+            If the body has no moments, the frame is unknown, or "space" comes without attitude.
         """
         if frame not in FRAMES:
             raise unknown("frame", str(frame), FRAMES)
@@ -70,9 +71,7 @@ class Mechanics:
         return momentum if frame == "body" else turned_to_space(self._attitudes(), momentum)
 
     def energy(self) -> Array:
-        """Return the kinetic energy of the rotation in each of the n rows of the trajectory.
-
-        An inertia that changes with time is that at the time of the row.
+        """Return the kinetic energy of the rotation in each row.
 
         Returns
         -------
@@ -82,27 +81,23 @@ class Mechanics:
         Raises
         ------
         InputError
-            If the body was specified without moments of inertia.
+            If the body has no moments.
         """
         energy: Array = 0.5 * (self.omega * self._momentum(self.omega)).sum(axis=1)
         return energy
 
     def power(self) -> Array:
-        """Return the power of the torque in each of the n rows of the trajectory.
-
-        The power is the scalar product of the torque and omega. It is positive while the torque
-        increases the kinetic energy of the body.
+        """Return the power of the torque, its scalar product with omega, in each row.
 
         Returns
         -------
         ndarray, shape (n,)
-            The power, W. It is NaN where the torque is singular.
+            The power, W; NaN where the torque is singular.
 
         Raises
         ------
         InputError
-            If the body was specified without moments of inertia, or if the trajectory is not a
-            result of the function `solve`.
+            If the body has no moments, or `solve` did not make the trajectory.
 
         References
         ----------
@@ -133,16 +128,12 @@ class Mechanics:
         return power
 
     def work(self) -> Array:
-        """Return the work that the torque has done on the body from time 0 to each of the n rows.
+        """Return the work of the torque on the body from time 0 to each row.
 
-        The work is the change of the kinetic energy since time 0. At negative times it has the
-        opposite sign of the work from that time until time 0. The wheels of the ready term `wheels`
-        are no part of the body; the energy of their motors is therefore not included.
-
-        The work is computed as (omega - omega0) . I (omega + omega0) / 2, where I is the inertia
-        and omega0 is omega at time 0. Unlike a difference of two energies, this product loses no
-        digits to rounding where all components of omega have changed little. Its error is then that
-        of omega, multiplied by the angular momentum.
+        It is the change of the kinetic energy; the motors of the ready term `wheels` are not
+        included. Computed as (omega - omega0) . I (omega + omega0) / 2 it loses no digits where
+        omega has changed little, unlike a difference of energies; its error is that of omega times
+        the angular momentum.
 
         Returns
         -------
@@ -152,21 +143,13 @@ class Mechanics:
         Raises
         ------
         InputError
-            If the body was specified without moments of inertia, if the inertia changes with time,
-            or if the trajectory is not a result of the function `solve`.
+            If the body has no moments, the inertia changes with time, or `solve` did not make the
+            trajectory.
 
         References
         ----------
         H. Goldstein, C. Poole and J. Safko, Classical Mechanics, 3rd edition, 2002, sections 1.1
         and 5.3.
-
-        Examples
-        --------
-        >>> from pyharness import Scene, solve
-        >>> from pyharness.torques import damping
-        >>> scene = Scene("damped", (0, 0, 2), moments=(3, 2, 1), torque=damping(0.5))
-        >>> solve(scene, [0.0, 2.0]).work().round(6)
-        array([ 0.      , -1.729329])
         """
         if isinstance(self._checked_moments(), Changing):
             # The forces that change the inertia change the kinetic energy too.
@@ -211,11 +194,7 @@ class Mechanics:
 
 
 def turned_to_space(attitude: Array, vectors: Array) -> Array:
-    """Transform n vectors from body-axis components to components along the axes of space.
-
-    `attitude` has a unit quaternion, from body to space, for each vector, shape (n, 4). `vectors`
-    and the result have the shape (n, 3).
-    """
+    """Transform n vectors, shape (n, 3), from the body to space, by unit quaternions, (n, 4)."""
     scalar, vector = attitude[:, :1], attitude[:, 1:]
     twice = 2.0 * np.cross(vector, vectors)
     return vectors + scalar * twice + np.cross(vector, twice)

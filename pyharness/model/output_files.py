@@ -12,10 +12,9 @@ from pyharness.model.pipes import write_waiting
 
 
 def check_writable(path: str, option: str) -> None:
-    """Raise InputError if no file can be written at the path `path`.
+    """Raise InputError, which names `option`, if no file can be written at `path`.
 
-    The error message names `option`, the option that gave the path. Callers make this check before
-    any computation.
+    Callers check before any computation.
     """
     try:
         # A link is followed to its target, as in an ordinary write.
@@ -52,13 +51,11 @@ def check_writable(path: str, option: str) -> None:
 
 
 def write_files(contents: dict[str, bytes], option: str) -> None:
-    """Write several files, either all or none.
+    """Write several files, by path, either all or none.
 
-    `contents` has the content of each file by its path. The files are first written under temporary
-    names, and then all are renamed. After any failure or interrupt, Ctrl-C included, the previous
-    files are restored. A path that is a special file (a device, a pipe) is written to before the
-    other files, and is never replaced. Raise InputError, which names `option`, the option that gave
-    the paths, if a file can't be written.
+    They are written under temporary names and then renamed; after any failure or Ctrl-C the
+    previous files are restored. Devices and pipes are written first, and never replaced. Raise
+    InputError, which names `option`, if a file can't be written.
     """
     path = ""
     try:
@@ -90,10 +87,10 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
 
 
 class DeferredInterrupt:
-    """A context manager that defers Ctrl-C, which could otherwise leave temporary files behind."""
+    """A context that defers Ctrl-C, which could leave temporary files behind."""
 
     def __enter__(self) -> Self:
-        """Install a signal handler that only records an interrupt by Ctrl-C."""
+        """Install a handler that only records an interrupt."""
         self._came = False
         self._before = signal.getsignal(signal.SIGINT)
         # Python raises KeyboardInterrupt in the main thread alone.
@@ -103,14 +100,14 @@ class DeferredInterrupt:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Restore the previous signal handler, and call it if Ctrl-C was pressed in between."""
+        """Restore the previous handler, and call it if Ctrl-C was pressed."""
         if self._holds:
             signal.signal(signal.SIGINT, self._before)
         if self._came and callable(self._before):
             self._before(signal.SIGINT, None)
 
     def check(self) -> None:
-        """Raise KeyboardInterrupt if Ctrl-C was pressed since the context was entered."""
+        """Raise KeyboardInterrupt if Ctrl-C was pressed."""
         if self._came:
             raise KeyboardInterrupt
 
@@ -119,11 +116,7 @@ class DeferredInterrupt:
 
 
 class _File:
-    """A file that is being written to a temporary path and is then renamed.
-
-    `target` is its final path, `new` the temporary path of the new content, and `old` the path of a
-    copy of the previous content.
-    """
+    """A file `target` with the temporary paths of its `new` content and its `old` copy."""
 
     def __init__(self, path: str) -> None:
         self.path = path
@@ -171,5 +164,5 @@ def _remove(names: list[str]) -> None:
 
 
 def _is_special(path: str) -> bool:
-    """Return whether a path exists and is a device, a pipe or a folder, not an ordinary file."""
+    """Return whether a path exists and is no ordinary file."""
     return Path(path).exists() and not Path(path).is_file()

@@ -23,11 +23,10 @@ def share(
     threads: int,
     given_up: NDArray[np.int32],
 ) -> None:
-    """Call `work` for each of `pieces`, which are ranges of bodies, in at most `threads` threads.
+    """Call `work` for each of `pieces`, ranges of bodies, in at most `threads` threads.
 
-    `given_up` is an array of one integer, 0 at first. With several threads it is set to 1 if an
-    exception is raised, for example after Ctrl-C. The compiled kernels that `work` calls poll this
-    integer. Therefore they end early in all threads.
+    After an exception in a thread, as by Ctrl-C, the integer `given_up` is set to 1; the kernels
+    poll it, and end early in all threads.
     """
     if threads == 1 or len(pieces) < 2:
         # The work is done in the calling thread, because only the main thread receives signals.
@@ -49,11 +48,9 @@ def share(
 
 
 def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, threads: int) -> None:
-    """Divide n bodies into pieces, and call `work` for each piece in at most `threads` threads.
+    """Divide n bodies into pieces of nearly the same size, and call `work` for each in threads.
 
-    `work` has two arguments: a piece, which is a slice of the bodies, and an array of one integer.
-    The integer is set to 1 after an exception, such as an interrupt by the user, and `work` should
-    then end. All pieces have nearly the same size, so that all threads end at nearly the same time.
+    Its arguments are a slice, and the integer of `share`.
     """
     if not n:
         return

@@ -13,27 +13,11 @@ _PIECE = 1 << 20
 
 
 def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) -> bytes:
-    """Return the content of a file that a user named.
+    """Return the content of a file or pipe, such as ``/dev/stdin``, that a user named.
 
-    All files that users name are read by this function. The file may be a regular file, or a pipe
-    (for example ``/dev/stdin``) to which another process writes.
-
-    Parameters
-    ----------
-    path : path
-        Path of the file.
-    where : str
-        Start of an error message, as in ``scene file 'brick.toml'``.
-    limit : int
-        Largest size of the content, in bytes.
-    what : str
-        Kind of file that is expected, for an error message, as in ``a TOML file``.
-
-    Raises
-    ------
-    InputError
-        For a file that can't be read, a folder, a device, a file larger than `limit`, or a pipe
-        that delivers no data for `PATIENCE` (10) seconds.
+    Raise InputError, beginning with `where`, for what can't be read, a folder, a device, more than
+    `limit` bytes, or a pipe without data for `PATIENCE` (10) seconds. The message names `what` is
+    expected, as "a TOML file".
     """
     try:
         content = _read(os.fspath(path), limit)
@@ -46,10 +30,7 @@ def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) 
 
 
 def _read(path: str, limit: int) -> bytes | None:
-    """Return the content of a file, or None if it has more than `limit` bytes.
-
-    Raise OSError if the file can't be read.
-    """
+    """Return the content of a file, or None if it has more than `limit` bytes."""
     # Without O_NONBLOCK, opening a pipe waits for a writer.
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
     try:
@@ -75,17 +56,14 @@ def _read(path: str, limit: int) -> bytes | None:
 
 
 def _is_quiet(handle: int) -> bool:
-    """Return whether an open character device is a terminal or the null device.
-
-    Only these character devices may be read. `handle` is the file descriptor of the device.
-    """
+    """Return whether a device is a terminal or the null device, which alone may be read."""
     return os.isatty(handle) or os.fstat(handle).st_rdev == os.stat(os.devnull).st_rdev
 
 
 def write_waiting(path: str, content: bytes) -> None:
-    """Write the bytes `content` to a device, or to a pipe once the pipe has a reader.
+    """Write to a device, or to a pipe once it has a reader.
 
-    Raise OSError if the pipe has no reader within `PATIENCE` (10) seconds.
+    Raise OSError if there is none within `PATIENCE` (10) seconds.
     """
     end = time.monotonic() + PATIENCE
     while True:

@@ -7,7 +7,7 @@ Polynomial = tuple[float, ...]
 
 
 def powers(time: Any, count: int) -> list[Any]:
-    """Return the first `count` powers of a time, from power 0; the time may be a symbol."""
+    """Return the first `count` powers of a time, perhaps a symbol, from power 0."""
     found: list[Any] = [1.0]
     while len(found) < count:
         found.append(found[-1] * time)

@@ -16,11 +16,11 @@ from pyharness.model.waves import exact_law
 
 @dataclass(frozen=True)
 class PrincipalScene(Scene):
-    """A scene (problem) about the principal axes, with moments in double-double precision.
+    """A scene about the principal axes, with moments in double-double precision.
 
-    The coefficients A, B, C of Euler's equations (13-15 of the thesis) contain differences of
-    moments. If two moments are nearly equal, rounding errors in binary64 would be a large part of
-    their difference. `moments_low` is the exact moments minus `moments` (kg m2).
+    The coefficients of Euler's equations contain differences of moments, of which rounding errors
+    would be a large part if two are nearly equal. `moments_low` is the exact moments minus
+    `moments` (kg m2).
     """
 
     moments_low: Triple = (0.0, 0.0, 0.0)
@@ -34,10 +34,7 @@ class PrincipalScene(Scene):
 
     @cached_property
     def euler_coefficients(self) -> Triple:
-        """The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
-
-        Each coefficient is computed exactly from `exact_moments`, and then rounded once.
-        """
+        """The coefficients A, B, C from `exact_moments`, each rounded once."""
         i1, i2, i3 = self.exact_moments
         exact = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
         a, b, c = map(nearest_float, exact)
@@ -50,25 +47,22 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
     Parameters
     ----------
     scene : Scene
-        The scene to transform, with a full inertia matrix (`Scene.inertia`). Any other scene is
-        returned unchanged, with the identity matrix as its axes.
+        The scene, with a full inertia matrix. Any other is returned unchanged, with the identity
+        matrix.
 
     Returns
     -------
     scene : Scene
-        The same problem in components about the principal axes, with `moments` instead of
-        `inertia`. Its `attitude` is the attitude of the principal axes. A torque about the axes of
-        space is unchanged. With such a torque the result has an attitude even if `scene` has none.
+        The same problem with `moments`, and with the attitude of the principal axes. A torque about
+        the axes of space is unchanged, and the result then has an attitude.
     axes : ndarray, shape (3, 3)
-        The principal axes in columns, as components about the body's own axes. They form a
-        right-handed frame. Their order and signs are chosen so that each axis is near to the body's
-        own axis of the same number.
+        The principal axes in columns, about the body's own: a right-handed frame, in which each
+        axis is near to the body's own of its number.
 
     Raises
     ------
     InputError
-        If amplitudes of the torque's waves of one frequency have a sum beyond the range of
-        binary64.
+        If the sum of amplitudes of one frequency is beyond the range of binary64.
 
     Examples
     --------
@@ -115,11 +109,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
 
 
 def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
-    """Return a trajectory, transformed from the principal axes back to the body's own axes.
-
-    `found` is a trajectory of the scene that `principal` returned. `axes` is the array of principal
-    axes, shape (3, 3), that `principal` returned with this scene.
-    """
+    """Return a trajectory of the scene of `principal`, transformed back to the body's own axes."""
     attitude = found.attitude
     if attitude is not None:
         w, x, y, z = quaternion_of_axes(axes)

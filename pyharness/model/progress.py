@@ -19,18 +19,11 @@ _bar: ContextVar[Any] = ContextVar("bar", default=None)
 
 
 def no_progress(done: int, total: int, what: str) -> None:
-    """Ignore a report of progress; this is the default function of computations that report it.
-
-    `done` is the number of completed parts, `total` the number of all parts, and `what` the name of
-    the current part.
-    """
+    """Ignore a report of progress: completed parts, all parts, and the current one."""
 
 
 def bar_of_bodies(is_shown: bool) -> AbstractContextManager[None]:
-    """Show a progress bar of the bodies that are computed in this context, if `is_shown`.
-
-    The bar is that of tqdm, in a terminal or in a notebook.
-    """
+    """Show tqdm's progress bar of the bodies that are computed in this context, if `is_shown`."""
     return _shown_bar() if is_shown else nullcontext()
 
 
@@ -52,14 +45,14 @@ def has_bar() -> bool:
 
 
 def expect_bodies(n: int) -> None:
-    """Tell the bar, if there is one, that n bodies are computed; only the first call counts."""
+    """Tell the bar, if any, that n bodies are computed; only the first call counts."""
     bar = _bar.get()
     if bar is not None and bar.total is None:
         bar.reset(total=n)
 
 
 def count_done(n: int) -> None:
-    """Tell the bar, if there is one, that n more bodies have been computed."""
+    """Tell the bar, if any, that n more bodies have been computed."""
     bar = _bar.get()
     if bar is not None:
         bar.update(n)

@@ -13,11 +13,9 @@ from pyharness.model.trajectory import Trajectory
 
 
 def scene_record(scene: Scene) -> dict[str, Any]:
-    """Return a scene (body, torque, initial conditions and steps) as a dictionary for JSON.
+    """Return a scene for JSON, with the keys of a scene file and "case".
 
-    The dictionary has the tables and keys of a scene file. In addition it has the key "case", the
-    number of the scene's case in Table 1 of the thesis, or None. For a torque that no scene file
-    can describe, "torque" has the number of recorded operations, or the key "opaque", instead.
+    A "torque" that no scene file can describe has the number of operations, or "opaque".
     """
     body, values = body_of(scene)
     return {
@@ -75,12 +73,7 @@ def _wave(wave: Wave) -> dict[str, Any]:
 
 
 def listing_record(listing: Listing) -> dict[str, Any]:
-    """Return a listing, a program with a choice of its defects, as a dictionary for JSON.
-
-    Its keys are "label", as in "corrected", and "defects", "readings" and "conjectures". The last
-    three have lists of the names of the mistakes that are kept, of the interpretations of doubtful
-    statements, and of the assumptions about missing statements.
-    """
+    """Return a listing for JSON: "label", and the names of its three kinds."""
     return {
         "label": listing.label,
         "defects": sorted(listing.defects),
@@ -90,11 +83,9 @@ def listing_record(listing: Listing) -> dict[str, Any]:
 
 
 def ending_record(trajectory: Trajectory) -> dict[str, Any]:
-    """Return how a run ended, as a dictionary for JSON.
+    """Return how a run ended for JSON: "steps", "evaluations", "stop" and "ended".
 
-    Its keys are "steps", "evaluations" (of the right-hand side), "stop" and "ended". "stop" has the
-    step, the variable and the Lipschitz quotient (1/s) at which the Lipschitz test stopped the run,
-    or is None. "ended" is the status in words, as in "complete".
+    "stop" has the step, the variable and the Lipschitz quotient (1/s), or is None.
     """
     stop = trajectory.stop
     return {
@@ -106,17 +97,10 @@ def ending_record(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def estimate_record(trajectory: Trajectory) -> dict[str, float | None]:
-    """Return a method's own estimates of its accuracy, as a dictionary for JSON.
-
-    Its keys are "error" (relative), "growth" (error amplification) and "digits" (number of correct
-    decimal digits). A value that is not known is None.
-    """
+    """Return "error" (relative), "growth" and "digits" of a method for JSON; None if unknown."""
     return {name: getattr(trajectory, name) for name in ("error", "growth", "digits")}
 
 
 def build_record() -> dict[str, Any]:
-    """Return the versions, compiler and compiler flags of this installation, for JSON.
-
-    The result is a dictionary with the attributes of `Build`.
-    """
+    """Return the attributes of `Build` for JSON."""
     return asdict(build())

@@ -1,7 +1,7 @@
-"""Reports: the results of a verb (subcommand) as data, which `pyharness.views` renders.
+"""Reports: the results of a verb as data, which `pyharness.views` renders.
 
-The types are named tuples and not dataclasses, because they are created whenever the program
-starts. The creation of a dataclass takes as long as that of five named tuples.
+The types are named tuples, because every start of the program creates them; a dataclass takes as
+long as five.
 """
 
 import math
@@ -17,10 +17,7 @@ if TYPE_CHECKING:
 
 
 def exact(value: Any) -> str:
-    """Return a value as text with all its digits, for CSV.
-
-    A float has as many digits as are needed to restore it exactly. None becomes an empty text.
-    """
+    """Return a value for CSV, a float with all digits, None as an empty text."""
     if isinstance(value, float):
         return float.__repr__(value)  # the repr of a NumPy float names its type
     if value is None:
@@ -29,12 +26,12 @@ def exact(value: Any) -> str:
 
 
 def plain(value: Any) -> str:
-    """Return a word or a whole number as text; None becomes a dash."""
+    """Return a word or whole number as text; None becomes a dash."""
     return "-" if value is None else str(value)
 
 
 def short(x: "float | Decimal | None") -> str:
-    """Return the number x as text with two digits, as in 1.2e-3; None becomes a dash."""
+    """Return a number with two digits, as 1.2e-3; None becomes a dash."""
     if x is None:
         return "-"
     if math.isnan(x) or math.isinf(x) or x == 0:
@@ -44,25 +41,17 @@ def short(x: "float | Decimal | None") -> str:
 
 
 def digits(form: str, scale: float = 1.0) -> Callable[[float | None], str]:
-    """Return a function that formats `scale` times a number as text.
-
-    `form` is the format specification, as in ``.3g``. The function returns a dash for None.
-    """
+    """Return a function that formats `scale` times a number by `form`, and None as a dash."""
     return lambda x: "-" if x is None else f"{scale * x:{form}}"
 
 
 def counted(number: int, what: str) -> str:
-    """Return a number with the noun `what`, in the plural if needed, as in 1 step, 2 steps."""
+    """Return a number with a noun, as in 1 step, 2 steps."""
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 class Column(NamedTuple):
-    """A column of a table: its heads, its unit, and the functions that format its values.
-
-    A table can be written with rounded numbers, or as CSV with all digits. With rounded numbers
-    `head` is the head, and `write` formats the values. In CSV `name` is the head, and `full`
-    formats the values.
-    """
+    """A column of a table: `head` and `write` for rounded numbers, `name` and `full` for CSV."""
 
     head: str
     write: Callable[[Any], str] = plain
@@ -74,34 +63,22 @@ class Column(NamedTuple):
 
 
 def words(heads: str) -> list[Column]:
-    """Return a list of left-aligned columns, one for each head in the text `heads`.
-
-    The heads in the text are separated by blanks.
-    """
+    """Return left-aligned columns with the heads in a text, separated by blanks."""
     return [Column(head, left=True) for head in heads.split()]
 
 
 class Table(NamedTuple):
-    """A table of a report: its columns, and its rows with a value for each column.
-
-    `rows` may be an array, shape (number of rows, number of columns).
-    """
+    """A table of a report; `rows` may be an array."""
 
     columns: Sequence[Column]
     rows: "Sequence[Sequence[Any]] | Array"
 
     def written(self) -> list[list[str]]:
-        """Return the table as lists of texts, first the heads and then the rows.
-
-        The numbers are rounded, as the function `write` of each column formats them.
-        """
+        """Return heads and rows as texts with rounded numbers."""
         return self._cells([(each.head, each.write) for each in self.columns])
 
     def in_full(self) -> list[list[str]]:
-        """Return the table for CSV as lists of texts, first the heads and then the rows.
-
-        The numbers have all their digits.
-        """
+        """Return heads and rows as texts with all digits."""
         return self._cells([(each.name or each.head, each.full) for each in self.columns])
 
     def _cells(self, columns: list[tuple[str, Callable[[Any], str]]]) -> list[list[str]]:
@@ -111,15 +88,12 @@ class Table(NamedTuple):
 
 
 def numbers(names: str, rows: Sequence[Sequence[Any]]) -> Table:
-    """Return a table of `rows` for CSV only.
-
-    The text `names` has the heads of its columns, separated by blanks.
-    """
+    """Return a table for CSV only; blanks separate its heads in `names`."""
     return Table([Column(name) for name in names.split()], rows)
 
 
 class Line(str):
-    """A line of a report that is not wrapped, however long it is."""
+    """A line of a report that is not wrapped."""
 
     __slots__ = ()
 
@@ -136,13 +110,10 @@ Section = Sequence[str | Field | Table]
 
 
 class Picture:
-    """A matplotlib figure, the table of the numbers that it shows, and the text of its title.
-
-    The title is a sequence of paragraphs.
-    """
+    """A matplotlib figure, the table of its numbers, and the paragraphs of its title."""
 
     def __init__(self, figure: "Figure", numbers: Table, title: Sequence[str] = ()) -> None:
-        """Store the figure, the table of the numbers that it shows, and its title."""
+        """Store the parts."""
         self.figure, self.numbers, self.title = figure, numbers, title
 
 
@@ -151,10 +122,7 @@ Case = tuple[str, str, str, str]
 
 
 class Report(NamedTuple):
-    """The results of a subcommand as data, from which every output format is written.
-
-    The formats are text, JSON, CSV, Markdown, JUnit and pictures.
-    """
+    """The results of a subcommand, from which every output format is written."""
 
     title: str  # the verb that made the report
     text: Sequence[Section]  # for the terminal; empty sections are skipped

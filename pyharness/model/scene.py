@@ -1,7 +1,4 @@
-"""Scenes, which are problems to solve: a body, a torque law, initial conditions and steps.
-
-Every value is checked when a scene is created.
-"""
+"""Scenes: a body, a torque, initial conditions and steps, checked when created."""
 
 import math
 import os
@@ -61,40 +58,38 @@ class Scene:
     """A problem to solve: a body, its torque, its initial conditions, and the steps of a program.
 
     Exactly one of `moments`, `coefficients` and `inertia` is required. Three numbers may be a list,
-    a tuple or an array; the fields are plain tuples of floats.
+    a tuple or an array; the fields are tuples of floats.
 
     Parameters
     ----------
     name : str
-        A title. It is shortened to one line of 60 characters, with unprintable characters escaped.
+        A title, shortened to one line of 60 printable characters.
     omega : three numbers
         The angular velocity about the body axes at time 0 (rad/s).
     moments : three numbers, or ChangingMoments, optional
-        The principal moments of inertia (kg m2), constant or as polynomials of time. For moments
-        that change, the attribute `moments` is None, and the attribute `changing` has them.
+        The principal moments of inertia (kg m2). If they change, the attribute `moments` is None,
+        and `changing` has them.
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
     torque : TorqueLaw, or function of (t, omega) or (t, omega, attitude)
-        The torque on the body; zero by default. A function returns the three components of the
-        torque about the body axes. It is called once, with symbols, and its arithmetic is recorded;
-        `attitude` is a quaternion from body to space, scalar first. A function that can't be
-        recorded is given as ``opaque(function)``.
+        The torque; zero by default. A function returns its components about the body axes; it is
+        called with symbols and recorded, or else given as ``opaque(function)``.
     step_size : float
-        The step size of the programs and of methods with a fixed step (s).
+        The step size of programs and methods with a fixed step (s).
     steps : int
         The number of steps of a program.
     masses, forces : three numbers
-        The masses (kg) and forces (N) in the equations of the three velocity components, which the
-        programs integrate too. The defaults are the numbers in the printed programs.
+        The masses (kg) and forces (N) in the velocity equations of the programs. The defaults are
+        the printed ones.
     case : int, optional
-        The number of the case in Table 1 of the thesis, if the scene is one of these cases.
+        The number of the case in Table 1 of the thesis.
     attitude : four numbers or scipy.spatial.transform.Rotation, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
     inertia : three rows of three numbers, or ChangingInertia, optional
-        A full symmetric inertia matrix about the body axes (kg m2), constant or as a polynomial of
-        time. For a matrix that changes, the attribute `inertia` is None, and `changing` has it.
+        A symmetric inertia matrix about the body axes (kg m2). If it changes, the attribute
+        `inertia` is None, and `changing` has it.
     changing : ChangingMoments or ChangingInertia, optional
-        An inertia that changes with time, as in `moments` and `inertia`.
+        An inertia that changes with time.
 
     Raises
     ------
@@ -145,10 +140,7 @@ class Scene:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the fields of the scene, and convert its real numbers to floats.
-
-        Raise InputError for an invalid value.
-        """
+        """Check the fields, and convert real numbers to floats, or raise InputError."""
         if not isinstance(self.name, str):
             raise InputError(f"name is {kind_of(self.name)}; it must be text")
         self._set("name", printable(" ".join(self.name.split()))[:_LONGEST_NAME].rstrip())
@@ -229,8 +221,8 @@ class Scene:
     def euler_coefficients(self) -> Triple:
         """The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
 
-        A is (I2 - I3)/I1; B and C follow by cyclic permutation. Raise InputError if the scene has a
-        full inertia matrix, or an inertia that changes with time.
+        A is (I2 - I3)/I1; B and C follow by cyclic permutation. Raise InputError for a full inertia
+        matrix, or one that changes with time.
         """
         if self.coefficients is not None:
             return self.coefficients
@@ -243,8 +235,7 @@ class Scene:
     def exact_moments(self) -> "Exact | None":
         """The principal moments (kg m2) as exact fractions; None for a body with coefficients.
 
-        The coefficients A, B, C of Euler's equations do not determine the moments. Raise InputError
-        if the scene has a full inertia matrix, or an inertia that changes with time.
+        Raise InputError for a full inertia matrix, or one that changes with time.
         """
         if self.coefficients is not None:
             return None
@@ -263,11 +254,10 @@ class Scene:
 
     @property
     def is_impossible(self) -> bool:
-        """Whether no rigid body has the moments of inertia of the scene.
+        """Whether no rigid body has the moments of inertia at time 0.
 
-        The largest moment then exceeds the sum of the other two, by more than rounding errors
-        (2**-50 of it) explain. The result is false for a body with coefficients. An inertia that
-        changes with time is that at time 0.
+        The largest then exceeds the sum of the other two by more than rounding (2**-50 of it).
+        Coefficients are always possible.
         """
         moments, inertia = self.moments, self.inertia
         if isinstance(self.changing, ChangingMoments):
@@ -282,10 +272,9 @@ class Scene:
 
     @property
     def law(self) -> TorqueLaw:
-        """The torque law, which depends on time alone.
+        """The torque law; read in place of `torque` by code that can treat no other scene.
 
-        Raise InputError if the torque depends on the state, or if the inertia changes with time.
-        Code that cannot treat such a scene therefore reads this property instead of `torque`.
+        Raise InputError if the torque depends on the state, or the inertia changes with time.
         """
         if self.changing is not None:
             raise InputError(CHANGING)
@@ -295,28 +284,17 @@ class Scene:
 
     @property
     def body_torque(self) -> TorqueLaw:
-        """The torque law about the axes of the body.
-
-        Raise InputError if the torque is about the axes of space, or depends on the state, or if
-        the inertia changes with time. Code that cannot treat such a scene therefore reads this
-        property instead of `torque`.
-        """
+        """The torque law about the axes of the body; raise InputError as `law`, or for space."""
         if self.torque.in_space:
             raise InputError(SPACE_TORQUE)
         return self.law
 
     def times(self) -> list[float]:
-        """Return the times (s) of a program's results, one for each step.
-
-        They are n times the step size, for n from 1 to the number of steps.
-        """
+        """Return the times (s) of a program's results, one for each step."""
         return [n * self.step_size for n in range(1, self.steps + 1)]
 
     def normalized_torque(self, time: float) -> Triple:
-        """Return M = N / I, the torque divided by the moments, at `time` (s): three numbers (1/s2).
-
-        If the body has coefficients instead of moments, its torque law is already M.
-        """
+        """Return the torque over the moments, M = N / I, at `time` (s): three numbers (1/s2)."""
         first, second, third = self.body_torque.at(time)
         if self.moments is None:
             return first, second, third
@@ -325,7 +303,7 @@ class Scene:
     def right_hand_side(self) -> Callable[[float, Sequence[float]], list[float]]:
         """Return the right-hand side f(t, omega) of Euler's equations (16-18 of the thesis).
 
-        The arguments of f are a time (s) and omega (rad/s). It returns three plain floats (rad/s2).
+        Its arguments are in s and rad/s, its three floats in rad/s2.
         """
         a, b, c = self.euler_coefficients
         if self.body_torque.varies:
@@ -348,7 +326,7 @@ class Scene:
 def most_steps() -> int:
     """Return the largest number of steps whose results fit in half of this machine's memory.
 
-    It is at most 400 million, because the compiled programs count in 32 bits.
+    It is at most 400 million: the compiled programs count in 32 bits.
     """
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return min(memory // 2 // _BYTES_PER_STEP, _COUNTABLE_STEPS)
@@ -371,9 +349,8 @@ def checked_scene(
 ) -> Scene:
     """Return the argument `scene`; raise InputError unless it is a Scene that the caller accepts.
 
-    A full inertia matrix is accepted if `any_axes` is true, a torque about the axes of space if
-    `any_torque` is true, a torque that depends on the state if `any_state` is true, and an
-    inertia that changes with time if `changing` is true.
+    The flags accept full inertia matrices, torques about the axes of space, torques of the state,
+    and changing inertia.
     """
     if isinstance(scene, Scene):
         if scene.changing is not None and not changing:

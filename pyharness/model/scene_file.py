@@ -1,6 +1,6 @@
-"""Scenes for the cases of Table 1 of the thesis, and the text of TOML files that describe scenes.
+"""Scenes of the cases of Table 1 of the thesis, and the text of TOML files of scenes.
 
-`pyharness.dynamics.scene_reader` reads scenes from these files.
+`pyharness.dynamics.scene_reader` reads these files. Each InputError begins with `where`.
 """
 
 import os
@@ -24,12 +24,12 @@ _WAVES = ("sines", "cosines")
 
 
 def case_numbers() -> list[int]:
-    """Return the list of the numbers, 1 to 7, of the cases of Table 1 of the thesis."""
+    """Return the numbers of the cases of Table 1 of the thesis."""
     return [entry["number"] for entry in facts("cases")["case"]]
 
 
 def case_scene(number: SupportsIndex) -> Scene:
-    """Return the scene (the problem to solve) of a case of Table 1 of the thesis.
+    """Return the scene of a case of Table 1 of the thesis.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def case_scene(number: SupportsIndex) -> Scene:
     Returns
     -------
     Scene
-        The case, with the step size (0.01 s) and the number of steps (100) that all cases share.
+        The case, with the common step size (0.01 s) and number of steps (100).
 
     Raises
     ------
@@ -70,28 +70,17 @@ def case_scene(number: SupportsIndex) -> Scene:
 
 
 def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
-    """Return the data of a user's TOML file as a dictionary.
-
-    Raise InputError, with `where` in front of the message, if the file can't be read or is not
-    TOML.
-    """
+    """Return the data of a user's TOML file; raise InputError if it can't be read."""
     return toml_of(read_file(path, where), where)
 
 
 def read_file(path: str | os.PathLike[str], where: str) -> bytes:
-    """Return the bytes of a user's TOML file.
-
-    Raise InputError, with `where` in front of the message, if the file can't be read. A caller that
-    needs the bytes twice must store them, because a pipe can be read only once.
-    """
+    """Return the bytes of a user's TOML file, which a pipe gives only once."""
     return read_input(path, where, _LARGEST_FILE, "a TOML file")
 
 
 def toml_of(content: bytes, where: str) -> dict[str, Any]:
-    """Return the data in the content of a TOML file as a dictionary.
-
-    Raise InputError, with `where` in front of the message, if the content is not TOML.
-    """
+    """Return the data of TOML; raise InputError if it is none."""
     try:
         return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError:
@@ -105,12 +94,10 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
 
 
 def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
-    """Return a scene as the text of a scene file, from which `read_scene` restores the scene.
+    """Return a scene as the text of a scene file, from which `read_scene` restores it bit for bit.
 
-    The restored numbers are bit-for-bit identical. Masses, forces and the number of the case are
-    not written, because scene files have no keys for them. `comments` are lines at the beginning of
-    the text. Raise InputError for a torque that no scene file can describe, as one that is an
-    opaque function or was recorded from a function, and for a text of more than 1 000 000 bytes.
+    Masses, forces and case are not written. `comments` are lines at the beginning. Raise InputError
+    for a torque that is an opaque or recorded function, and above 1 000 000 bytes.
     """
     import json
 
@@ -205,11 +192,9 @@ def _toml(value: Any) -> str:
 
 
 def body_of(scene: Scene) -> tuple[str, list[Any]]:
-    """Return the key and the value with which a scene file specifies the body of `scene`.
+    """Return the key, "moments", "coefficients" or "inertia", and the list of a scene file's body.
 
-    The key is "moments" (kg m2), "coefficients" or "inertia" (kg m2). The value is a list. If the
-    inertia changes with time, it has the coefficients of polynomials of time: a list for each of
-    the moments, or a list of matrices.
+    A changing inertia has a list for each moment, or a list of matrices.
     """
     if scene.inertia is not None:
         return "inertia", [list(row) for row in scene.inertia]
@@ -223,10 +208,7 @@ def body_of(scene: Scene) -> tuple[str, list[Any]]:
 
 
 def law_of_table(table: dict[str, Any]) -> TorqueLaw:
-    """Return the torque law with the keys and values of a table [torque] of a scene file.
-
-    Raise InputError if a value is invalid.
-    """
+    """Return the torque law of a table [torque]; raise InputError if a value is invalid."""
     waves = {key: _waves(f"[torque] {key}", table[key]) for key in _WAVES if key in table}
     return TorqueLaw(**{**table, **waves})
 
@@ -243,21 +225,16 @@ def _waves(where: str, entries: object) -> list[tuple[Any, Any]]:
 
 
 def check_written_schema(data: dict[str, Any], kind: str) -> None:
-    """Raise InputError if a file that users write has a schema number that is not supported.
+    """Raise InputError if a user's file of a `kind`, as "scene file", has an unsupported schema.
 
-    A schema number is the version of a file format. `data` are the data of the file, as a
-    dictionary. A missing schema number is accepted, and stands for the supported one. `kind` is the
-    kind of the file, as in "scene file".
+    A missing number stands for the supported one.
     """
     given = data.get("schema", SCHEMAS[kind])
     check_schema("top level", kind, given, "write it in that form, or take a version that reads it")
 
 
 def check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> None:
-    """Raise InputError if a table of a file has a key that is not among the keys in `allowed`.
-
-    `where` names the table; the message begins with it.
-    """
+    """Raise InputError if a table, named `where`, has a key that is not `allowed`."""
     for key in table:
         if key not in allowed:
             raise unknown("key", key, allowed, where)

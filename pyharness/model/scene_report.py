@@ -16,10 +16,7 @@ _LONGEST_TEXT = 60
 
 
 def heading(scene: Scene) -> list[str]:
-    """Return lines that describe a scene: name, body, torque, initial omega, steps, attitude.
-
-    A further line is a warning if no rigid body can have the moments of inertia.
-    """
+    """Return lines that describe a scene, with a warning if its moments are impossible."""
     if scene.inertia is not None:
         body = f"I = {', '.join(map(_tuple, scene.inertia))} kg m2"
     elif isinstance(scene.changing, ChangingMoments):
@@ -116,10 +113,7 @@ def _tuple(values: Sequence[float]) -> str:
 
 
 def ending(trajectory: Trajectory) -> str:
-    """Return a line that says how a run ended, and how many steps and evaluations it took.
-
-    The evaluations are those of the right-hand side.
-    """
+    """Return a line that says how a run ended, with its steps and evaluations."""
     steps = counted(trajectory.steps, "step")
     counts = f"{steps}, {counted(trajectory.evaluations, 'right-hand side')}"
     if trajectory.stop is not None:
@@ -142,20 +136,13 @@ def ending(trajectory: Trajectory) -> str:
 
 
 def sensitive(growth: float | None, digits: float | None) -> str:
-    """Return a phrase on a result whose amplified rounding error exceeds the requested tolerance.
-
-    `growth` is the error amplification of the motion. `digits` is the number of decimal digits that
-    are correct.
-    """
+    """Return a phrase on a result whose amplified rounding error exceeds the tolerance."""
     left = counted(math.floor(digits or 0.0), "digit")
     return f"sensitive: rounding errors are amplified by {short(growth)}; {left} left"
 
 
 def estimates(trajectory: Trajectory) -> list[str]:
-    """Return a line with a method's estimates of the error of its results, as a list.
-
-    The list has one element, or none if the method estimates no error.
-    """
+    """Return a line with a method's estimates of the error, or no line."""
     told = []
     if trajectory.error is not None and trajectory.digits is not None:
         told.append(f"estimated error {short(trajectory.error)} of the largest |omega|")

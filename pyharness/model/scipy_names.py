@@ -36,19 +36,14 @@ class SciPyNames:
 
     @property
     def t(self) -> Array:
-        """The times of the rows (s), shape (n,), which is the attribute `time`.
-
-        A result of SciPy's `solve_ivp` has its times in an attribute of this name.
-        """
+        """The attribute `time` (s), shape (n,)."""
         return self.time
 
     @property
     def y(self) -> Array:
-        """The state with one column for each time, as in a result of SciPy's `solve_ivp`.
+        """The state, one column for each time.
 
-        Without an attitude it is omega (rad/s), shape (3, n), and a view of the attribute `omega`.
-        With an attitude it is a new array, shape (7, n): omega, and then the four components of the
-        quaternion, scalar first.
+        It is a view of `omega` (rad/s), shape (3, n), or with the quaternion a new array, (7, n).
         """
         if self.attitude is None:
             return self.omega.T
@@ -61,21 +56,14 @@ class SciPyNames:
 
     @property
     def status(self) -> int:
-        """The ending of the integration as a number, with the meaning that it has in SciPy.
-
-        It is 0 if the integration reached all requested times, 1 if a terminal event ended it, and
-        -1 if it ended before for another reason, which is in the attribute `ended`.
-        """
+        """The ending as in SciPy: 0 if all times were reached, 1 by a terminal event, or -1."""
         if self.ended == "event":
             return 1
         return 0 if self.has_all_rows else -1
 
     @property
     def message(self) -> str:
-        """A sentence that says how the integration ended.
-
-        The same information is in the attributes `ended`, `stop`, `growth` and `digits`.
-        """
+        """A sentence that says how the integration ended."""
         if self.stop is not None:
             return (
                 f"The Lipschitz test ended the run at step {self.stop.step}, because the Lipschitz "
@@ -103,8 +91,5 @@ class SciPyNames:
 
     @property
     def nfev(self) -> int:
-        """The number of evaluations of the right-hand side, which is the attribute `evaluations`.
-
-        A result of SciPy's `solve_ivp` has this number in an attribute of this name.
-        """
+        """The attribute `evaluations`."""
         return self.evaluations

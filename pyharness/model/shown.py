@@ -11,10 +11,7 @@ _LONGEST = 60  # most characters of one value
 
 
 def short_repr(result: Any) -> str:
-    """Return a result, which is an instance of a dataclass, as text of at most ten lines.
-
-    An array is represented by its type and shape. Fields with the value None are omitted.
-    """
+    """Return a result as at most ten lines, arrays by type and shape, without None."""
     shown = [
         f"{each.name}={_short(value)}"
         for each in fields(result)
@@ -29,7 +26,7 @@ def short_repr(result: Any) -> str:
 
 
 def _short(value: Any) -> str:
-    """Return the value of one field of a dataclass as text on one line."""
+    """Return the value of a field on one line."""
     if isinstance(value, np.ndarray):
         return f"<{value.dtype} {value.shape}>"
     if isinstance(value, (tuple, list)) and value and is_dataclass(value[0]):

@@ -27,35 +27,30 @@ _ARGUMENTS = "allowed: a function of (t, omega), or of (t, omega, attitude)"
 class StateTorque:
     """A torque about the body axes that depends on time, omega and attitude.
 
-    Its unit is N m for a body with moments or inertia, and 1/s2 (torque over moment) for a body
-    with coefficients. Scenes create it from a function that the user gives as their torque.
+    In N m for a body with moments or inertia, in 1/s2 for coefficients. Scenes create it from the
+    function that is their torque.
 
     Attributes
     ----------
     tape : Tape or None
-        The recorded function; None for an opaque torque.
+        The recorded function; None if opaque.
     function : callable or None
-        The function of an opaque torque, else None.
+        The opaque function, else None.
     needs_attitude : bool
         Whether the torque depends on the attitude.
-    expression : tuple of str
-        The three expressions of a scene file from which the tape was recorded; empty if it was
-        recorded from a Python function.
-    constants : tuple of pairs
-        The names and values of the constants in `expression`.
+    expression, constants : tuple
+        The three expressions of a scene file that were recorded, and pairs of their constants.
     terms : tuple
-        The other summands as data of a scene file: at most one `TorqueLaw`, and then the ready
-        terms. A term is a tuple of pairs of keys and values, of which the first is its kind. Empty
-        for an expression alone, and if no scene file can describe the torque.
+        The other summands in a scene file: at most one `TorqueLaw`, and ready terms as pairs of
+        keys and values, first the kind.
     parameters : tuple of pairs
-        The names and values of the keyword arguments of the function from which the tape was
-        recorded, if it has such arguments with numbers as defaults.
+        Names and values of the recorded function's keyword arguments with numbers as defaults.
     varied : Tape or None
-        The function with these parameters as further inputs; None without parameters.
+        The function with these parameters as further inputs.
     parts : tuple
-        The torques and torque laws of a sum; empty for a torque that is no sum.
+        The torques and torque laws of a sum.
     is_zero, varies, in_space : bool
-        False, True and False. A `TorqueLaw` has these attributes too.
+        False, True and False, as of a `TorqueLaw`.
     """
 
     tape: Tape | None
@@ -73,7 +68,7 @@ class StateTorque:
     in_space: bool = field(default=False, init=False, repr=False)
 
     def __repr__(self) -> str:
-        """Return one line that names the kind of the torque, without the operations of its tape."""
+        """Return one line without the operations of the tape."""
         if self.tape is None:
             return f"StateTorque(opaque, needs_attitude={self.needs_attitude})"
         # Expressions may be long; three of them and their constants are shortened together.
@@ -88,11 +83,9 @@ class StateTorque:
         )
 
     def at(self, time: float, omega: Sequence[float], attitude: Sequence[float]) -> Triple:
-        """Return the three components of the torque at `time` (s).
+        """Return the torque at `time` (s), omega (rad/s) and attitude; NaN where it is singular.
 
-        `omega` has three components (rad/s), and `attitude` is a quaternion, scalar first. A
-        component is NaN where the torque is singular. Raise InputError if an opaque function does
-        not return three numbers.
+        Raise InputError if an opaque function does not return three numbers.
         """
         if self.tape is None:
             return _called(self.function, self.needs_attitude, time, omega, attitude)
@@ -103,10 +96,9 @@ class StateTorque:
         return first, second, third
 
     def __add__(self, other: "StateTorque | TorqueLaw | Function | int") -> "StateTorque":
-        """Return the sum with a torque, a torque law or a function, which is recorded.
+        """Return the sum with a torque, a torque law, a function, or 0, so that ``sum`` works.
 
-        The sum with the number 0 is the torque itself, so that ``sum`` accepts torques. Raise
-        InputError if one of the two is opaque.
+        Raise InputError if one of the two is opaque.
         """
         if type(other) is int and other == 0:
             return self
@@ -121,11 +113,7 @@ class StateTorque:
     __radd__ = __add__
 
     def rotated(self, axes: Array) -> "StateTorque":
-        """Return the torque about other body axes.
-
-        The columns of `axes`, shape (3, 3), are the new axes in components about the old ones. The
-        attitude of the result is that of the new axes.
-        """
+        """Return the torque, and its attitude, about the axes in columns of `axes`, (3, 3)."""
         if self.tape is None:
             raise InputError(
                 "an opaque torque can't be transformed to principal axes; allowed: a torque that "
@@ -136,12 +124,12 @@ class StateTorque:
 
 
 def torque_of(tape: Tape, time: Any, omega: Any, attitude: Any) -> Array:
-    """Return the three outputs of a tape in symbols, as an array, for symbols as its inputs."""
+    """Return the three outputs of a tape for symbols as its inputs."""
     return np.array(evaluate(tape, [time, *omega, *attitude], SYMBOLS), dtype=object)
 
 
 def replayed(function: Function) -> StateTorque:
-    """Return a torque recorded from a function of (t, omega, attitude) of this project."""
+    """Return a torque recorded from a function of this project."""
     tape = _tape_of(function)
     return StateTorque(tape, None, tape.needs_attitude)
 
@@ -159,32 +147,31 @@ def _recorded_with(recorder: Recorder, function: Function, names: Sequence[str] 
 
 
 def of_law(law: TorqueLaw) -> StateTorque:
-    """Return a torque law, about the axes of the body or of space, as a recorded torque."""
+    """Return a torque law about any axes as a recorded torque."""
     return replayed(lambda time, omega, attitude: body_torque(law, time, attitude))
 
 
 def recorded(function: Function) -> StateTorque:
     """Return the torque that a user's function computes, recorded with symbols.
 
-    A scene records the function of its torque itself; sums of functions are made with this one.
+    A scene records its function itself; this is for sums.
 
     Parameters
     ----------
     function : callable
-        A function of (t, omega) or of (t, omega, attitude) that returns the three components of the
-        torque about the body axes (N m). Keyword arguments whose defaults are numbers are
-        parameters, and `solve` computes sensitivities to them.
+        A function of (t, omega) or (t, omega, attitude) that returns the torque about the body axes
+        (N m). Keyword arguments with numbers as defaults are parameters for sensitivities.
 
     Returns
     -------
     StateTorque
-        The torque, which can be added to other torques.
+        The torque, which can be added to others.
 
     Raises
     ------
     InputError
-        If the function can't be recorded, does not return three numbers, or has a memory: it is
-        called at least twice, and must be recorded as the same operations.
+        If the function can't be recorded, does not return three numbers, or has a memory: two calls
+        must be recorded alike.
 
     Examples
     --------
@@ -213,21 +200,19 @@ def recorded(function: Function) -> StateTorque:
 def opaque(function: Any, *, needs_attitude: bool = False) -> StateTorque:
     """Return a torque that is evaluated by calling a function at each time step.
 
-    Only SciPy's methods solve a scene with such a torque. Under a compiled function, ``dop853``
-    does not call Python and is faster by two orders of magnitude.
+    Only SciPy's methods solve it. With a compiled function, ``dop853`` does not call Python and is
+    faster by two orders of magnitude.
 
     Parameters
     ----------
     function : callable
-        A function of (t, omega) or of (t, omega, attitude), which are a float and NumPy arrays. It
-        returns the three components of the torque about the body axes (N m). Or a compiled function
-        with the signature ``void (double, double *, double *, double *, void *)``: a
-        `scipy.LowLevelCallable`, a function of ctypes, or a cfunc of numba. Its arguments are the
-        time (s), the addresses of omega (rad/s) and of the attitude, the address to which it writes
-        the torque, and the user's data.
+        A function of (t, omega) or (t, omega, attitude), a float and arrays, that returns the
+        torque about the body axes (N m). Or a `scipy.LowLevelCallable`, a function of ctypes or a
+        cfunc of numba: ``void (double, double *, double *, double *, void *)``, with the time (s),
+        the addresses of omega (rad/s), attitude and torque, and the user's data.
     needs_attitude : bool
-        Whether a compiled function depends on the attitude. If it does not, the attitude that it is
-        given may be NaN. A Python function depends on the attitude if it has three arguments.
+        Whether a compiled function depends on the attitude, which may else be NaN. A Python
+        function does if it has three arguments.
 
     Returns
     -------
@@ -237,8 +222,7 @@ def opaque(function: Any, *, needs_attitude: bool = False) -> StateTorque:
     Raises
     ------
     InputError
-        If `function` is not a function of two or three arguments, has no argument for an attitude
-        that it needs, or is a compiled function with another signature.
+        If `function` has other arguments, or none for an attitude that it needs.
 
     Examples
     --------
@@ -262,10 +246,7 @@ def opaque(function: Any, *, needs_attitude: bool = False) -> StateTorque:
 
 
 def checked_torque(value: object) -> TorqueLaw | StateTorque:
-    """Return a user's torque as a TorqueLaw or a StateTorque; a function is recorded.
-
-    Raise InputError for any other type, and for a function that can't be recorded.
-    """
+    """Return a user's torque, with a function recorded; raise InputError for anything else."""
     if isinstance(value, (TorqueLaw, StateTorque)):
         return value
     if not callable(value):
@@ -278,10 +259,9 @@ def checked_torque(value: object) -> TorqueLaw | StateTorque:
 
 
 def law_of(torque: StateTorque) -> TorqueLaw | None:
-    """Return the torque law that equals a recorded torque, or None if it is no such law.
+    """Return the torque law that equals a recorded torque, or None.
 
-    The torque must be a sum of a constant, a term linear in time, and sines and cosines of angles
-    proportional to time. The methods for torque laws are faster.
+    It is a sum of a constant, a linear term and waves, for which methods are faster.
     """
     tape = torque.tape
     if tape is None or tape.inputs - {TIME}:
@@ -312,9 +292,9 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
 
 
 def _with_parameters(torque: StateTorque, function: Function, called: Function) -> StateTorque:
-    """Return a torque with its parameters, the numbers among its function's keyword arguments.
+    """Return a torque with the numbers among its function's keyword arguments as parameters.
 
-    An argument is no parameter if the function does anything with it that can't be recorded.
+    One with which the function does what can't be recorded is none.
     """
     pairs = {
         each.name: converted(each.default)
@@ -346,7 +326,7 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
 
 
 def _parts(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, ...]":
-    """Return the summands of a torque; a torque law that is 0 has none."""
+    """Return the summands of a torque; a law that is 0 has none."""
     if isinstance(torque, TorqueLaw):
         return () if torque.is_zero else (torque,)
     return torque.parts or (torque,)
@@ -355,8 +335,7 @@ def _parts(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, .
 def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
     """Return the sum of torques, of which at least one depends on the state.
 
-    The operations are recorded in the order of a scene file, so that the sum of terms and the scene
-    that is read from its text have the same tape.
+    It is recorded in the order of a scene file, so that reading its text gives the same tape.
     """
     torques = [each for each in parts if isinstance(each, StateTorque)]
     torques.sort(key=lambda each: bool(each.expression))
@@ -423,6 +402,6 @@ def _called(
 
 
 def _old(attitude: Any, axes: Array) -> list[Any]:
-    """Return the attitude of the old axes from that of the new, in symbols."""
+    """Return the attitude of the old axes from the new one, in symbols."""
     w, x, y, z = quaternion_of_axes(axes)
     return list(product(tuple(attitude), (w, -x, -y, -z)))

@@ -1,8 +1,8 @@
 """Symbols, with which a function is called once so that its arithmetic is recorded on a tape.
 
 A symbol is a linear combination of the slots of a tape. Sums, and products with numbers, only
-change its coefficients. Any other operation is recorded on the tape, but only the first time: the
-same operation on the same slots returns the same slot.
+change its coefficients. Another operation is recorded the first time; the same on the same slots
+returns the same slot.
 """
 
 import math
@@ -42,7 +42,7 @@ class Recorder:
         place: str = "[torque]",
         instead: str = "opaque(function), which SciPy's methods solve",
     ) -> None:
-        """Begin an empty tape of a function of `n_inputs` numbers, with at most `most` operations.
+        """Begin an empty tape of `n_inputs` numbers and at most `most` operations.
 
         Messages begin with `place`, and say what to use `instead` of what can't be recorded.
         """
@@ -85,10 +85,7 @@ class Recorder:
         return self._slots[operation]
 
     def tape(self, outputs: Sequence[Any]) -> Tape:
-        """Return the tape that computes `outputs`, which are symbols and real numbers.
-
-        Operations on which no output depends are removed.
-        """
+        """Return the tape that computes `outputs`, without operations that are not used."""
         linear = [self._output(axis, each) for axis, each in enumerate(outputs, 1)]
         return _without_unused(self._operations, linear, self._n_inputs)
 
@@ -352,10 +349,7 @@ class Symbol:
 
 
 def recorded_twice(record: Callable[[Recorder], Tape], recorder: Callable[[], Recorder]) -> Tape:
-    """Return the tape that `record` records of a user's function with a new recorder.
-
-    Raise InputError if another call of the function is recorded as another tape.
-    """
+    """Return the tape of a user's function; raise InputError if a second call differs."""
     first, again = record(recorder()), recorder()
     if record(again) != first:
         raise again.impure()
@@ -365,9 +359,9 @@ def recorded_twice(record: Callable[[Recorder], Tape], recorder: Callable[[], Re
 def called_once(
     function: Callable[..., Any], given: Sequence[Any], recorder: Recorder, allowed: str
 ) -> list[Any]:
-    """Return the components that a user's function returns for symbols of `recorder`.
+    """Return the components that a user's function returns for symbols.
 
-    Raise InputError if it raises an exception; `allowed` describes the functions that don't.
+    Raise InputError if it raises an exception; `allowed` describes functions that don't.
     """
     try:
         return list(function(*given))

@@ -1,7 +1,7 @@
 """The tape: a function of time, omega and attitude, recorded as a list of arithmetic operations.
 
-A tape is recorded once, with symbols in place of numbers (`pyharness.model.symbols`). The same tape
-is then evaluated in every arithmetic: floats, decimal numbers, Taylor series, or symbols again.
+It is recorded once, with symbols (`pyharness.model.symbols`), and evaluated in every arithmetic:
+floats, decimal numbers, Taylor series, or symbols again.
 """
 
 import math
@@ -24,10 +24,7 @@ N_INPUTS = 8
 
 
 class Linear(NamedTuple):
-    """A linear combination of slots: a constant plus the sum of coefficient times slot.
-
-    `terms` are pairs of a slot and its coefficient, in ascending order of the slots.
-    """
+    """A constant plus the sum of pairs in `terms`, slot times coefficient, in order of slots."""
 
     constant: float
     terms: tuple[tuple[int, float], ...]
@@ -36,10 +33,8 @@ class Linear(NamedTuple):
 class Table(NamedTuple):
     """A function of time that consists of cubic polynomials.
 
-    `breaks` are the times (s), in ascending order, at which the pieces begin. Piece k, with the
-    coefficients c0 to c3, is c0 + c1 s + c2 s^2 + c3 s^3, where s is the time minus breaks[k]. It
-    holds until the next break. Piece 0 also holds at all times before its break, and the last piece
-    at all times after.
+    `breaks` are the times (s), ascending, at which pieces begin. Piece k is c0 + c1 s + c2 s^2 + c3
+    s^3 with s the time minus breaks[k]; the first also holds before its break, the last for ever.
     """
 
     breaks: tuple[float, ...]
@@ -49,9 +44,8 @@ class Table(NamedTuple):
 class Operation(NamedTuple):
     """An operation of a tape.
 
-    `kind` is "product", "quotient", "sqrt", "exp", "tanh", "sine" or "cosine", and `operands` are
-    its one or two slots; or it is "linear", and `linear` is a linear combination of slots; or it is
-    "table", and `table` is a function of the time.
+    Its kind is "product", "quotient", "sqrt", "exp", "tanh", "sine" or "cosine" of one or two
+    slots, or "linear" or "table".
     """
 
     kind: str
@@ -62,10 +56,7 @@ class Operation(NamedTuple):
 
 @dataclass(frozen=True)
 class Tape:
-    """A recorded function: its operations in order of execution, and its results.
-
-    `n_inputs` is the number of its inputs, the time and the unknowns, which are in the first slots.
-    """
+    """A recorded function: operations in order, and outputs; the first slots are `n_inputs`."""
 
     operations: tuple[Operation, ...]
     outputs: tuple[Linear, ...]
@@ -116,8 +107,7 @@ class Functions(Generic[T]):
 def evaluate(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T]:
     """Return the outputs of a tape in the arithmetic of `functions`.
 
-    `inputs` are the values of the eight input slots: the time, three components of omega, and four
-    of the attitude.
+    `inputs` are the time, omega and attitude, eight values.
     """
     values = slot_values(tape, inputs, functions)
     return [_combined(each, values, functions) for each in tape.outputs]
@@ -182,8 +172,8 @@ _UNSEEN = 2.0**-150
 def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     """Return the outputs of a tape in floats.
 
-    If a large exponential makes an output NaN or infinite, as in sinh(x)/cosh(x), it is replaced by
-    another one, unless the outputs depend on which. A division by zero raises ZeroDivisionError.
+    A large exponential that makes an output NaN or infinite, as in sinh(x)/cosh(x), is replaced by
+    another, unless the outputs depend on which. Division by zero raises ZeroDivisionError.
     """
     found = evaluate(tape, inputs, FLOATS)
     if all(map(math.isfinite, found)) or all(each.kind != "exp" for each in tape.operations):

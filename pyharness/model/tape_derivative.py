@@ -16,12 +16,9 @@ _MORE, _FEWER = 100, 10
 
 
 def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
-    """Return a tape with the outputs of `tape`, followed by their partial derivatives.
+    """Return a tape with its outputs, then the derivatives of each by the inputs in `slots`.
 
-    The derivatives of the first output with respect to the inputs in `slots` come first, then those
-    of the second output, and so on. The chain rule is applied to the operations one by one (forward
-    differentiation), so that the derivatives are exact. The derivative of a table is the derivative
-    of the piece that holds at the time.
+    Forward differentiation is exact. A table has the derivative of the piece that holds.
     """
     recorder = Recorder(_MORE * MOST_OPERATIONS)
     inputs = [
@@ -34,11 +31,9 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
 
 
 def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
-    """Return a tape with partial derivatives, for an equation that depends on parameters.
+    """Return a tape of the derivatives of each output by m parameters, then of the outputs.
 
-    The last inputs of `tape` are m parameters, with these `values`. The other inputs are those of
-    the returned tape. Its outputs are the derivatives of the first output with respect to each
-    parameter, then those of the second output, and so on, and then the outputs of `tape`.
+    The parameters, with these `values`, are the last inputs of `tape`; the others remain.
     """
     count = len(values)
     instead = "fewer parameters"

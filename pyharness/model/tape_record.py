@@ -1,8 +1,8 @@
-"""Tapes (recorded functions) as data for JSON, and tapes from such data.
+"""Tapes as data for JSON, and tapes from such data.
 
-The data are a dictionary with the operations and the outputs of a tape. A linear combination is the
-list of its constant and its pairs of a slot and a coefficient. An operation is a list of its kind
-and its operands, its linear combination, or the breaks and the pieces of its table.
+A dictionary has the operations and outputs. A linear combination is a list of its constant and its
+pairs of slot and coefficient; an operation of its kind, and its operands, linear combination, or
+breaks and pieces of a table.
 """
 
 import math
@@ -42,7 +42,7 @@ def _linear_record(linear: Linear) -> list[Any]:
 def tape_of(record: Any) -> Tape:
     """Return the tape that a dictionary from JSON describes.
 
-    Raise ValueError, TypeError, KeyError or OverflowError if the data do not describe a tape.
+    Raise ValueError, TypeError, KeyError or OverflowError if it describes none.
     """
     operations = record["operations"]
     if len(operations) > MOST_OPERATIONS:

@@ -21,21 +21,19 @@ class TorqueLaw:
 
     N(t) = constant + rate t + sum of amplitude sin(frequency t) + sum of amplitude cos(frequency t)
 
-    The unit of N is N m for a body with moments or inertia. It is 1/s2 (torque over moment) for a
-    body with coefficients. Three numbers may be a list, a tuple or an array; the fields of the law
-    are plain tuples of floats.
+    in N m for a body with moments or inertia, in 1/s2 (torque over moment) for one with
+    coefficients. The fields are tuples of floats.
 
     Parameters
     ----------
     constant : three numbers
         The constant term, in the unit of N.
     rate : three numbers
-        The factor of time in the linear term, in the unit of N per second.
+        The factor of time, in the unit of N per second.
     sines, cosines : iterable of waves
-        The sinusoidal terms. A wave is a pair: an amplitude, three numbers in the unit of N, and a
-        frequency (rad/s).
+        Pairs of an amplitude, three numbers in the unit of N, and a frequency (rad/s).
     frame : {"body", "space"}
-        The axes of the components. A torque about the axes of space does not rotate with the body.
+        The axes of the components.
 
     Raises
     ------
@@ -71,10 +69,7 @@ class TorqueLaw:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the fields of the torque law, and convert its numbers to floats.
-
-        Raise InputError for an invalid value.
-        """
+        """Check the fields, and convert numbers to floats."""
         for name in ("constant", "rate"):
             object.__setattr__(self, name, three(f"[torque] {name}", getattr(self, name)))
         for name in ("sines", "cosines"):
@@ -83,11 +78,9 @@ class TorqueLaw:
             raise unknown("frame", self.frame, FRAMES, "[torque] frame")
 
     def __add__(self, other: "TorqueLaw | int") -> "TorqueLaw":
-        """Return the sum with another torque law about the same axes.
+        """Return the sum with another law about the same axes, or with 0, so that ``sum`` works.
 
-        The sum with the number 0 is the law itself, so that ``sum`` accepts laws. The class
-        `StateTorque` has the sum of a law and a torque that depends on the state. Raise InputError
-        if the axes are different, or if a sum overflows.
+        Raise InputError if the axes differ, or if a sum overflows.
         """
         if type(other) is int and other == 0:
             return self
@@ -128,18 +121,11 @@ class TorqueLaw:
 
     @property
     def in_space(self) -> bool:
-        """Whether the torque is not zero and its components are about the axes of space.
-
-        Under such a torque omega depends on the attitude.
-        """
+        """Whether the torque is not zero and about the axes of space."""
         return self.frame == "space" and not self.is_zero
 
     def at(self, time: float) -> Triple:
-        """Return the three components of the torque N at `time` (s).
-
-        The terms are added in the order constant, linear, sines and cosines, so that rounding is
-        always the same.
-        """
+        """Return the torque N at `time` (s), with terms always added in the same order."""
         torque = list(self.constant)
         if self.varies:
             for axis in range(3):

@@ -33,13 +33,13 @@ class Stop:
     Attributes
     ----------
     step : int
-        The number of the step, from 1. The last row of the trajectory is the result of this step.
+        The number of the step, from 1, whose result is the last row.
     variable : str
-        The variable that failed the test: `U1` to `U3` (omega), `V1` to `V3` (translational
-        velocity), or a norm: `U` (of omega), `UV` (of omega and velocity together).
+        The variable that failed: `U1` to `U3` (omega), `V1` to `V3` (velocity), or a norm, `U` (of
+        omega) or `UV` (of both).
     quotient : float
-        The Lipschitz quotient (1/s): the change of the derivative between two stages of the step,
-        divided by the change of the variable. It is infinite if the variable did not change.
+        The Lipschitz quotient (1/s): the change of the derivative between two stages over the
+        change of the variable; infinite if that is 0.
 
     Examples
     --------
@@ -58,72 +58,60 @@ class Stop:
 class Trajectory(Mechanics, Conversions):
     """The results of an integration, one row for each time, and how the integration ended.
 
+    What was not computed, requested or known is None.
+
     Attributes
     ----------
     time : ndarray, shape (n,)
-        The true time of each row, s.
+        The true times, s.
     recorded_time : ndarray, shape (n,)
-        The variable TIME that a program writes to its output file TAPE5, s. A defect may make it
-        differ from `time`. For methods, the modern solvers of this package, it is the same as
-        `time`.
+        The variable TIME of a program's output, s, which a defect may falsify; else `time`.
     omega : ndarray, shape (n, 3)
         Angular velocity about the body axes, rad/s.
     velocity : ndarray, shape (n, 3), or None
-        Translational velocity along the body axes, m/s. None if it was not computed.
+        Translational velocity along the body axes, m/s.
     steps, evaluations : int
-        The number of steps, and the number of evaluations of the right-hand side. SciPy's methods
-        and the reference count their rows as steps.
+        Numbers of steps (of rows, for SciPy's methods and the reference) and of evaluations of the
+        right-hand side.
     ended : {"complete", "sensitive", "unchecked", "stopped", "overflow", "singular", "event"}
-        How the integration ended. "stopped" means that the Lipschitz test ended it. After an
-        "overflow" the rows end before the first omega that is not finite, and if it is "singular"
-        before a time at which a recorded torque is not defined (`reason`). "event" means that a
-        terminal event ended it, and that rows after it are not present. In two cases all rows are
-        present: "sensitive" means that the rounding error, amplified by the motion, exceeds the
-        requested tolerance, and "unchecked" that a method of SciPy may have passed a short change
-        of a recorded torque, because the series that bounds its steps does not reach the end.
+        How the integration ended. All rows are present if it is "sensitive", the amplified rounding
+        error exceeding the tolerance, or "unchecked": a method of SciPy may have passed a short
+        change of a recorded torque, because the series that bounds its steps does not reach the
+        end. It was "stopped" by the Lipschitz test, by an "overflow", before omega is not finite,
+        where a recorded torque is not defined ("singular"), or by a terminal "event".
     stop : Stop or None
-        The point at which the Lipschitz test ended the run; None if the test did not end it.
+        Where the Lipschitz test ended the run.
     ier : ndarray of int, shape (n,), or None
-        The error code of the linear solver in each step, as the collocation programs print it: 129
-        for a singular matrix. None for other programs and for methods.
+        The error codes of the linear solver of the collocation programs; 129 for a singular matrix.
     error : float or None
-        Estimated error of any component at the requested times, relative to the largest component
-        of omega along the trajectory. None if the method does not estimate it, and after an
-        overflow.
+        Estimated error of any component, relative to the largest one along the trajectory.
     growth : float or None
-        The error amplification: the largest norm of the state-transition matrix of omega from any
-        earlier time to the end. None if it is unknown.
+        The error amplification: the largest norm of the state-transition matrices of omega from any
+        time to the end.
     reason : str or None
-        The time at which a recorded torque is not defined, and the operation; None if it is.
+        Where a recorded torque is not defined: the time and the operation.
     attitude : ndarray, shape (n, 4), or None
-        Quaternions from body to space, scalar first, with continuous signs. None if they were not
-        requested.
+        Quaternions from body to space, scalar first, with continuous signs.
     moments : tuple of three floats, ChangingMoments, ChangingInertia, or None
-        Principal moments of the body, kg m2, or its inertia if that changes with time; None if the
-        body has only coefficients.
+        Principal moments, kg m2, or an inertia that changes; None for coefficients.
     axes : ndarray, shape (3, 3), or None
-        The principal axes, in columns; None if they are the body's own axes.
+        The principal axes, in columns; None if they are the body's own.
     exact : ndarray of object, shape (n, 8), or None
-        Rows of a program that ran in another arithmetic than binary64: `time`, `recorded_time`,
-        `omega` and `velocity` as numbers of this arithmetic. The attributes of these names have the
-        nearest floats. None for binary64, and if there are no rows.
+        Rows of a program in another arithmetic than binary64: `time`, `recorded_time`, `omega` and
+        `velocity`, whose attributes are the nearest floats.
     tolerance : float or None
-        The tolerance to which a method integrated the scene. None for programs and for methods
-        with a fixed step, which have no tolerance.
+        The tolerance of a method without a fixed step.
     scene : Scene or None
-        The scene that the function `solve` solved. None for programs.
+        The scene, if `solve` solved it.
     sol : DenseOutput or None
-        The solution as a function of time, if it was requested. It is not saved in a file.
+        The solution as a function of time. It is not saved.
     t_events : list of ndarray, or None
-        For each function of events the times (s) of its events, in the order of `time`; None if no
-        events were requested.
+        The times (s) of the events of each function, in the order of `time`.
     y_events : list of ndarray, or None
-        For each function of events omega (rad/s), and the attitude if it was requested, with one
-        row for each event: shape (k, 3) or (k, 7).
+        Omega (rad/s), with the attitude if requested, at these events: shape (k, 3) or (k, 7).
     sensitivities : dict of ndarray, or None
-        The derivatives of omega (rad/s), and of the attitude's quaternion if it was requested, at
-        `time` with respect to parameters. For each requested name the array has shape (n, 3, m) or
-        (n, 7, m), where m is the number of values of the parameter.
+        For each name the derivatives of omega (rad/s), with the quaternion if requested, at `time`:
+        shape (n, 3, m) or (n, 7, m) for a parameter of m values.
 
     Examples
     --------
@@ -160,26 +148,15 @@ class Trajectory(Mechanics, Conversions):
 
     @property
     def digits(self) -> float | None:
-        """The number of correct decimal digits of omega; None if it is unknown.
-
-        It is computed from the estimated relative error, the attribute `error`.
-        """
+        """The number of correct decimal digits of omega by `error`, or None."""
         return digits_left(self.error)
 
     @property
     def has_all_rows(self) -> bool:
-        """Whether all requested rows are present in the trajectory.
-
-        A trajectory that is reported as sensitive has all rows too. In such a trajectory the
-        amplified rounding error exceeds the tolerance.
-        """
+        """Whether all requested rows are present, as also in a sensitive trajectory."""
         return self.ended in WITH_ALL_ROWS
 
 
 def digits_left(error: float | None) -> float | None:
-    """Return the number of correct decimal digits of a result with the relative error `error`.
-
-    It is at least 0, and at most 15.95, the number of digits of binary64. It is None if `error` is
-    None.
-    """
+    """Return the number of correct decimal digits, 0 to 15.95 (binary64), or None if unknown."""
     return None if error is None else max(0.0, -math.log10(max(error, ROUNDING)))

@@ -1,8 +1,7 @@
 """Writing of trajectories to files. `pyharness.dynamics.trajectory_reader` reads them.
 
-A file is a ZIP archive of arrays in NumPy's format, as `numpy.savez` writes it. The array `header`
-is a JSON text with the attributes that are no arrays, and with the schema number. The array `scene`
-is the text of a scene file, and `sha256` that of the digest of all other arrays.
+A file is an archive of `numpy.savez`: the array `header` is JSON with the other attributes and the
+schema number, `scene` the text of a scene file, and `sha256` the digest of all other arrays.
 """
 
 import hashlib
@@ -50,7 +49,7 @@ _TAPED = "The torque was recorded from a function. Its operations are in the hea
 
 
 def checked_path(path: object) -> str:
-    """Return the path of a trajectory file as text; raise InputError if it is no path."""
+    """Return the path of a trajectory file as text, or raise InputError."""
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"trajectory file: {kind_of(path)}; allowed: a path, as text or a Path")
     return os.fsdecode(path)

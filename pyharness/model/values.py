@@ -1,4 +1,7 @@
-"""Functions that check user input and convert it to plain Python numbers."""
+"""Functions that check user input and convert it to plain Python numbers.
+
+Each InputError begins with `where`.
+"""
 
 import itertools
 import math
@@ -22,10 +25,7 @@ _THREE_FLOATS = [float, float, float]
 
 
 def number(where: str, value: object) -> float:
-    """Return a user's real number as a float; infinities and NaN are accepted.
-
-    Raise InputError, with `where` in front of the message, if `value` is no real number.
-    """
+    """Return a user's real number, perhaps infinite or NaN, as a float, or raise InputError."""
     found = converted(value)
     if isinstance(found, float):
         return found
@@ -35,10 +35,7 @@ def number(where: str, value: object) -> float:
 
 
 def converted(value: object) -> float | str:
-    """Return a real number as a float; for any other value return a phrase that names its type.
-
-    For a number beyond the range of binary64 the phrase says that it is too large.
-    """
+    """Return a real number as a float, and a phrase for anything else, or beyond binary64."""
     if type(value) is float:
         return value
     if is_no_number(value):
@@ -54,10 +51,7 @@ def converted(value: object) -> float | str:
 
 
 def is_no_number(value: object) -> bool:
-    """Return whether a value is of a type that is rejected even if float() accepts the value.
-
-    These types are text, booleans, arrays, and NumPy scalars that are not real numbers.
-    """
+    """Return whether a value is text, a boolean, an array or the like, even if float() takes it."""
     if isinstance(value, (bool, str, bytes, bytearray, memoryview)):
         return True
     kind = getattr(getattr(value, "dtype", None), "kind", _REAL[0])
@@ -65,15 +59,16 @@ def is_no_number(value: object) -> bool:
 
 
 def parsed_float(text: str) -> float:
-    """Return the number that `text` is, finite or not; raise ValueError if it is none.
+    """Return the number that `text` is, or raise ValueError.
 
-    Other programs do not read the underscores and foreign digits that float() allows.
+    Underscores and foreign digits, which float() allows, are refused: other programs do not read
+    them.
     """
     return float(_plain(text))
 
 
 def parsed_whole(text: str) -> int:
-    """Return the whole number that `text` is, as `parsed_float` does."""
+    """Return the whole number that `text` is, or raise ValueError."""
     return int(_plain(text))
 
 
@@ -84,11 +79,7 @@ def _plain(text: str) -> str:
 
 
 def three(where: str, values: object) -> Triple:
-    """Return three finite numbers of a user as a tuple of floats.
-
-    Raise InputError, with `where` in front of the message, unless `values` are three finite
-    numbers.
-    """
+    """Return three finite numbers of a user as floats, or raise InputError."""
     found = three_floats(where, values)
     for each in found:
         if not math.isfinite(each):
@@ -97,10 +88,7 @@ def three(where: str, values: object) -> Triple:
 
 
 def three_floats(where: str, values: object) -> Triple:
-    """Return three numbers of a user, which need not be finite, as a tuple of floats.
-
-    Raise InputError, with `where` in front of the message, unless `values` are three real numbers.
-    """
+    """Return three real numbers of a user, perhaps not finite, as floats, or raise InputError."""
     if type(values) is tuple and [type(each) for each in values] == _THREE_FLOATS:
         return values
     allowed = "allowed: three numbers"
@@ -113,10 +101,7 @@ def three_floats(where: str, values: object) -> Triple:
 
 
 def finite(where: str, value: object) -> float:
-    """Return a finite number of a user as a float.
-
-    Raise InputError, with `where` in front of the message, if `value` is no finite number.
-    """
+    """Return a finite number of a user as a float, or raise InputError."""
     found = number(where, value)
     if not math.isfinite(found):
         raise _not_finite(where, found)
@@ -128,10 +113,9 @@ def _not_finite(where: str, value: float) -> InputError:
 
 
 def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
-    """Return an iterator over a user's list, tuple, array or another ordered collection.
+    """Return an iterator over a user's ordered collection, whose elements are not checked.
 
-    The elements are not checked. Raise InputError if `values` is text, a set, a mapping or a single
-    value. The message begins with `where`, and ends with `allowed`, which says what is allowed.
+    Raise InputError for text, a set, a mapping or a single value; it ends with `allowed`.
     """
     if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):
         try:
@@ -142,11 +126,7 @@ def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
 
 
 def integer(where: str, value: object) -> int:
-    """Return a whole number of a user as an int.
-
-    Raise InputError, with `where` in front of the message, if `value` is no integer. A float is no
-    integer, even if it is whole.
-    """
+    """Return a whole number of a user as an int; raise InputError for others, and all floats."""
     if type(value) is int:
         return value
     if not is_no_number(value):
@@ -158,20 +138,16 @@ def integer(where: str, value: object) -> int:
 
 
 def boolean(where: str, value: object) -> bool:
-    """Return a user's truth value, True or False of Python or of NumPy, as a bool.
-
-    Raise InputError, with `where` in front of the message, for any other value.
-    """
+    """Return a user's True or False, of Python or NumPy, or raise InputError."""
     if isinstance(value, bool) or kind_of(value) == "true or false":
         return bool(value)
     raise InputError(f"{where} is {kind_of(value)}; allowed: True or False")
 
 
 def tolerance_of(value: object, finest: float) -> float:
-    """Return a user's tolerance as a float; raise InputError if it is no number.
+    """Return a user's tolerance as a float, with its range unchecked, or raise InputError.
 
-    The caller checks the range of the tolerance. `finest` is the smallest tolerance that the caller
-    allows, and is only used in the message.
+    `finest` is for the message.
     """
     found = converted(value)
     if isinstance(found, float):

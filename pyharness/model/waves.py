@@ -1,10 +1,10 @@
 """Exact sums of the waves of a torque law that have the same frequency.
 
-A wave is a sine or cosine term of the law. A solver divides each amplitude by a moment of inertia,
-and rounds the quotient. If two waves nearly cancel, the rounding errors of the quotients remain.
-For example, if two opposite amplitudes differ by a relative 1e-10, only six digits of their sum
-would be correct. If the amplitudes are added exactly before the division, all digits are correct.
-Fewer waves also take less work.
+A wave is a sine or cosine term. A solver divides each amplitude by a moment and rounds: if two
+opposite amplitudes differ by a relative 1e-10, only six digits of their sum would be correct. Added
+exactly before the division, all are. Fewer waves also take less work.
+
+Merged laws have at most one sine and one cosine per frequency, and none of frequency 0.
 """
 
 import math
@@ -30,10 +30,7 @@ _ZERO = (Fraction(0), Fraction(0), Fraction(0))
 
 @dataclass(frozen=True)
 class ExactLaw:
-    """A torque law with at most one sine and one cosine per frequency, in exact fractions.
-
-    The attributes have the same meanings and units as those of `TorqueLaw`.
-    """
+    """A merged `TorqueLaw` in exact fractions."""
 
     constant: Exact
     rate: Exact
@@ -42,11 +39,7 @@ class ExactLaw:
     frame: str
 
     def turned(self, turn: Callable[[Exact], Exact]) -> "ExactLaw":
-        """Return the law with each of its vectors rotated by the function `turn`.
-
-        The vectors are the constant torque, the rate (the factor of time in the linear term) and
-        the amplitudes of the waves, which have three components each.
-        """
+        """Return the law with constant, rate and amplitudes rotated by the function `turn`."""
 
         def waves(each: tuple[ExactWave, ...]) -> tuple[ExactWave, ...]:
             return tuple((turn(amplitude), frequency) for amplitude, frequency in each)
@@ -56,10 +49,7 @@ class ExactLaw:
         )
 
     def rounded(self) -> TorqueLaw:
-        """Return the law as a TorqueLaw, with each exact number rounded to the nearest float.
-
-        Raise InputError if a number is beyond the range of floats.
-        """
+        """Return the law rounded to floats; raise InputError if a number is beyond their range."""
 
         def waves(each: tuple[ExactWave, ...]) -> tuple[Wave, ...]:
             return tuple((_rounded(amplitude), frequency) for amplitude, frequency in each)
@@ -74,22 +64,15 @@ class ExactLaw:
 
 
 def merged(law: TorqueLaw) -> TorqueLaw:
-    """Return a torque law with at most one sine and one cosine per frequency.
+    """Return a merged torque law, the argument itself if there is nothing to merge or remove.
 
-    Waves of equal or opposite frequencies are merged by adding their amplitudes; for sines of
-    opposite frequencies the amplitudes are subtracted. A cosine of frequency 0 is added to the
-    constant, and a sine of frequency 0 is removed. The result is the argument itself if no waves
-    can be merged or removed.
+    Sines of opposite frequencies are subtracted; a cosine of frequency 0 is added to the constant.
     """
     return exact_law(law).rounded() if is_mergeable(law) else law
 
 
 def is_mergeable(law: TorqueLaw) -> bool:
-    """Return whether a torque law has waves that `merged` would merge or remove.
-
-    Such waves are a wave of frequency 0, two sines of equal or opposite frequency, and two cosines
-    of equal or opposite frequency. Waves of amplitude 0 are ignored.
-    """
+    """Return whether `merged` changes a law, apart from waves of amplitude 0."""
     for waves in (law.sines, law.cosines):
         # A wave of amplitude 0 is ignored.
         counts = Counter(abs(frequency) for amplitude, frequency in waves if any(amplitude))
@@ -99,11 +82,7 @@ def is_mergeable(law: TorqueLaw) -> bool:
 
 
 def exact_law(law: TorqueLaw) -> ExactLaw:
-    """Return a torque law in exact fractions, with its waves merged.
-
-    Waves are sine and cosine terms. After merging there is at most one sine and one cosine per
-    frequency, and none of frequency 0.
-    """
+    """Return a torque law in exact fractions, merged."""
     constant = _exact(law.constant)
     cosines = _summed(law.cosines, even=True)
     # A cosine of frequency 0 is 1 at all times, whereas a sine is 0.
@@ -120,12 +99,7 @@ def exact_law(law: TorqueLaw) -> ExactLaw:
 
 
 def _summed(waves: Iterable[Wave], even: bool) -> list[ExactWave]:
-    """Return the sums of waves of equal or opposite frequency, without sums of amplitude 0.
-
-    All `waves` are cosines if `even` is true, otherwise sines. A sine whose frequency is opposite
-    to that of the first sine in the sum is subtracted. The result is a list of pairs: an amplitude
-    (three exact fractions) and a frequency.
-    """
+    """Return the nonzero sums of cosines, if `even`, or sines of equal or opposite frequency."""
     found: dict[float, tuple[float, Exact]] = {}
     for amplitude, frequency in waves:
         exact = _exact(amplitude)
@@ -157,11 +131,7 @@ def _rounded(values: Exact) -> Triple:
 
 
 def with_merged_waves(scene: Scene) -> Scene:
-    """Return the scene with at most one sine and one cosine per frequency in its torque.
-
-    Terms of the same frequency are added exactly, by the function `merged`. A torque that depends
-    on the state is unchanged.
-    """
+    """Return the scene with a merged torque law; another torque is unchanged."""
     if not isinstance(scene.torque, TorqueLaw):
         return scene
     law = merged(scene.torque)
@@ -169,13 +139,10 @@ def with_merged_waves(scene: Scene) -> Scene:
 
 
 def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Array, Array, Array]:
-    """Return the constants, sines and cosines of many torque laws, with merged waves in each law.
+    """Return the constants, sines and cosines of m torque laws, merged in each law.
 
-    A law with merged waves has at most one sine and one cosine per frequency, as `merged` returns
-    it. The arrays have the shapes (m, 3), (m, k, 4) and (m, l, 4), where a wave is three amplitudes
-    and a frequency (rad/s). In each array m is the number of laws, or 1 if all laws share one row.
-    Each law is filled up with waves of amplitude and frequency 0. A law that is not finite is
-    unchanged.
+    Shapes are (m, 3), (m, k, 4) and (m, l, 4), or one row for all; a wave is three amplitudes and a
+    frequency (rad/s). Laws are filled up with zeros. A law that is not finite is unchanged.
     """
     concerned = _mergeable_rows(sines, cosines)
     if not concerned.any():
@@ -208,12 +175,7 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
 
 
 def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
-    """Return, for each of m torque laws, whether it has waves that `merged` would merge or remove.
-
-    The result is a boolean array, shape (m,). `sines` and `cosines` have the waves of the laws,
-    shape (m, k, 4), or one row, shape (1, k, 4), that all laws share. If both arrays have one row,
-    the result has one element.
-    """
+    """Return which of m torque laws `merged` changes, shape (m,), or (1,) if all share one row."""
     found = np.zeros(1, bool)
     for waves in (sines, cosines):
         if waves.size:
@@ -236,11 +198,9 @@ def _waves_of(rows: Array) -> list[Wave]:
 
 
 def _without_empty(waves: Array) -> Array:
-    """Return the waves of m torque laws without the positions at which no law has a wave.
+    """Return the waves, shape (m, k, 4), without positions k at which no law has a wave.
 
-    `waves` has the shape (m, k, 4), and the position is its second index, from 0 to k - 1. A wave
-    of amplitude 0 only fills its position. A position at which a law has a frequency that is not
-    finite is kept, so that the solver rejects only this law.
+    A frequency that is not finite is kept, so that the solver rejects only its law.
     """
     is_one = waves[..., :3].any(axis=-1) | ~np.isfinite(waves[..., 3])
     return np.ascontiguousarray(waves[:, is_one.any(axis=0)])

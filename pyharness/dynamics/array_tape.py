@@ -24,20 +24,13 @@ ARRAYS: Functions[Any] = Functions(float, np.sqrt, np.exp, np.tanh, np.sin, np.c
 
 
 def inputs_of(times: Array, state: Array) -> list[Array]:
-    """Return the eight inputs of a tape as arrays of shape (n,).
-
-    `times` has shape (n,), and `state` shape (n, 3) or (n, 7): omega, and the attitude. Without an
-    attitude its inputs are 0.
-    """
+    """Return the eight inputs of a tape, shape (n,), from times and states, (n, 3) or (n, 7)."""
     columns = [times, *state.T]
     return columns + [np.zeros(len(times))] * (N_INPUTS - len(columns))
 
 
 def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
-    """Return the outputs of a tape at n times and states, shape (n, outputs).
-
-    The arguments are those of `inputs_of`. A result is not finite where the tape is singular.
-    """
+    """Return the outputs of a tape, shape (n, outputs), not finite where it is singular."""
     with np.errstate(all="ignore"):
         found: Sequence[Any] = evaluate(tape, inputs_of(times, state), ARRAYS)
     # An output that is a constant is a number.

@@ -18,16 +18,14 @@ def gravity_gradient(
 ) -> StateTorque:
     """Return the torque of the gravity gradient, 3 n^2 r x I r, in a circular orbit.
 
-    The unit vector r points from the centre of attraction to the body. At the time t it is
-    (cos n t, sin n t, 0) about the axes of space, so that the orbit is in the plane of the first
-    two axes and is described from the first to the second. The torque is in equilibrium if a
-    principal axis is along r. In the plane of the orbit that equilibrium is stable if this axis has
-    a smaller moment than the other principal axis in the plane.
+    The unit vector r from the centre of attraction is (cos n t, sin n t, 0) about the axes of
+    space. The torque is in equilibrium if a principal axis is along r, in the plane of the orbit
+    stably if its moment is the smaller one in the plane.
 
     Parameters
     ----------
     inertia : three numbers, three rows of three numbers, ChangingMoments, or ChangingInertia
-        The moments or the inertia matrix (kg m2) of the body, about the axes of the scene.
+        The moments or the inertia matrix (kg m2), about the axes of the scene.
     rate : float
         The rate n of the orbit (rad/s).
 
@@ -80,16 +78,14 @@ def gravity_gradient(
 def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque m x b on a magnetic dipole that is fixed in the body.
 
-    The field is b = R^T B, where B has components about the axes of space, and R is the rotation
-    from body to space.
+    The field is b = R^T B, with B about the axes of space, and R from body to space.
 
     Parameters
     ----------
     moment : three numbers
         The moment m of the dipole about the body axes (A m2).
     field : three numbers, or TorqueLaw
-        The magnetic field B about the axes of space (T). A field that depends on time is a
-        `TorqueLaw` with ``frame="space"``, whose numbers are in tesla instead of N m.
+        The field B (T), or a `TorqueLaw` of it with ``frame="space"``, in tesla.
 
     Returns
     -------
@@ -125,10 +121,10 @@ def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
 def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque m x b of coils that damp the rotation in a magnetic field.
 
-    The coils have the moment m = -k b', where b' is the rate of the field b = R^T B about the body
-    axes, which a magnetometer in the body measures. This rate is R^T B' - omega x b. In a constant
-    field the torque is -k (|b|^2 omega - (omega . b) b). It damps the part of omega that is
-    perpendicular to the field. In a field that rotates in space, the body finally rotates with it.
+    The coils have the moment m = -k b', where b' = R^T B' - omega x b is the rate of b = R^T B that
+    a magnetometer in the body measures. In a constant field the torque -k (|b|^2 omega - (omega .
+    b) b) damps the part of omega that is perpendicular to the field; in one that rotates, the body
+    finally rotates with it.
 
     Parameters
     ----------
@@ -174,8 +170,7 @@ def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
 def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque R^T N, where N has components about the axes of space.
 
-    It is meant for sums with other torques. A scene whose whole torque is a
-    ``TorqueLaw(..., frame="space")`` specifies the same torque, and is solved faster.
+    It is for sums; alone, a ``TorqueLaw(..., frame="space")`` is solved faster.
 
     Parameters
     ----------

@@ -41,10 +41,9 @@ class _Body(NamedTuple):
 class VariedEquations:
     """The equations of motion of a scene, and how they depend on parameters.
 
-    `tape` has the partial derivatives of the rates with respect to the parameters as outputs, and
-    then the rates of omega and, if it is computed, of the attitude. `forcings`, shape (n, m), are
-    for n rates and m columns the numbers of the outputs, from 1, that are the partial derivatives;
-    0 stands for a derivative that is 0. `columns` are those of each name.
+    The outputs of `tape` are partial derivatives of the rates by parameters, then the rates.
+    `forcings`, shape (n, m), has for n rates and m columns the numbers of these derivatives, from
+    1, or 0 for none. `columns` are those of each name.
     """
 
     tape: Tape
@@ -53,9 +52,9 @@ class VariedEquations:
 
 
 def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
-    """Return the values of the parameters of a scene by name, without those of its initial state.
+    """Return the parameters of a scene by name, except the initial state.
 
-    A name that two summands of the torque have stands for no parameter; its value is None.
+    A name that two summands of the torque have is None.
     """
     found: dict[str, list[float] | None] = {}
     if scene.moments is not None:
@@ -71,9 +70,9 @@ def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
 
 
 def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> VariedEquations:
-    """Return the equations of motion of a scene with their derivatives with respect to parameters.
+    """Return the equations of motion with their derivatives by parameters and initial state.
 
-    `names` are those of parameters, or "omega0", or "attitude". The torque must not be opaque.
+    The torque must not be opaque.
     """
     body = _Body(scene.moments, scene.coefficients, scene.inertia, scene.changing)
     known = parameters_of(scene)
@@ -103,9 +102,9 @@ def _equations(
     values: tuple[tuple[str, tuple[float, ...]], ...],
     attitude: bool,
 ) -> VariedEquations:
-    """Return the equations for parameters, pairs of a name and values, in the order of columns.
+    """Return the equations for pairs of names and values, in the order of columns.
 
-    A name without values is one of the initial state, with three columns.
+    A name without values is of the initial state, with three columns.
     """
     n = 7 if attitude else 3
     flat = [each for _, listed in values for each in listed]

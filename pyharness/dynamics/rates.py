@@ -15,11 +15,9 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def rates(scene: Scene, times: Array, state: Array) -> Array:
-    """Return the derivatives of omega and attitude of a scene at n times and states.
+    """Return the derivatives of n states: omega (rad/s), (n, 3), or with the quaternion, (n, 7).
 
-    `times` has shape (n,). `state` has shape (n, 3), which is omega (rad/s), or (n, 7), which is
-    omega and the attitude's quaternion. The result has the shape of `state`. It is not finite where
-    the torque is singular.
+    They are not finite where the torque is singular.
     """
     bare, axes = principal(scene)
     bare = with_constant_body(bare)

@@ -1,7 +1,7 @@
 """A recorded torque in rescaled time, in which omega is near 1 rad/s.
 
-Every slot of the tape is multiplied by a power of two of its own. Intermediate results then neither
-overflow nor underflow, although a square of omega would in the original unit of time.
+Each slot is multiplied by a power of two of its own, so that intermediate results, as a square of
+omega, neither overflow nor underflow.
 """
 
 import math
@@ -16,11 +16,10 @@ MULTIPLE = 16
 
 @lru_cache(maxsize=64)
 def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
-    """Return the tape of a torque in another unit of time, 2**exponent s.
+    """Return the tape of a torque in the unit of time 2**exponent s, without rounding.
 
-    The inputs of the returned tape are the time divided by 2**exponent, omega multiplied by it, and
-    the attitude. Its outputs are those of `tape` multiplied by 2**(2 * exponent). No number is
-    rounded. The result is None if a number of the tape would not be representable.
+    Its outputs are those of `tape` times 2**(2 * exponent). It is None if a number would not be
+    representable.
     """
     scaling = _Scaling(exponent)
     try:
@@ -71,7 +70,7 @@ class _Scaling:
         self._exponents.append(exponent)
 
     def combined(self, linear: Linear, exponent: int) -> Linear:
-        """Return a linear combination of the new slots, whose value is multiplied by 2**exponent.
+        """Return a linear combination of the new slots, times 2**exponent.
 
         Raise ArithmeticError if a number is out of range.
         """

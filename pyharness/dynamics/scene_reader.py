@@ -1,7 +1,6 @@
-"""Reading of scenes from TOML files that users write.
+"""Reading of scenes from TOML files that users write, with the ready terms of this subpackage.
 
-The torque of a scene file may have ready terms, which are in this subpackage.
-`pyharness.model.scene_file` writes scene files.
+`pyharness.model.scene_file` writes them.
 """
 
 import os
@@ -33,18 +32,18 @@ SCENE_TABLES = {
 
 
 def read_scene(path: str | os.PathLike[str]) -> Scene:
-    """Return the scene (the problem to solve) that a TOML file describes.
+    """Return the scene that a TOML file describes.
 
     Parameters
     ----------
     path : str or path
-        The path of the file, of at most 1 000 000 bytes. If the file has no key ``name``, the
-        scene's name is the file's name without its suffix.
+        The path of the file, of at most 1 000 000 bytes. Without the key ``name``, the scene has
+        the file's name.
 
     Returns
     -------
     Scene
-        The scene, with all its values checked.
+        The scene.
 
     Raises
     ------
@@ -65,11 +64,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
-    """Return the scene that a TOML file, a scene file with the bytes `content`, describes.
-
-    `default_name` is the name of the scene if the file has no key ``name``. Raise InputError, with
-    `where` in front of the message, if the content is invalid.
-    """
+    """Return the scene of a file's bytes, or raise InputError, beginning with `where`."""
     data = toml_of(content, where)
     try:
         return scene_of(data, default_name)
@@ -78,11 +73,7 @@ def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
 
 
 def scene_of(data: dict[str, Any], default_name: str) -> Scene:
-    """Return the scene that `data`, the content of a scene file as a dictionary, describes.
-
-    `default_name` is the name of the scene if the data have no key ``name``. Raise InputError if
-    the data are invalid.
-    """
+    """Return the scene of a file's data, or raise InputError."""
     check_written_schema(data, "scene file")
     check_keys(data, ("schema", "name", *SCENE_TABLES), "top level")
     tables: dict[str, dict[str, Any]] = {}
@@ -106,9 +97,9 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
 
 
 def _body(table: dict[str, Any]) -> dict[str, Any]:
-    """Return the table [body] of a scene file, with an inertia that changes with time as a value.
+    """Return the table [body], with an inertia that changes as a value.
 
-    Lists in place of the three moments are polynomials, and so are matrices in place of the rows.
+    Lists in place of three moments, or matrices in place of rows, are polynomials.
     """
     moments, inertia = table.get("moments"), table.get("inertia")
     if isinstance(moments, list) and _has_lists(moments):

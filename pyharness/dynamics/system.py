@@ -1,6 +1,6 @@
 """The equations of motion of a scene with a recorded torque, as one tape.
 
-An inertia that changes with time becomes part of a recorded torque.
+An inertia that changes becomes part of the torque.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,11 +18,10 @@ from pyharness.model.values import Triple
 
 
 def system_of(scene: Scene, attitude: bool) -> Tape:
-    """Return the right-hand side of the equations of motion of a scene as a tape.
+    """Return the equations of motion of a scene with recorded torque and principal axes as a tape.
 
-    The outputs are the derivatives of the three components of omega (equations 16-18 of the thesis)
-    and, if `attitude` is true, those of the quaternion q, which satisfies q' = q (0, omega)/2. The
-    scene must have a recorded torque, and principal axes.
+    Outputs are the derivatives of omega (equations 16-18 of the thesis) and, if `attitude`, of the
+    quaternion, q' = q (0, omega)/2.
     """
     assert isinstance(scene.torque, StateTorque)
     assert scene.torque.tape is not None
@@ -41,19 +40,15 @@ def system_of(scene: Scene, attitude: bool) -> Tape:
 
 
 def is_recorded(scene: Scene) -> bool:
-    """Return whether the equations of motion of a scene are solved as a tape.
-
-    This is the case for a torque that depends on the state, and for an inertia that changes.
-    """
+    """Return whether the torque depends on the state, or the inertia changes."""
     return isinstance(scene.torque, StateTorque) or scene.changing is not None
 
 
 def with_constant_body(scene: Scene) -> Scene:
     """Return a scene with the same solution whose inertia does not change with time.
 
-    It is the scene itself if its inertia is constant. Otherwise it is a scene with the coefficients
-    A = B = C = 0, whose torque is the derivative of omega:
-    I omega' = N - I' omega - omega x (I omega), with the inertia I and the torque N.
+    Instead of an inertia that changes it has A = B = C = 0, and the derivative of omega as torque:
+    I omega' = N - I' omega - omega x (I omega), with inertia I and torque N.
     """
     changing, torque = scene.changing, scene.torque
     if changing is None:
@@ -78,7 +73,7 @@ def with_constant_body(scene: Scene) -> Scene:
 
 
 def rates_of_changing(changing: Changing, time: Any, omega: Any, torque: Any) -> list[Any]:
-    """Return the derivative of omega for an inertia that changes; all others may be symbols."""
+    """Return the derivative of omega, in symbols, for an inertia that changes."""
     matrix, rate, (x, y, z) = changing.matrix(time), changing.matrix_rate(time), omega
     if isinstance(changing, ChangingMoments):
         a, b, c = (matrix[k][k] for k in range(3))
@@ -92,7 +87,7 @@ def rates_of_changing(changing: Changing, time: Any, omega: Any, torque: Any) ->
 
 
 def rates_of_inertia(matrix: Any, omega: Any, torque: Any) -> list[Any]:
-    """Return the derivative of omega for a full inertia matrix; all may be symbols."""
+    """Return the derivative of omega, in symbols, for a full inertia matrix."""
     (x, y, z), (u, v, w) = omega, (_dot(row, omega) for row in matrix)
     products = z * v - y * w, x * w - z * u, y * u - x * v
     return _solved(matrix, [torque[k] + products[k] for k in range(3)])
@@ -103,9 +98,9 @@ def _dot(first: Any, second: Any) -> Any:
 
 
 def _solved(matrix: list[list[Any]], right: list[Any]) -> list[Any]:
-    """Return the solution of a linear system with a symmetric positive definite matrix.
+    """Return the solution of a symmetric positive definite system by L D L^T.
 
-    The matrix is factorised as L D L^T (Golub and Van Loan 2013, Matrix Computations, section 4.1).
+    Golub and Van Loan 2013, Matrix Computations, section 4.1, has it.
     """
     (a, f, e), (_, b, d), (_, _, c) = matrix
     l21, l31 = f / a, e / a
@@ -121,10 +116,10 @@ def _solved(matrix: list[list[Any]], right: list[Any]) -> list[Any]:
 
 
 def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
-    """Return the right-hand side f(t, state) of the equations of motion of a scene, in floats.
+    """Return f(t, state) of a scene whose torque depends on the state, in floats.
 
-    The state is omega (rad/s), followed by the attitude, a quaternion, if the scene has one. The
-    torque of the scene depends on the state. A rate is NaN where the torque is singular.
+    The state is omega (rad/s), and the quaternion if the scene has one. A rate is NaN where the
+    torque is singular.
     """
     torque = scene.torque
     assert isinstance(torque, StateTorque)

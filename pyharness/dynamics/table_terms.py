@@ -1,4 +1,8 @@
-"""Torque terms given by tables of values over time, and pulses; components about the body axes."""
+"""Torque terms given by tables of values over time, and pulses; components about the body axes.
+
+Methods by Taylor series begin a step where a table changes, and are as accurate as for a smooth
+torque.
+"""
 
 import itertools
 import math
@@ -26,20 +30,17 @@ _Cubic = tuple[float, float, float, float]
 def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linear") -> StateTorque:
     """Return a torque that a table of values over time specifies.
 
-    Before the first time the torque has the first value, and after the last time the last value.
-    The methods that integrate by Taylor series begin a step at each time at which the torque or a
-    derivative is discontinuous. Their accuracy is therefore that of a smooth torque.
+    Before the first time it has the first value, and after the last time the last.
 
     Parameters
     ----------
     times : iterable of numbers, shape (n,)
-        The times (s) in ascending order, at least 2 and at most 10 000.
+        The times (s), ascending, 2 to 10 000.
     values : iterable of three numbers, shape (n, 3)
         The torque about the body axes (N m) at each time.
     interpolation : str
-        The torque between the times: ``held`` (each value holds until the next time), ``linear``,
-        or ``cubic`` (a cubic spline, whose first two pieces are one polynomial, as are the last
-        two; between the first time and the last, its first two derivatives are continuous).
+        ``held`` (until the next time), ``linear``, or ``cubic``: a spline whose first two pieces
+        are one polynomial, as are the last two.
 
     Returns
     -------
@@ -49,8 +50,8 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
     Raises
     ------
     InputError
-        If the times are not in ascending order, if there are not as many values as times, if the
-        interpolation is unknown, or if a number is not finite.
+        If times do not ascend, numbers of times and values differ, the interpolation is unknown, or
+        a number is not finite.
 
     References
     ----------
@@ -60,8 +61,6 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
     --------
     >>> from pyharness.torques import table
     >>> ramp = table([0.0, 1.0, 3.0], [(0, 0, 0), (2, 0, 0), (2, 0, 4)])
-    >>> ramp.at(0.5, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-    (1.0, 0.0, 0.0)
     >>> ramp.at(2.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
     (2.0, 0.0, 2.0)
     >>> steps = table([0.0, 1.0, 3.0], [(0, 0, 0), (2, 0, 0), (2, 0, 4)], interpolation="held")
@@ -86,15 +85,13 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
 def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbers]) -> StateTorque:
     """Return a torque that acts within pulses, and is 0 elsewhere.
 
-    The methods that integrate by Taylor series begin a step at each start and end of a pulse.
-
     Parameters
     ----------
     starts : iterable of numbers, shape (n,)
-        The times (s) at which the pulses begin, in any order, at least 1 and at most 10 000.
+        The times (s) at which the pulses begin, in any order, 1 to 10 000.
     durations : iterable of numbers, shape (n,)
-        The durations (s), above 0. A pulse may begin when another ends, but not before. Its impulse
-        is torque times duration, even if its end is rounded.
+        The durations (s), above 0. A pulse may begin when another ends, not before. Its impulse is
+        torque times duration, even if its end is rounded.
     torque : three numbers, or iterable of three numbers, shape (n, 3)
         The torque about the body axes (N m) of all pulses, or of each.
 
@@ -106,8 +103,8 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
     Raises
     ------
     InputError
-        If pulses overlap, if there are not as many durations or torques as starts, if a duration
-        is not above 0, or if a number is not finite.
+        If pulses overlap, numbers of starts, durations and torques differ, a duration is not above
+        0, or a number is not finite.
 
     References
     ----------
@@ -176,7 +173,7 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
 
 
 def _torques_of_pulses(torque: object, count: int) -> list[Triple]:
-    """Return the torque of each of `count` pulses (N m) from one torque or from a list of them."""
+    """Return the torque of each of `count` pulses (N m)."""
     where = "[torque] pulses torque"
     allowed = "allowed: three numbers, or three numbers for each pulse"
     given = list(islice(number_list(where, torque, allowed), max(count, 3) + 1))
@@ -208,10 +205,7 @@ def _other_number(where: str, what: str, given: int, wanted: int) -> InputError:
 
 
 def _before(first: float, second: float) -> float:
-    """Return a time before the first one, where a constant piece may begin.
-
-    It is as far from the first time as the second is, so that no piece is shorter than the others.
-    """
+    """Return a time before the first one, so far that its constant piece is not the shortest."""
     return min(2.0 * first - second, math.nextafter(first, -math.inf))
 
 

@@ -36,10 +36,10 @@ _LAW = ("constant", "rate", "sines", "cosines")
 
 
 def read_terms(tables: object, body: dict[str, Any]) -> list[StateTorque]:
-    """Return the ready terms of a torque from the tables [[torque.terms]] of a scene file.
+    """Return the ready terms from the tables [[torque.terms]].
 
-    `body` is the table [body] of the file. Raise InputError if a table is invalid; the message
-    begins with the number of the table, from 1.
+    `body` is the table [body]. Raise InputError, with the number of the table from 1, if it is
+    invalid.
     """
     if not isinstance(tables, list):
         raise InputError(
@@ -92,9 +92,9 @@ def _inertia(body: dict[str, Any], where: str) -> Any:
 
 
 def _argument(where: str, value: object, key: str, frame: str | None) -> object:
-    """Return the argument of a term for the value of a key; a table becomes a torque law.
+    """Return the argument of a term for the value of a key.
 
-    `frame` names the axes of the law; it is None if the argument is no law.
+    A table becomes a torque law about the axes `frame`; None for no law.
     """
     if key == "per_axis":
         return boolean(where, value)

@@ -1,4 +1,7 @@
-"""Functions that check the arguments of the torque terms, and the form of terms in scene files."""
+"""Checks of the arguments of the torque terms, and the form of terms in scene files.
+
+Each InputError begins with `where`.
+"""
 
 from dataclasses import replace
 from typing import Any
@@ -14,10 +17,10 @@ from pyharness.model.values import converted, finite, number_list, three
 
 
 def ready_term(kind: str, function: Function, **arguments: Any) -> StateTorque:
-    """Return the torque that a function of (t, omega, attitude) records, as a ready term.
+    """Return a recorded function of (t, omega, attitude) as a ready term.
 
-    Scene files describe it by its kind and its checked arguments. An argument is a vector or a
-    matrix (an array), a list of arguments, a TorqueLaw, a number, a text or a truth value.
+    Scene files have its kind and its checked arguments: arrays, lists, laws, numbers, texts or
+    truth values.
     """
     pairs = ((key, _file_value(value)) for key, value in arguments.items())
     return replace(replayed(function), terms=((("kind", kind), *pairs),))
@@ -44,11 +47,7 @@ def is_diagonal(matrix: Array) -> bool:
 
 
 def matrix_of(where: str, value: object) -> Array:
-    """Return a matrix, shape (3, 3), from a number, three diagonal elements, or three rows.
-
-    Raise InputError, with `where` in front of the message, for anything else, and for a number that
-    is not finite.
-    """
+    """Return a finite matrix, shape (3, 3), from a number, a diagonal, or three rows."""
     if isinstance(converted(value), float):
         return np.diag([finite(where, value)] * 3)
     allowed = "allowed: a number, three numbers for the axes, or three rows of three numbers"
@@ -65,8 +64,7 @@ def matrix_of(where: str, value: object) -> Array:
 def inertia_of(where: str, value: object) -> Array:
     """Return an inertia matrix (kg m2), shape (3, 3), from three moments or three rows.
 
-    Raise InputError, with `where` in front of the message, unless the moments are above 0, or the
-    matrix is symmetric and positive definite.
+    Raise InputError unless it is symmetric and positive definite.
     """
     if isinstance(converted(value), float):
         raise InputError(f"{where}: {kind_of(value)}; allowed: three moments, or three rows, kg m2")
@@ -79,11 +77,7 @@ def inertia_of(where: str, value: object) -> Array:
 
 
 def law_of_vector(where: str, value: object, frame: str) -> TorqueLaw:
-    """Return a vector that depends on time, from three numbers or a TorqueLaw about given axes.
-
-    Raise InputError, with `where` in front of the message, for anything else, and for a TorqueLaw
-    with another frame.
-    """
+    """Return a vector over time, from three numbers or a TorqueLaw with this frame."""
     allowed = f'allowed: three numbers, or a TorqueLaw with frame="{frame}"'
     if isinstance(value, TorqueLaw):
         if value.frame != frame:

@@ -1,4 +1,7 @@
-"""Torque terms for damping, control and wheels, with components about the body axes."""
+"""Torque terms for damping, control and wheels, with components about the body axes.
+
+A matrix is a number, times the identity, or three diagonal elements, or three rows.
+"""
 
 from collections.abc import Iterable
 from itertools import islice
@@ -22,14 +25,13 @@ _MOST_COEFFICIENTS = 50
 def damping(matrix: MatrixLike) -> StateTorque:
     """Return the torque -D omega of linear damping.
 
-    The body loses the power omega . D omega (W), which is never negative if the symmetric part of D
-    is positive semidefinite.
+    The body loses the power omega . D omega (W), never negative if the symmetric part of D is
+    positive semidefinite.
 
     Parameters
     ----------
     matrix : number, three numbers, or three rows of three numbers
-        The matrix D (N m s); a number is a multiple of the identity matrix, and three numbers are
-        the elements of a diagonal matrix.
+        The matrix D (N m s): a multiple of the identity, a diagonal, or all elements.
 
     Returns
     -------
@@ -59,17 +61,14 @@ def damping(matrix: MatrixLike) -> StateTorque:
 def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTorque:
     """Return a torque of drag that is an odd polynomial of omega.
 
-    The torque is the sum over n = 0, 1, 2, ... of -C_n |omega|^(2n) omega, where C_n is coefficient
-    number n. If `per_axis` is true, it is the sum of -C_n v_n, where the vector v_n has the
-    components omega_i^(2n+1). The list ``[0, k]`` is therefore a cubic drag. Quadratic drag,
-    -k |omega| omega, is not smooth at omega = 0, and is no such polynomial; a function that the
-    user writes with ``numpy.sqrt`` can have it, for an omega that does not vanish.
+    It is the sum over n = 0, 1, 2, ... of -C_n |omega|^(2n) omega, or if `per_axis` of -C_n v_n,
+    with v_n of components omega_i^(2n+1). Quadratic drag, -k |omega| omega, is no such polynomial
+    and not smooth at 0; a function with ``numpy.sqrt`` can have it elsewhere.
 
     Parameters
     ----------
     coefficients : iterable of numbers, three numbers, or three rows of three numbers
-        The coefficients C_0, C_1, ..., at least one and at most 50. The unit of C_n is
-        N m (s/rad)^(2n+1). Each is a matrix in the form that `damping` accepts.
+        1 to 50 coefficients C_0, C_1, ..., in N m (s/rad)^(2n+1), in the forms of `damping`.
     per_axis : bool
         Whether the powers are those of the components, instead of those of |omega|.
 
@@ -81,8 +80,7 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
     Raises
     ------
     InputError
-        If `coefficients` is no list, or has no coefficient or too many, or if a coefficient is of
-        another form.
+        If `coefficients` or one of them is of another form.
 
     References
     ----------
@@ -118,8 +116,8 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
 def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTorque:
     """Return the torque -K (omega - target), which controls the angular velocity.
 
-    Under this torque alone, with a positive definite K, the angular velocity approaches a target
-    about a principal axis, or the target 0, from every start that is near enough.
+    Alone, with a positive definite K, it leads from every near start to the target, if that is 0 or
+    about a principal axis.
 
     Parameters
     ----------
@@ -163,11 +161,10 @@ def attitude_control(
 ) -> StateTorque:
     """Return the torque -2 k e0 e - K omega, which rotates the body to a target attitude.
 
-    The error quaternion (e0, e) is target* q, where q is the attitude. A quaternion and its
-    negative are one attitude, and the torque is the same for both; the body therefore does not
-    unwind. For a number k the first term is -k sin(angle) about the axis of the error, and has the
-    potential energy k (1 - cos(angle)). A body that is turned by 180 degrees is in an unstable
-    equilibrium.
+    The error quaternion (e0, e) is target* q with the attitude q. A quaternion and its negative
+    have the same torque, so that the body does not unwind. For a number k the first term is -k
+    sin(angle) about the axis of the error, with the potential k (1 - cos(angle)); the equilibrium
+    at 180 degrees is unstable.
 
     Parameters
     ----------
@@ -176,7 +173,7 @@ def attitude_control(
     gain : number, three numbers, or three rows of three numbers
         The matrix K (N m s) of the damping.
     target : four numbers
-        The desired attitude, a quaternion from body to space, scalar first. It is normalised.
+        The desired quaternion from body to space, scalar first. It is normalised.
 
     Returns
     -------
@@ -217,20 +214,17 @@ def attitude_control(
 def wheels(momentum: Numbers, motor: TorqueLaw | Numbers | None = None) -> StateTorque:
     """Return the torque -omega x h - u of wheels, which store the momentum h, on the body.
 
-    The motors exert the torque u on the wheels, so that h' = u. The momentum h at the time t is
-    `momentum` plus the integral of u from 0 to t. Without motors h is constant: the body is a
-    gyrostat.
+    The motors exert u on the wheels: h' = u. Without motors h is constant, and the body a gyrostat.
 
-    The vector h is the absolute momentum of the wheels about their own axes, and the inertia of the
-    scene excludes the moments of the wheels about these axes. The same equations hold if h is the
-    momentum relative to the body, u is its rate, and the inertia includes these moments.
+    Either h is the absolute momentum of the wheels about their own axes, and the inertia excludes
+    their moments about these; or h is relative to the body, and the inertia includes them.
 
     Parameters
     ----------
     momentum : three numbers
-        The momentum of the wheels at time 0, about the body axes (N m s).
+        The momentum h at time 0, about the body axes (N m s).
     motor : TorqueLaw or three numbers, optional
-        The torque u (N m) of the motors on the wheels, about the body axes.
+        The torque u (N m), about the body axes.
 
     Returns
     -------

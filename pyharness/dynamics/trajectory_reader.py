@@ -1,7 +1,7 @@
 """Reading of the files that `Trajectory.save` writes.
 
-A file may come from anyone. Therefore nothing in it is executed or unpickled, no array is larger
-than the file, and every value is checked.
+Since they may come from anyone, nothing is executed or unpickled, no array is larger than the file,
+and every value is checked.
 """
 
 import hashlib
@@ -48,9 +48,8 @@ _CHANGING = {each.place: each for each in (ChangingMoments, ChangingInertia)}
 def load(path: str | os.PathLike[str]) -> Trajectory:
     """Return the trajectory that `Trajectory.save` wrote to a file.
 
-    Every number is bit-for-bit identical to that of the saved trajectory, and so are the results of
-    its methods, such as `power` and `work`. A torque that no scene file can describe, as one that
-    was recorded from a Python function, is restored as a list of operations.
+    All numbers, and the results of its methods, are bit-for-bit the same. A torque that no scene
+    file can describe is restored as a list of operations.
 
     Parameters
     ----------
@@ -65,9 +64,8 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
     Raises
     ------
     InputError
-        If the file can't be read, was not written by `Trajectory.save`, was changed afterwards, is
-        damaged, is of a version that this version does not read, or is larger than a quarter of
-        this machine's memory.
+        If the file can't be read, is not by `Trajectory.save` or of another version, was changed or
+        damaged, or is larger than a quarter of this machine's memory.
 
     Examples
     --------
@@ -109,10 +107,7 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
 
 
 def _arrays(content: bytes, names: Sequence[str] = ()) -> tuple[dict[str, Any], str]:
-    """Return the arrays of some names in the content of a file, or all if none is given.
-
-    The second value is the digest of these arrays without `DIGEST`.
-    """
+    """Return the arrays of some names, or all, and the digest of these without `DIGEST`."""
     found, digest = {}, hashlib.sha256()
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         allowed = {f"{name}.npy" for name in (*TEXTS, *ROWS, AXES, *EVENTS, SENSITIVITIES)}

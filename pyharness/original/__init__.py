@@ -1,1 +1,1 @@
-"""The three programs of the thesis's appendix: their cards, Python ports (twins), compiled runs."""
+"""Cards, Python ports (twins) and compiled runs of the three programs of the appendix."""

@@ -1,10 +1,10 @@
-"""The text of the edition: every card of the three decks, and the way in which the scan shows it.
+"""The text of the edition: every card of the three decks, and how the scan shows it.
 
-A deck consists of the cards of a program. A line of the scan is a card number, a dash and the text
-of the card; blanks are ignored. The tables in `data/cards` contain the decks, and the pages of the
-scan in their order. They also name the lines of the Python twin that correspond to each card. The
-critical apparatus (`data/apparatus.toml`) has entries that record and explain the deviations of the
-scan from our text.
+A card is a line of a printed program; a deck is the cards of one program. A line of the scan is a
+card number, a dash and the text of the card; blanks are ignored. The tables in `data/cards` contain
+the decks, the pages of the scan in their order, and the lines of the Python twin that correspond to
+each card. `data/apparatus.toml`, the critical apparatus, explains the deviations of the scan from
+our text.
 """
 
 import re
@@ -21,11 +21,9 @@ _SPECIFICATION = re.compile(r"PROGRAM |DIMENSION |REAL |FORMAT\(|END$")
 
 
 class Difference(NamedTuple):
-    """A passage of a card that has different characters in our text and in the scan.
+    """A passage of a card that differs between our text and the scan.
 
-    A card is a line of a printed program, and the scan is that of the thesis. `ours` and `scans`
-    are the characters in our text and in the scan, without blanks. `entry` is the identifier of the
-    entry of the critical apparatus that explains the difference.
+    `ours` and `scans` are without blanks. `entry` identifies the explanation in the apparatus.
     """
 
     ours: str
@@ -34,7 +32,7 @@ class Difference(NamedTuple):
 
 
 class Card(NamedTuple):
-    """A card (line) of a printed program, and the way in which the scan of the thesis shows it.
+    """A card of a printed program, and how the scan shows it.
 
     Attributes
     ----------
@@ -43,15 +41,13 @@ class Card(NamedTuple):
     number : int
         Card number: 100, 110, 120, ...
     text : str
-        Columns 1 to 72 of the card in our text.
+        Columns 1 to 72 in our text.
     differences : tuple of Difference
-        The passages whose characters differ in the scan, from left to right. Each passage is the
-        first occurrence of its characters after the previous passage; blanks are ignored.
+        From left to right. Each is the first occurrence of its characters after the previous one.
     printed : tuple of (str, str) or None
-        If the scan shows another card number than `number`: this other number, and the identifier
-        of the entry of the critical apparatus (our notes on the text) that explains it.
+        Another card number that the scan shows, and the apparatus entry that explains it.
     lost : str or None
-        If the card is missing from the scan: the identifier of the apparatus entry about its loss.
+        The apparatus entry about the loss of a card that the scan lacks.
     """
 
     program: str
@@ -63,30 +59,27 @@ class Card(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Return the name of the card: program and card number, as in ``two-term:1660``."""
+        """Return the name of the card, as in ``two-term:1660``."""
         return f"{self.program}:{self.number}"
 
     @property
     def statement(self) -> str:
-        """Return the text of the card with each run of blanks reduced to one blank."""
+        """Return the text with each run of blanks reduced to one."""
         return " ".join(self.text.split())
 
     @property
     def is_comment(self) -> bool:
-        """Return whether the card is a comment, which has a C in column 1."""
+        """Return whether column 1 has a C."""
         return self.text.startswith("C")
 
     @property
     def continues(self) -> bool:
-        """Return whether the card continues the previous statement, by a character in column 6."""
+        """Return whether column 6 marks a continuation."""
         return not self.is_comment and self.text[5:6].strip() != ""
 
     @property
     def scan(self) -> str | None:
-        """Return the card's number and text in the scan of the thesis, without blanks.
-
-        The result is one text, with a dash after the number. It is None if the scan lacks the card.
-        """
+        """Return the scan's number, dash and text without blanks; None if the card is lost."""
         if self.lost:
             return None
         number = self.printed[0] if self.printed else str(self.number)
@@ -94,15 +87,12 @@ class Card(NamedTuple):
         return f"{number}-{''.join(shown)}"
 
     def passages(self) -> Iterator[tuple[str, Difference | None]]:
-        """Yield pairs: a passage of the card's text, and its difference from the thesis's scan.
-
-        The difference is None for a passage that is the same in the scan.
-        """
+        """Yield each passage of the text with its difference from the scan, or None."""
         return passages(self.text, self.differences)
 
     @property
     def text_with_scanned_names(self) -> str:
-        """Return the text of the card with the scan's names where ours are a normalization."""
+        """Return the text with the scan's names where ours are a normalization."""
         kinds = {each["id"]: each["kind"] for each in facts("apparatus")["entry"]}
         return "".join(
             each.scans if each and kinds[each.entry] == "normalization" else text
@@ -111,15 +101,12 @@ class Card(NamedTuple):
 
     @property
     def deviates(self) -> bool:
-        """Return whether the scan of the thesis lacks the card, or differs from our text of it."""
+        """Return whether the scan lacks the card or differs from our text."""
         return bool(self.lost or self.printed or self.differences)
 
     @property
     def entries(self) -> tuple[str, ...]:
-        """Return the identifiers of the entries of the critical apparatus that name the card.
-
-        These entries record and explain the mistakes and deviations of the printed programs.
-        """
+        """Return the identifiers of the apparatus entries that name the card."""
         return tuple(
             each["id"]
             for each in facts("apparatus")["entry"]
@@ -128,11 +115,7 @@ class Card(NamedTuple):
 
 
 class Deck:
-    """The cards of a program by card number, and the source lines that correspond to each card.
-
-    A card is a line of the printed program. The source lines are those of the program's Fortran
-    port and of its Python version (twin).
-    """
+    """The cards of a program by number, and the source lines of port and twin for each card."""
 
     def __init__(self, program: str) -> None:
         """Read the table of cards of the program from `data/cards`."""
@@ -154,8 +137,7 @@ class Deck:
     def executable(self) -> frozenset[int]:
         """Return the numbers of the cards with executable statements.
 
-        Every other card is a comment, or contains a PROGRAM, DIMENSION, REAL, FORMAT or END
-        statement.
+        The others are comments, or part of a PROGRAM, DIMENSION, REAL, FORMAT or END statement.
         """
         found, computes = set(), False
         for card in self.cards.values():
@@ -173,54 +155,34 @@ class Deck:
 
     @cached_property
     def absent(self) -> dict[int, str]:
-        """Return, by card number, the reasons why the Fortran port omits executable cards.
-
-        The result is a dictionary. It has a key only for each card that the port omits.
-        """
+        """Return, by card number, why the Fortran port omits executable cards."""
         return {n: why for cards, why in self._places["absent"] for n in numbers(cards)}
 
     @cached_property
     def otherwise(self) -> dict[int, str]:
-        """Return, by card number, the reasons why the port's statements differ from those on cards.
-
-        The result is a dictionary. It has a key only for each card whose statement the Fortran port
-        has in another form.
-        """
+        """Return, by card number, why the port has the card's statement in another form."""
         return {n: why for cards, why in self._places["otherwise"] for n in numbers(cards)}
 
     @cached_property
     def port(self) -> dict[int, list[Place]]:
-        """Return, by card number, the lines of the Fortran port that correspond to the card.
-
-        The comment at the end of a line of the port names the cards of this line.
-        """
+        """Return, by card number, the lines of the Fortran port that correspond to the card."""
         return _by_card((cards, place) for place, cards in port_lines(self.program))
 
     @cached_property
     def twin(self) -> dict[int, list[Place]]:
-        """Return, by card number, the lines of the Python twin that correspond to the card.
-
-        The twin is the Python version of the program.
-        """
+        """Return, by card number, the lines of the twin that correspond to the card."""
         places = self._places["twin"]
         return _by_card((cards, twin_line(file, text)) for cards, file, text in places)
 
 
 @cache
 def deck(program: str) -> Deck:
-    """Return the deck of a program, which contains the cards (lines) of the printed program.
-
-    The deck is read only once and then shared, so that callers must not change it.
-    """
+    """Return the deck of a program; it is shared, so callers must not change it."""
     return Deck(program)
 
 
 def numbers(ranges: str) -> list[int]:
-    """Return the list of the card numbers that a text of numbers and ranges names.
-
-    The text ``750-770, 800`` names 750, 760, 770 and 800, because cards are numbered in steps of
-    10.
-    """
+    """Return the card numbers that a text names: ``750-770, 800`` is 750, 760, 770 and 800."""
     found: list[int] = []
     for each in ranges.split(",") if ranges else ():
         first, _, last = each.strip().partition("-")
@@ -229,9 +191,9 @@ def numbers(ranges: str) -> list[int]:
 
 
 def find(program: str, number: int) -> Card:
-    """Return the card of a program's deck that has the card number `number`.
+    """Return the card of a program with a number.
 
-    Raise InputError, which names the nearest cards, if there is no such card.
+    Raise InputError, which names the nearest cards, if there is none.
     """
     cards = deck(program).cards
     if number not in cards:
@@ -244,19 +206,11 @@ def find(program: str, number: int) -> Card:
 
 
 def chosen(asked: Iterable[str]) -> list[Card]:
-    """Return the cards that `asked` names; all cards of the three programs if `asked` is empty.
+    """Return the cards that `asked` names; all cards if it is empty.
 
-    Parameters
-    ----------
-    asked : iterable of str
-        Programs, card numbers and ranges: ``two-term``, ``1660``, ``1040-1090`` (of every program
-        that has such cards), ``two-term:1660``.
-
-    Raises
-    ------
-    InputError
-        If an item of `asked` is not a program, a card or a range, or if it is a range without
-        cards.
+    Items are programs, numbers and ranges: ``two-term``, ``1660``, ``1040-1090`` (of every program
+    that has such cards), ``two-term:1660``. Raise InputError for any other item, and for a range
+    without cards.
     """
     found: dict[Card, None] = {}
     for each in list(asked) or PROGRAMS:
@@ -265,9 +219,9 @@ def chosen(asked: Iterable[str]) -> list[Card]:
 
 
 def parallels(card: Card) -> list[Card]:
-    """Return the cards of the two other programs that have the same text as `card`.
+    """Return the cards of the other programs with the same text, blanks ignored.
 
-    Blanks are ignored. The list is empty for a comment or a blank card.
+    The list is empty for a comment or a blank card.
     """
     if card.is_comment or not card.text[6:].strip():
         return []
@@ -325,11 +279,10 @@ def _cards_of(asked: str) -> list[Card]:
 def passages(
     text: str, differences: Iterable[Difference]
 ) -> Iterator[tuple[str, Difference | None]]:
-    """Yield pairs: a passage of a card's text, and its difference from the scan of the thesis.
+    """Yield each passage of a card's text with its difference from the scan, or None.
 
-    `differences` are all differences of the card, in the order of the text. For a passage that is
-    the same in the scan, None is yielded as its difference. Raise ValueError if the text does not
-    contain the differing characters in this order.
+    `differences` are all differences of the card, in the order of the text; else ValueError is
+    raised.
     """
     # Indices of all characters that are not blanks. Blanks are ignored.
     places = [n for n, letter in enumerate(text) if not letter.isspace()]

@@ -1,11 +1,10 @@
 """The rounding rules of the floating-point arithmetic of the CDC 6600 and CYBER 70.
 
 The source is the CYBER 170 hardware reference, CDC 60463560. A number is an integer coefficient of
-p = 48 bits and an exponent. A sum is formed in a register of 2 p bits, here called a frame. `FX`
-denotes the truncating instructions for sum, difference, product and quotient, which have the octal
-codes 30, 31, 40 and 44. `RX` denotes their rounding counterparts 34, 35, 41 and 45. The instruction
-NX (24) normalises a sum. A sum has no guard bit, because the bits below the unit of the larger
-operand are truncated before NX shifts the sum to the left.
+p = 48 bits and an exponent. A sum is formed in a register of 2 p bits, the frame. `FX` denotes the
+truncating instructions for sum, difference, product and quotient (octal 30, 31, 40 and 44), `RX`
+the rounding ones (34, 35, 41 and 45). NX (24) normalises a sum. There is no guard bit: the bits
+below the unit of the larger operand are truncated before NX shifts the sum to the left.
 """
 
 from pyharness.original.rounding import Operation, Pair, Rules, rounding
@@ -15,12 +14,10 @@ LEAST, MOST = -1023, 1022
 
 
 def cdc(p: int, rounds: bool) -> Rules:
-    """Return the arithmetic of the CDC 6600 for numbers with p-bit coefficients.
+    """Return the arithmetic of the CDC for p-bit coefficients: RX if `rounds`, else FX.
 
-    The result is a `Rules` object, whose attributes are functions for the operations. It is the
-    arithmetic of the rounding instructions RX if `rounds`, else of the truncating instructions FX.
-    Literals, such as the constants .2 and .01 in the programs, are rounded to nearest. This is an
-    assumption: no source states how CDC's compiler FTN converted literals.
+    Literals are rounded to nearest. This is an assumption: no source states how CDC's compiler FTN
+    converted them.
     """
     settled = rounding(p, LEAST, MOST, cut=True, gradual=False)
     quarter = 1 << p - 2 if rounds else 0
@@ -52,10 +49,9 @@ def _sum(p: int, rounds: bool) -> Operation:
 def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[int, int]:
     """Return the sum of xm 2**xe and ym 2**ye before normalisation, as a pair (frame, e).
 
-    The frame is the sum as an integer, in units of 2**(e - p), where e is the larger of the
-    exponents xe and ye. The coefficients xm and ym must have p bits. The operand with the smaller
-    exponent is shifted for alignment, and truncated. If `rounds`, as in the instruction RX, half a
-    unit in the last place is added to each operand before the shift.
+    The frame is an integer in units of 2**(e - p), e the larger exponent. Both coefficients have p
+    bits. The operand with the smaller exponent is shifted and truncated; if `rounds`, half a unit
+    in the last place is first added to each operand, as in RX.
     """
     if xe <= ye:
         xm, xe, ym, ye = ym, ye, xm, xe

@@ -1,7 +1,7 @@
 """Cells: combinations of a listing and a case, for which Fortran port and twin are compared.
 
-A listing is a program of the thesis with a choice of active defects, readings and conjectures. A
-case is a scene of Table 1. The twin is the Python port of a program.
+A listing is a program with a choice of active defects, readings and conjectures. A case is a scene
+of Table 1.
 """
 
 from collections.abc import Iterator
@@ -19,11 +19,9 @@ def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
 
 
 def all_listings(program: str) -> Iterator[Listing]:
-    """Yield every listing of a program, which is a choice of its switches and readings.
+    """Yield every listing of a program: each subset of switches with each subset of readings.
 
-    The switches of a program are its defects (mistakes) and some conjectures (assumptions), which
-    are all active in the original program. Readings are interpretations of doubtful cards. Each
-    subset of the switches is combined with each subset of the readings.
+    The switches are the defects and some conjectures, all active in the original program.
     """
     for readings in subsets(names_of("reading", program)):
         for defects in subsets(switches(program)):
@@ -31,11 +29,9 @@ def all_listings(program: str) -> Iterator[Listing]:
 
 
 def all_cells() -> Iterator[tuple[Listing, int]]:
-    """Yield every pair of a listing and the number of a case of the thesis, for all programs.
+    """Yield every pair of a listing and a case number, for all programs.
 
-    A listing is a program with a choice of its defects (mistakes), readings (interpretations of
-    doubtful cards) and conjectures (assumptions). The cases are those of Table 1. For a case with
-    an initial torque, each listing is also yielded with the conjecture `initial-torque`.
+    For a case with an initial torque, each listing also comes with the conjecture `initial-torque`.
     """
     cases = {case: initial_torque(case_scene(case)) is not None for case in case_numbers()}
     for program in PROGRAMS:
@@ -48,20 +44,15 @@ def all_cells() -> Iterator[tuple[Listing, int]]:
 
 
 def cell_name(listing: Listing, case: int) -> str:
-    """Return a name for the combination of a listing and a case of Table 1 of the thesis.
-
-    A listing is a program with a choice of its defects. An example of a name is
-    ``two-term/case-3/dt-accumulates+torque-held``.
-    """
+    """Return a name such as ``two-term/case-3/dt-accumulates+torque-held``."""
     return f"{listing.program}/case-{case}/{listing_name(listing)}"
 
 
 def listing_name(listing: Listing) -> str:
-    """Return a name, without blanks, for a listing (a choice of a program's defects).
+    """Return a name, without blanks, for a listing.
 
-    The name is ``corrected``, or ``original`` followed by the chosen readings (interpretations of
-    doubtful cards), each after a colon. For any other listing it consists of the names of all
-    chosen defects, readings and conjectures (assumptions), joined by ``+``.
+    It is ``corrected``; or ``original`` and the chosen readings, each after a colon; or the names
+    of all chosen defects, readings and conjectures, joined by ``+``.
     """
     if listing.label == "custom":
         return "+".join(sorted(listing.active))

@@ -1,7 +1,4 @@
-"""The collation: checks that the scan, our text of the cards and the critical apparatus agree.
-
-The critical apparatus (`data/apparatus.toml`) lists, among others, the deviations of the scan.
-"""
+"""Checks that the scan, our text of the cards and the critical apparatus agree."""
 
 import difflib
 import re
@@ -17,11 +14,10 @@ HEADING = "APPENDIX AND PROGRAMS"
 
 
 def expected_lines() -> list[tuple[str, str]]:
-    """Return the lines that our tables expect in the appendix of the scan, as pairs (text, name).
+    """Return the lines that our tables expect in the appendix, as pairs (text, name).
 
-    The appendix of the thesis has the cards (lines) of the programs. The text is the line without
-    blanks. The name is usually that of a card, as in ``two-term:1660``. It is ``furniture`` for a
-    line that an editor added, and ``phantom`` for text that belongs to no card at its place.
+    The text has no blanks. The name is a card's, as in ``two-term:1660``, or ``furniture`` for a
+    line that an editor added, or ``phantom`` for text that belongs to no card at its place.
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -38,10 +34,9 @@ def expected_lines() -> list[tuple[str, str]]:
 
 @cache
 def witness_lines() -> dict[str, str]:
-    """Return the line of the scan for each card that the scan has, with the blanks of the scan.
+    """Return the scan's line of each card by the card's name, with the scan's blanks.
 
-    The keys are names of cards (lines of the printed programs), as in ``two-term:1660``. The blanks
-    are those in `data/cards/blanks.toml`. Callers must not change the dictionary.
+    The blanks are from `data/cards/blanks.toml`. Callers must not change the dictionary.
     """
     blanks = facts("cards/blanks")
     found = {}
@@ -54,15 +49,9 @@ def witness_lines() -> dict[str, str]:
 
 
 def unexplained(scan: str) -> list[str]:
-    """Return one sentence for each line in which a scan disagrees with our tables of cards.
+    """Return a sentence for each line in which a scan disagrees with our tables of cards.
 
-    The cards are the lines of the programs. `scan` is the text of the whole thesis, as scanned. The
-    list is empty if all lines agree.
-
-    Raises
-    ------
-    InputError
-        If the text has no appendix with cards.
+    `scan` is the text of the whole thesis. Raise InputError if it has no appendix with cards.
     """
     _, heading, appendix = scan.rpartition(HEADING)
     if not heading or not re.search(r"^\s*\d+-", appendix, re.MULTILINE):
@@ -88,13 +77,10 @@ def unexplained(scan: str) -> list[str]:
 
 
 def undeclared() -> list[str]:
-    """Return one sentence for each disagreement between the cards and the critical apparatus.
+    """Return a sentence for each disagreement between the cards and the apparatus.
 
-    The cards are the lines of the programs. The apparatus has entries that explain the deviations
-    of the thesis's scan from our text of the cards. A card names an entry for each deviation. This
-    entry must declare the deviation. Conversely, each deviation that an entry declares must be
-    recorded with a card. A card that is missing from the scan must name an entry of the kind
-    ``missing text``.
+    Each deviation at a card must name an entry that declares it, each declared deviation must be at
+    a card, and a lost card must name an entry of the kind ``missing text``.
     """
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):

@@ -1,11 +1,9 @@
-"""Collocation as in IV.2 of the thesis, with up to five terms: a step, and a run of many steps.
+"""Collocation as in IV.2 of the thesis, with up to five terms: a step, and a run.
 
-A step is called an interval, as in the thesis. In each interval every unknown is approximated by a
-polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). The derivative of the polynomial equals the
-right-hand side at as many collocation points as there are terms after x(0) (eq. 36). Because the
-right-hand side depends on the unknowns, a first estimate of the polynomials assumes a constant
-right-hand side. One correction then evaluates the right-hand side at the collocation points, with
-the unknowns of the first estimate.
+A step is an interval, in which every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34).
+Its derivative equals the right-hand side at as many collocation points as there are terms after
+x(0) (eq. 36). A first estimate assumes a constant right-hand side; one correction evaluates it at
+the collocation points, with the unknowns of the estimate.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,14 +30,10 @@ def integrate(
 ) -> Trajectory:
     """Run a collocation program on a scene, and return its trajectory.
 
-    `listing` is the program with its active defects. The function `points_of` returns the
-    collocation points, in seconds from the start of a step. Its argument is DT, the step size (s)
-    as the program computes it.
-
-    The function `rates` returns the right-hand sides of all unknowns at one point. Its first
-    argument is the list of the torques divided by the moments of inertia (1/s2) at the start and at
-    all collocation points. The others are the number k of the point (0 for the start), and the
-    unknowns at this point.
+    `points_of` returns the collocation points (s) from the start of a step, given DT, the step size
+    as the program computes it. `rates` returns the right-hand sides of all unknowns at one point,
+    from the torques over the moments of inertia (1/s2) at the start and all points, the number k of
+    the point (0 for the start), and the unknowns.
     """
     h = scene.step_size
     dt = h
@@ -71,13 +65,11 @@ def integrate(
 def interval(
     start: Vector, points: Sequence[float], end: float, rates: Rates
 ) -> tuple[list[float], int]:
-    """Return all unknowns after one interval, which is one step, and the error code IER.
+    """Return all unknowns after one interval, and the error code IER that the programs print.
 
-    `start` contains the unknowns at the start of the interval. The collocation points `points` and
-    the time `end` of the result are in seconds from the start. The function `rates` returns the
-    right-hand sides at point k (0 for the start), from k and the unknowns. The linear solver LEQT1F
-    is called twice, for a first estimate and for its correction. IER is the error code of the
-    second call, which the programs print.
+    `start` has the unknowns at the start; `points` and `end` are in seconds from it. `rates`
+    returns the right-hand sides at point k (0 for the start), from k and the unknowns. IER is that
+    of the second solution, the correction.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))
@@ -87,22 +79,16 @@ def interval(
 
 
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
-    """Return the coefficients c1, c2, ... of each unknown's polynomial, and the error code IER.
+    """Return c1, c2, ... of each unknown's polynomial, and the error code IER.
 
-    The polynomials are x(0) + c1 t + c2 t**2 + ... Their derivatives at the collocation points
-    `points` (s) are `rates`, which has one row for each point. IER is the error code of the linear
-    solver LEQT1F.
+    `rates` has the derivatives at `points` (s), a row for each point.
     """
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(collocation_matrix(points), by_unknown)
 
 
 def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
-    """Return the matrix of the derivatives of t, t**2, ... at the collocation points.
-
-    This is the matrix of equation 36 of the thesis. It has a row for each of `points` (s), and a
-    column for each power of t. There are as many powers as points.
-    """
+    """Return the derivatives of t, t**2, ... at the points (s), a row for each (eq. 36)."""
     return [
         [1.0, 2.0 * t, 3.0 * (t * t), 4.0 * (t * t * t), 5.0 * (t * t * t * t)][: len(points)]
         for t in points
@@ -112,8 +98,7 @@ def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
 def values(start: Vector, coefficients: Sequence[Vector], t: float) -> list[float]:
     """Return every unknown's polynomial x(0) + c1 t + c2 t**2 + ... at the time `t` (s).
 
-    `start` contains x(0) of each unknown, and `coefficients` contains its c1, c2, ... The terms are
-    added in this order, because the rounding errors depend on the order.
+    The terms are added in this order, because the rounding errors depend on it.
     """
     t2 = t * t
     powers = [t, t2, t2 * t, t2 * t2, t2 * t2 * t]

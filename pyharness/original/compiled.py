@@ -22,10 +22,8 @@ def run(
 ) -> Trajectory:
     """Run the compiled program of a listing on a scene, and return its trajectory.
 
-    `listing` is the program with its active defects. `lipschitz` is the Lipschitz constant (1/s) of
-    the Runge-Kutta program's stop test, and `may_stop` says whether this test may end the run.
-    `velocity` requests the translational velocity. The result is that of `run_program`, but the
-    arguments are not checked. Raise NotBuiltError if the extension is not built.
+    The arguments are those of `run_program`, and are not checked. Raise NotBuiltError if the
+    extension is not built.
     """
     rows, ier, n_rows, status, evaluations, variable, quotient = extension().run_program(
         *program_arguments(scene, listing, lipschitz, may_stop, velocity)
@@ -41,13 +39,10 @@ def read_rows(
 ) -> Trajectory:  # fmt: skip
     """Return the output of a compiled program as a trajectory.
 
-    `listing` supplies the name of the program. `rows` has shape (n, 8): true time and recorded TIME
-    (s), omega (rad/s) and translational velocity (m/s). `ier` contains at least n error codes of
-    the linear solver. `evaluations` is the number of evaluations of the right-hand sides. `ended`
-    says how the run ended, as in `Trajectory`. `stop_variable` is the number, from 1 in
-    `STOP_VARIABLES`, of the variable that failed the stop test, or 0 if the test did not end the
-    run. `stop_quotient` is the change of the right-hand side divided by the change of this variable
-    (1/s).
+    `rows` has shape (n, 8): true time and recorded TIME (s), omega (rad/s) and translational
+    velocity (m/s). `ier` has at least n codes. `stop_variable` is the number, from 1 in
+    `STOP_VARIABLES`, of the variable that failed the stop test, or 0. `stop_quotient` is the change
+    of the right-hand side over that of the variable (1/s).
     """
     n = len(rows)
     is_stopped = stop_variable > 0
@@ -65,12 +60,11 @@ def read_rows(
 
 
 class Arguments(NamedTuple):
-    """The arguments of the compiled extension's function `run_program`, in its order.
+    """The arguments of the compiled function `run_program`, in its order.
 
-    `flags` is a bit mask of the active defects, readings (interpretations of doubtful cards) and
-    conjectures (assumptions). `body` contains the moments (kg m2) if `by_moments`, else the
-    coefficients A, B and C of Euler's equations. `torque_first` is the initial torque divided by
-    the moments (1/s2), or zeros.
+    `flags` is a bit mask of defects, readings and conjectures. `body` contains the moments (kg m2)
+    if `by_moments`, else A, B and C of Euler's equations. `torque_first` is the initial torque
+    divided by the moments (1/s2), or zeros.
     """
 
     program: int
@@ -96,12 +90,7 @@ class Arguments(NamedTuple):
 def program_arguments(
     scene: Scene, listing: Listing, lipschitz: float, may_stop: bool, velocity: bool
 ) -> Arguments:
-    """Return the arguments of the compiled function `run_program` for a scene and a listing.
-
-    A listing is a program with a choice of its defects. `lipschitz` is the Lipschitz constant (1/s)
-    of the Runge-Kutta program's stop test, and `may_stop` says whether this test may end the run.
-    `velocity` says whether the translational velocity is requested.
-    """
+    """Return the arguments of the compiled function `run_program`."""
     first = initial_torque(scene) if listing.has("initial-torque") else None
     if first is None and listing.has("initial-torque"):
         conjectures = listing.conjectures - {"initial-torque"}
@@ -130,9 +119,5 @@ def program_arguments(
 
 
 def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:
-    """Return whether a run needs the translational velocity because the stop test reads it.
-
-    The stop test of the Runge-Kutta program reads the velocity if the defect
-    `lipschitz-tests-velocity` is active in `listing`, and if the test may end the run (`may_stop`).
-    """
+    """Return whether the stop test needs the velocity: defect `lipschitz-tests-velocity`."""
     return may_stop and listing.has("lipschitz-tests-velocity")

@@ -1,6 +1,6 @@
-"""Runs of the compiled programs in a word, which is a floating-point format of IEEE 754.
+"""Runs of the compiled programs in a floating-point format of IEEE 754.
 
-Numbers are passed to the compiled extension module, and returned by it, as bytes.
+Numbers are passed to the extension module, and returned by it, as bytes.
 """
 
 import itertools
@@ -23,13 +23,11 @@ from pyharness.original.word import Word
 def run(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the compiled program of a listing in a word, which is a floating-point format.
+    """Run the compiled program of a listing in a word; the result is that of `in_word.run`.
 
-    `listing` is the program with its active defects. `lipschitz` is the Lipschitz constant (1/s) of
-    the Runge-Kutta program's stop test, and `may_stop` says whether this test may end the run. The
-    result is that of `in_word.run`, which runs the Python version (twin). Raise InputError if the
-    extension's compiler does not support the word, or if angles of the torque's waves are too large
-    for the extension's sine. Raise NotBuiltError if the extension is not built.
+    Raise InputError if the extension's compiler does not support the word, or if angles of the
+    torque's waves are too large for the extension's sine, and NotBuiltError if the extension is not
+    built.
     """
     if word.p > 53:
         _check_angles(scene)
@@ -66,9 +64,9 @@ def run(
 
 
 def compiled_words() -> tuple[str, ...]:
-    """Return the names of the floating-point formats (words) that the compiled programs support.
+    """Return the names of the words that the compiled programs support.
 
-    The tuple is empty if the extension module that contains the programs is not built.
+    The tuple is empty if the extension is not built.
     """
     try:
         from pyharness import _build

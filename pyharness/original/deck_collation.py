@@ -1,8 +1,7 @@
-"""A comparison of the decks with each other and with the thesis's text, operation by operation.
+"""A comparison of the decks with each other and with the thesis, operation by operation.
 
-A deck consists of the cards of a program. The text is sections II to V of the thesis. The table
-`data/cards/collation.toml` lists the operations of the programs, and what the text states about
-them. Whether the decks agree on an operation is computed from their statements.
+`data/cards/collation.toml` lists the operations of the programs, and what sections II to V state
+about them. Whether the decks agree is computed from their statements.
 """
 
 import re
@@ -16,29 +15,25 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 
 
 class Row(NamedTuple):
-    """An operation of the programs, and whether the decks of cards and the thesis agree on it.
+    """An operation, and whether the decks and the thesis agree on it.
 
     Attributes
     ----------
     what : str
         A description of the operation.
     cards : dict of str to str
-        For each program whose deck has the operation, the numbers of its cards, as in
-        ``750-770, 800``.
+        The card numbers by program, as in ``750-770, 800``.
     decks : str
-        ``agree`` if all decks that have the operation have the same statements. ``names`` if their
-        statements differ only in names, ``order`` if they differ only in names and order, else
-        ``differ``. ``-`` if no deck has the operation.
+        ``agree`` if all decks with the operation have the same statements, ``names`` if only names
+        differ, ``order`` if only names and order differ, else ``differ``. ``-`` if no deck has it.
     thesis : str
-        Whether the text of the thesis ``agrees`` with the decks or ``differs``; ``silent`` if it
-        does not mention the operation.
+        Whether the thesis ``agrees`` with the decks, ``differs`` or is ``silent``.
     text, says : str
-        The place in the thesis that mentions the operation, and the statement at this place. Both
-        are empty if the thesis is silent.
+        The place in the thesis, and its statement; empty if the thesis is silent.
     entries : tuple of str
-        The identifiers of the apparatus entries that explain a disagreement.
+        The apparatus entries that explain a disagreement.
     reason : str
-        An explanation of a disagreement that is not in the apparatus.
+        An explanation that is not in the apparatus.
     """
 
     what: str
@@ -52,31 +47,21 @@ class Row(NamedTuple):
 
     @property
     def is_explained(self) -> bool:
-        """Return whether decks and thesis agree on the operation, or the row explains why not.
-
-        A deck contains the cards of a program. Decks and thesis agree if all three decks have the
-        same statements, and the thesis agrees with them.
-        """
+        """Return whether all decks and the thesis agree, or the row explains why not."""
         agrees = self.decks == "agree" and len(self.cards) == len(PROGRAMS)
         return (agrees and self.thesis == "agrees") or bool(self.entries or self.reason)
 
 
 def rows() -> list[Row]:
-    """Return the rows of the table that compares the decks of cards with the thesis's text.
-
-    Each row is for one operation of the programs. The rows have the order of the operations in the
-    decks.
-    """
+    """Return the rows of the comparison, in the order of the operations in the decks."""
     return [_row(each) for each in facts("cards/collation")["row"]]
 
 
 def faults(found: list[Row]) -> list[str]:
-    """Return one sentence for each mistake or unexplained disagreement in the table `found`.
+    """Return a sentence for each mistake or unexplained disagreement.
 
-    The rows of the table compare the cards (lines) of the programs with the text of the thesis.
-    They name entries of the critical apparatus that explain disagreements. An entry is a mistake if
-    it is unknown, is in no row, or names no card of its row. A card is a mistake if it is unknown,
-    in no row, or in two rows.
+    An apparatus entry must be known, in a row, and name a card of its row. A card must be known and
+    in exactly one row.
     """
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}
@@ -104,10 +89,7 @@ def faults(found: list[Row]) -> list[str]:
 
 
 def statements(program: str, cards: str) -> list[str]:
-    """Return the statements on some cards of a program, without blanks, labels and comments.
-
-    `cards` contains the numbers of the cards as text, as in ``750-770, 800``.
-    """
+    """Return the statements on some cards, without blanks, labels and comments."""
     found: list[str] = []
     for number in numbers(cards):
         card = deck(program).cards[number]
@@ -132,12 +114,7 @@ def _row(given: dict[str, Any]) -> Row:
 
 
 def _decks(given: dict[str, Any]) -> str:
-    """Return whether the decks that have an operation have the same statements.
-
-    The result is ``agree``, ``names`` (only names differ), ``order`` (only names and order differ),
-    ``differ``, or ``-`` if no deck has the operation. `given` is the operation's row in
-    `data/cards/collation.toml`.
-    """
+    """Return the value of `Row.decks` for a row of `data/cards/collation.toml`."""
     found = {program: statements(program, cards) for program, cards in given["cards"].items()}
     if not found:
         return "-"
@@ -164,20 +141,13 @@ def _same(found: dict[str, list[str]]) -> bool:
 
 
 def _renamed(statement: str, names: str) -> str:
-    """Return a FORTRAN statement with some names replaced.
-
-    `names` lists the old and the new name of each replacement, as in ``A=A1 B=B1``.
-    """
+    """Return a statement with names replaced as in ``A=A1 B=B1``."""
     changes = dict(each.split("=") for each in names.split())
     return re.sub(r"[A-Z][A-Z0-9]*", lambda name: changes.get(name[0], name[0]), statement)
 
 
 def _names_a_card(entry: dict[str, Any], row: Row) -> bool:
-    """Return whether an entry of the critical apparatus names a card of a row, or names no card.
-
-    The critical apparatus explains deviations in the thesis's programs. The row is one of the table
-    that compares the programs' cards with the text of the thesis.
-    """
+    """Return whether an apparatus entry names a card of a row, or no card at all."""
     return not entry["cards"] or any(
         set(numbers(entry["cards"].get(program, ""))) & set(numbers(cards))
         for program, cards in row.cards.items()

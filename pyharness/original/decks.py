@@ -1,9 +1,8 @@
-"""Decks: the cards of a program as fixed-form FORTRAN, and runs of them after compilation.
+"""Decks as fixed-form FORTRAN, and runs of them after compilation.
 
-The run of a deck is a third, independent way from the cards to the results, besides the Fortran
-port and the Python twin. It shares the table of cards with the edition, but no code with the port
-and the twin. The compiler translates the author's own statements, and a separate version of LEQT1F,
-the linear solver (`data/cards/leqt1f.f`).
+A third, independent way from the cards to the results, besides port and twin: it shares the table
+of cards with the edition, but no code with either. The compiler translates the author's own
+statements, and a separate version of the solver LEQT1F (`data/cards/leqt1f.f`).
 """
 
 import re
@@ -38,15 +37,10 @@ _MARK = "+"
 
 
 class Run(NamedTuple):
-    """The output of a compiled deck: the contents of its two files, TAPE5 and TAPE6.
+    """The output of a compiled deck.
 
-    Attributes
-    ----------
-    tape5 : array (n, 7)
-        TIME (s), U1 to U3 (rad/s) and V1 to V3 (m/s), one row for each record of TAPE5.
-    page : str
-        The text of TAPE6, the printed output, without carriage-control characters and trailing
-        blanks.
+    `tape5` has shape (n, 7): TIME (s), U1 to U3 (rad/s) and V1 to V3 (m/s). `page` is the text of
+    TAPE6, without carriage-control characters and trailing blanks.
     """
 
     tape5: np.ndarray
@@ -64,25 +58,22 @@ def deck_text(
     Parameters
     ----------
     listing : Listing
-        The program, with its active defects and its readings (interpretations of doubtful cards).
+        The program with its active defects and readings.
     scene : Scene, optional
-        A case of Table 1 of the thesis. Its numbers are written on the deck's own assignment cards,
-        and its number of steps in the DO statement. By default it is the case on the published
-        cards: Case 2 with 300 steps in the collocation decks, Case 5 with 100 steps in the
-        Runge-Kutta deck.
+        A case of Table 1, whose numbers replace those of the deck's assignment cards and DO
+        statement. By default the case on the published cards: Case 2 with 300 steps
+        (collocation) or Case 5 with 100 steps (Runge-Kutta).
     dialect : {"1982", "gfortran", "ftn"}
-        With "1982" the text is that of the cards, without changes for a compiler. "ftn" is for the
-        compiler for which the decks were written, and adds only the torque of Case 7. "gfortran"
-        adds this torque and the changes that a modern compiler needs. A mark in column 73 shows
-        each card that a dialect adds or replaces.
+        "1982": the cards without changes. "ftn", for the original compiler, adds only the torque of
+        Case 7. "gfortran" adds this torque and the changes that a modern compiler needs. Column 73
+        marks each card that a dialect adds or replaces.
     terms : int, optional
-        Number of terms, 3 or 5, of a collocation program whose deck the thesis does not print. The
-        deck is derived from the four-term deck, and is a conjecture.
+        3 or 5, for a conjectural deck that is derived from the four-term deck.
 
     Raises
     ------
     InputError
-        If the dialect is unknown, or if no card can express the listing, the terms or the scene.
+        If the dialect is unknown, or no card can express the listing, the terms or the scene.
     """
     if dialect not in DIALECTS:
         raise unknown("dialect", dialect, DIALECTS, "--dialect")
@@ -112,27 +103,23 @@ def deck_text(
 
 
 def card_steps(program: str) -> int:
-    """Return the number of steps on the cards of a program, the upper limit of its DO statement."""
+    """Return the number of steps in the DO statement of a program's cards."""
     number = facts("cards/alterations")["case"][program]["steps"]
     return int(deck(program).cards[number].text.split(",")[1])
 
 
 def corrected_cards(program: str) -> dict[int, str]:
-    """Return the text of each card of the corrected program, by card number.
+    """Return the text of each card of the corrected program, by number.
 
-    Cards that the correction inserts have numbers between those of their neighbours. Cards that it
-    deletes are missing from the result. The text has no blanks at its end.
+    Inserted cards have numbers between their neighbours'; deleted cards are missing. There are no
+    blanks at the end.
     """
     lines = deck_text(Listing.corrected(program)).splitlines()
     return {int(line[73:]): line[:72].rstrip() for line in lines}
 
 
 def corrections(program: str) -> dict[int, list[str]]:
-    """Return, by card number, the defects whose correction changes the card.
-
-    To change a card is to replace, delete or insert it. A card that no correction changes is not a
-    key of the result.
-    """
+    """Return the defects whose correction replaces, deletes or inserts a card, by number."""
     found: dict[int, list[str]] = {}
     for each in facts("cards/alterations")["alteration"]:
         if each["program"] == program and "corrects" in each and "case" not in each:
@@ -144,23 +131,11 @@ def corrections(program: str) -> dict[int, list[str]]:
 
 
 def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
-    """Return the text of a batch job that compiles and runs a deck with FTN, CDC's compiler.
+    """Return a batch job that compiles and runs a deck in the dialect `ftn` with CDC's FTN.
 
-    The job includes our version of LEQT1F, the linear solver, if the deck calls LEQT1F.
-
-    Parameters
-    ----------
-    deck : str
-        A deck in the dialect `ftn`.
-    system : {"nos", "nosbe"}
-        The operating system whose control statements surround the deck.
-    rounds : bool
-        Whether FTN's option ROUND is set, with which sums, products and quotients are rounded.
-
-    Raises
-    ------
-    InputError
-        If the system is unknown.
+    The job includes our LEQT1F if the deck calls it. `system` ("nos" or "nosbe") selects the
+    control statements. `rounds` sets FTN's option ROUND, with which sums, products and quotients
+    are rounded. Raise InputError if the system is unknown.
     """
     if system not in SYSTEMS:
         raise unknown("system", system, SYSTEMS, "--system")
@@ -176,12 +151,9 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
 def _is_made(
     alteration: Mapping[str, Any], listing: Listing, dialect: str, case: int | None
 ) -> bool:
-    """Return whether an alteration of cards applies to a listing, a dialect and a case.
+    """Return whether all conditions of an entry of `data/cards/alterations.toml` hold.
 
-    An alteration deletes, replaces or inserts cards, for example to correct a defect. `alteration`
-    is an entry of `data/cards/alterations.toml`, and applies if all its conditions are satisfied.
-    `listing` is a program with a choice of its defects. `case` is the number of the case of Table 1
-    of the thesis, or None for the case on the published cards.
+    `case` is None for the case on the published cards.
     """
     named = alteration.get
     return (
@@ -207,22 +179,17 @@ def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
 
 
 def model_cards(terms: int) -> dict[int, str]:
-    """Return the text of each card, by card number, of a collocation deck with `terms` terms.
+    """Return the cards, by new number, of a collocation deck with `terms` terms.
 
-    The cards are derived from the four-term deck, and have new numbers. They are a conjecture,
-    because V.2 of the thesis uses models of three and five terms in Case 6 of Table 1, but the
-    thesis does not print their decks. With n terms the collocation points are at the fractions
-    k/(n+1) of the interval, where k is 1 to n.
+    They are a conjecture from the four-term deck: V.2 uses three and five terms in Case 6, but the
+    thesis prints no such deck. The n collocation points are at k/(n+1) of the interval, k = 1 to n.
     """
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
     end = f"T{terms + 1}"
 
     def made(start: str, last: str, new: list[str]) -> None:
-        """Replace the cards from the text `start` to the text `last` by the statements `new`.
-
-        The first card that is replaced reads `start`, and the last one reads `last`.
-        """
+        """Replace the cards from the text `start` to the text `last` by the statements `new`."""
         first = next(n for n, each in enumerate(text) if each.strip() == start)
         after = next(n for n in range(first, len(text)) if text[n].strip() == last)
         text[first : after + 1] = [f"      {each}" for each in new]
@@ -318,30 +285,20 @@ def _literal(value: float) -> str:
 
 
 def solver_cards() -> int:
-    """Return the number of cards, except comments, in our version of the linear solver LEQT1F."""
+    """Return the number of cards, except comments, in our LEQT1F."""
     return sum(not line.startswith("C") for line in _SOLVER.read_text().splitlines())
 
 
 def compiler() -> str | None:
-    """Return the path of the Fortran compiler gfortran; None if it is not installed."""
+    """Return the path of gfortran; None if it is not installed."""
     return shutil.which(COMPILER)
 
 
 def run_deck(text: str, folder: Path | None = None) -> Run:
-    """Compile and run a deck in the dialect `gfortran`, and return its output files' contents.
+    """Compile and run a deck in the dialect `gfortran`, and return its output.
 
-    Parameters
-    ----------
-    text : str
-        The deck, as `deck_text` returns it.
-    folder : Path, optional
-        A folder in which the compiled solver LEQT1F is stored for later calls. By default each call
-        compiles the solver again.
-
-    Raises
-    ------
-    RuntimeError
-        If the compiler rejects the deck, or if the program fails.
+    The compiled solver is kept in `folder` for later calls; by default it is compiled each time.
+    Raise RuntimeError if the compiler rejects the deck, or if the program fails.
     """
     with TemporaryDirectory() as place:
         here = Path(place)
@@ -353,7 +310,7 @@ def run_deck(text: str, folder: Path | None = None) -> Run:
 
 
 def solver_object(folder: Path) -> Path:
-    """Return the path of the compiled solver LEQT1F in `folder`; compile it if it is missing."""
+    """Return the path of the compiled solver in `folder`; compile it if it is missing."""
     found = folder / "leqt1f.o"
     if not found.exists():
         _command([COMPILER, *FLAGS, "-c", str(_SOLVER), "-o", str(found)], folder)
@@ -367,9 +324,9 @@ def _command(words: list[str], folder: Path) -> None:
 
 
 def _records(path: Path) -> np.ndarray:
-    """Return the records of the unformatted file TAPE5 as an array of shape (n, 7).
+    """Return the records of TAPE5, shape (n, 7).
 
-    Each record of the file consists of 7 numbers between two copies of the length of the record.
+    Each is 7 numbers between two copies of the record's length.
     """
     record = np.dtype([("begin", "i4"), ("values", "f8", 7), ("end", "i4")])
     return np.fromfile(path, dtype=record)["values"]

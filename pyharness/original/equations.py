@@ -1,4 +1,4 @@
-"""Right-hand sides and the record of a run, for the Python twins of all three programs."""
+"""Right-hand sides and the record of a run, for all three twins."""
 
 from collections.abc import Sequence
 
@@ -14,20 +14,18 @@ Vector = Sequence[float]
 
 
 def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
-    """Return F, G, H of the thesis's equations 16-18, the rates of change of omega (rad/s2).
+    """Return F, G, H of equations 16-18, the rates of change of omega (rad/s2).
 
-    `coefficients` contains A, B, C of Euler's equations, `m` the torque divided by the moment of
-    inertia about each axis (1/s2), and `u` the angular velocity omega (rad/s).
+    `coefficients` are A, B, C of Euler's equations, `m` is torque over moment of inertia (1/s2).
     """
     a, b, c = coefficients
     return [m[0] + a * u[1] * u[2], m[1] + b * u[0] * u[2], m[2] + c * u[0] * u[1]]
 
 
 def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
-    """Return F/m - omega x V, the rate of change of the translational velocity (m/s2).
+    """Return F/m - omega x V along the body axes (m/s2).
 
-    `acceleration` is the force divided by the mass, F/m, (m/s2), `u` the angular velocity omega
-    (rad/s) and `v` the velocity V (m/s), all along the body axes.
+    `acceleration` is F/m (m/s2), `u` omega (rad/s) and `v` V (m/s).
     """
     return [
         acceleration[0] + v[1] * u[2] - v[2] * u[1],
@@ -37,21 +35,19 @@ def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
 
 
 def accelerations(scene: Scene, listing: Listing) -> list[float]:
-    """Return the force divided by the mass along each body axis (m/s2).
+    """Return force over mass along each body axis (m/s2).
 
-    With the defect `three-masses` in `listing`, each axis has its own mass. Without the defect the
-    first mass is used for all axes.
+    With the defect `three-masses` each axis has its own mass, else all have the first.
     """
     masses = scene.masses if listing.has("three-masses") else scene.masses[:1] * 3
     return [force / mass for force, mass in zip(scene.forces, masses, strict=True)]
 
 
 def initial_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque of a scene divided by its moments of inertia (1/s2).
+    """Return the initial torque over the moments of inertia (1/s2), or None.
 
-    The result is None if the scene has no moments, or is not a case of Table 1 of the thesis with
-    an initial torque. By the conjecture (assumption) `initial-torque` this torque acts during the
-    first step.
+    It acts during the first step by the conjecture `initial-torque`, and exists only for cases of
+    Table 1 given by moments.
     """
     given = card_torque(scene)
     if given is None or scene.moments is None:
@@ -60,30 +56,23 @@ def initial_torque(scene: Scene) -> Vector | None:
 
 
 def card_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque (N m) that the thesis specifies for a scene's case of Table 1.
-
-    The result is None if the scene is not a case of Table 1, or if its case has no initial torque.
-    """
+    """Return the initial torque (N m) of a scene's case of Table 1, or None."""
     given = {each["case"]: each["torque"] for each in facts("printer")["initial_torque"]}
     return given.get(scene.case)
 
 
 def all_finite(values: Vector) -> bool:
-    """Return whether all values are finite, so that no value is NaN or infinite."""
+    """Return whether no value is NaN or infinite."""
     return all(map(is_finite, values))
 
 
 class Record:
-    """The results of a run of a program's Python version, from which a trajectory is made.
-
-    A row of results is added for each step.
-    """
+    """The results of a twin's run, a row for each step."""
 
     def __init__(self, scene: Scene, evaluations_per_step: int) -> None:
-        """Create a record of a run without rows.
+        """Create a record without rows.
 
-        `scene` supplies the step size. `evaluations_per_step` is the number of evaluations of the
-        right-hand sides in a step.
+        `evaluations_per_step` counts evaluations of the right-hand sides.
         """
         self._step_size = scene.step_size
         self._per_step = evaluations_per_step
@@ -91,10 +80,10 @@ class Record:
         self._ier: list[int] = []
 
     def add(self, recorded_time: float, omega: Vector, velocity: Vector, ier: int = 0) -> None:
-        """Add the results of the next step to this record, as a row.
+        """Add the results of a step.
 
-        `recorded_time` is TIME (s) as the program computes it. `omega` (rad/s) and `velocity` (m/s)
-        are the results of the step. `ier` is the error code of the linear solver in the step.
+        `recorded_time` is TIME (s) as the program computes it; `omega` is in rad/s, `velocity` in
+        m/s. `ier` is the linear solver's error code.
         """
         true_time = (len(self._rows) + 1) * self._step_size
         self._rows.append([true_time, recorded_time, *omega, *velocity])
@@ -103,12 +92,10 @@ class Record:
     def trajectory(
         self, ended: str = "complete", stop: Stop | None = None, prints_ier: bool = True
     ) -> Trajectory:
-        """Return the trajectory of all rows that were added.
+        """Return the trajectory of all rows.
 
-        `ended` says how the run ended, as in "complete". `stop` is the result of the stop test if
-        this test ended the run. If `prints_ier`, the program prints the error code IER of its
-        linear solver, and the trajectory contains it. A step that overflows has no row, but its
-        evaluations of the right-hand sides are counted.
+        If `prints_ier`, it contains IER. A step that overflows has no row, but its evaluations are
+        counted.
         """
         given = np.array(self._rows).reshape(-1, 8)
         rows = given.astype(np.float64)

@@ -15,11 +15,9 @@ from pyharness.original.equations import Vector, accelerations, omega_rate, velo
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the four-term collocation program on a scene, and return its trajectory.
+    """Run the program on a scene, and return its trajectory.
 
-    `listing` is the program with its active defects (mistakes), readings (interpretations of
-    doubtful cards) and conjectures (assumptions). `lipschitz` and `may_stop` have no effect,
-    because the program has no stop test.
+    `lipschitz` and `may_stop` have no effect: the program has no stop test.
     """
     coefficients = scene.euler_coefficients
     acceleration = accelerations(scene, listing)

@@ -1,7 +1,4 @@
-"""Runs of a program's Python twin in a word, which is a floating-point format of `word.py`.
-
-The twin is the Python port of one of the three programs of the thesis.
-"""
+"""Runs of a twin in a floating-point format of `word.py`."""
 
 import copy
 import importlib
@@ -21,12 +18,9 @@ Of = TypeVar("Of", Scene, TorqueLaw)
 def run(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the Python version of a listing's program in a word, which is a floating-point format.
+    """Run the twin of a listing in a word; no argument is checked.
 
-    `listing` is the program with its active defects. `lipschitz` is the Lipschitz constant (1/s) of
-    the Runge-Kutta program's stop test, and `may_stop` says whether this test may end the run. No
-    argument is checked. The trajectory contains the results rounded to floats. Its attribute
-    `exact` contains the results as numbers of the word.
+    The results are rounded to floats; the attribute `exact` has them as numbers of the word.
     """
     twin = importlib.import_module(f"pyharness.original.{listing.program.replace('-', '_')}")
     found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)
@@ -36,11 +30,7 @@ def run(
 
 
 def scene_in(scene: Scene, word: Word) -> Scene:
-    """Return a copy of `scene` with all its numbers, except counts, in the format `word`.
-
-    A word is a floating-point format. The numbers of the copy are not checked. Therefore `scene`
-    itself must have been checked.
-    """
+    """Return a copy of a checked scene with all its numbers, except counts, in a word."""
     law = scene.law
 
     def those(values: Any) -> Any:
@@ -62,10 +52,9 @@ def scene_in(scene: Scene, word: Word) -> Scene:
 
 
 def _with(frozen: Of, **fields: Any) -> Of:
-    """Return a copy of a frozen dataclass in which some fields have new values.
+    """Return a copy of a frozen dataclass with new values of some fields.
 
-    The new values are the keyword arguments `fields`. The checks of the dataclass are skipped,
-    because they would convert the values to floats.
+    Its checks are skipped, because they would convert the values to floats.
     """
     changed = copy.copy(frozen)
     vars(changed).update(fields)

@@ -1,7 +1,4 @@
-"""Conversions between numbers of an IEEE 754 word and the bytes of its interchange format.
-
-The bytes of a number are in the byte order of this machine, as the compiled programs require.
-"""
+"""Conversions between numbers of an IEEE 754 word and bytes in this machine's order."""
 
 import math
 import sys
@@ -18,18 +15,14 @@ _BITS = {24: 32, 53: 64, 113: 128}
 
 
 def n_bytes(word: Word) -> int:
-    """Return the number of bytes of a number in the IEEE 754 interchange format of a word.
-
-    A word is a floating-point format: here binary32, binary64 or binary128.
-    """
+    """Return the number of bytes of a number: binary32, binary64 or binary128."""
     return _BITS[word.p] // 8
 
 
 def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
-    """Return an array of numbers as an array of the bytes of their IEEE 754 format `word`.
+    """Return numbers as bytes, shape (n_bytes(word), *shape).
 
-    `numbers` are in column-major order, and `shape` is the shape of their array. The result has the
-    shape (n_bytes(word), *shape), and column-major order too.
+    `numbers` and the result are in column-major order.
     """
     size = n_bytes(word)
     written = b"".join(_pattern(each).to_bytes(size, sys.byteorder) for each in numbers)
@@ -38,11 +31,7 @@ def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
 
 
 def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
-    """Return the array of numbers of the IEEE 754 format `word` that `given` represents.
-
-    `given` is an array of bytes in column-major order, as `to_bytes` returns it. Its first index
-    counts the bytes of a number. The result has the shape of the other axes.
-    """
+    """Return the array of numbers that bytes from `to_bytes` represent."""
     size = n_bytes(word)
     written = given.tobytes(order="F")
     found = np.empty(len(written) // size, dtype=object)
@@ -53,10 +42,7 @@ def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
 
 
 def _pattern(x: Number) -> int:
-    """Return the bits of a number in its IEEE 754 format, as an integer.
-
-    The bits are the sign, the exponent and the fraction, from the highest to the lowest.
-    """
+    """Return sign, exponent and fraction of a number, highest bit first, as an integer."""
     p = x.word.p
     places, most = p - 1, (1 << _BITS[p] - p) - 1
     if x.m:

@@ -1,7 +1,6 @@
-"""A replacement for LEQT1F of the IMSL library, which solves A X = B for several right-hand sides.
+"""A replacement for LEQT1F of the IMSL library, which solves A X = B.
 
-The replacement computes LU factors in Crout's order, with implicit row scaling and partial
-pivoting.
+It computes LU factors in Crout's order, with implicit row scaling and partial pivoting.
 """
 
 SINGULAR = 129
@@ -12,9 +11,8 @@ def leqt1f(
 ) -> tuple[list[list[float]], int]:
     """Return the solutions x of A x = b for all right-hand sides b, and the error code IER.
 
-    `matrix` contains the rows of A, and `right_hand_sides` the vectors b. Neither is changed. If A
-    is algorithmically singular, IER is `SINGULAR` (129), and every b is returned instead of its x.
-    Otherwise IER is 0.
+    The arguments are not changed. If A is algorithmically singular, IER is `SINGULAR` (129), and
+    every b is returned instead of its x; otherwise IER is 0.
     """
     factors = [list(row) for row in matrix]
     pivots = _factor(factors)
@@ -24,10 +22,10 @@ def leqt1f(
 
 
 def _factor(a: list[list[float]]) -> list[int] | None:
-    """Overwrite `a`, the rows of a matrix, by its LU factors, and return the pivot rows.
+    """Overwrite the rows of a matrix by its LU factors, and return the pivot rows.
 
-    The pivot row of a column is the index of the row that was exchanged with the row of the
-    diagonal element. The result is None if the matrix is singular.
+    A pivot row is the index of the row exchanged with that of the diagonal element. None if the
+    matrix is singular.
     """
     n = len(a)
     pivots = []
@@ -67,10 +65,7 @@ def _factor(a: list[list[float]]) -> list[int] | None:
 
 
 def _substitute(a: list[list[float]], pivots: list[int], b: list[float]) -> list[float]:
-    """Return the solution x of A x = b, by forward and backward substitution.
-
-    `a` contains the LU factors of A, and `pivots` the pivot rows, as `_factor` computes them.
-    """
+    """Return the solution x of A x = b from LU factors and pivot rows of `_factor`."""
     n = len(a)
     x = list(b)
     for i, row in enumerate(a):

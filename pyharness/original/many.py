@@ -1,4 +1,4 @@
-"""Runs of a compiled program of the thesis's appendix for many bodies in one call."""
+"""Runs of a compiled program for many bodies in one call."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -40,36 +40,30 @@ _NOT_REACHED = -1
 class ProgramEnsemble(BatchResult):
     """The results of a program of the thesis for n bodies, with a row for each of m steps.
 
-    A row is NaN, and -1 in `ier`, if the run of the body ended before that step. `run_many` returns
-    a ProgramEnsemble.
+    A row is NaN, and -1 in `ier`, if the run of the body ended before that step.
 
     Attributes
     ----------
     omega : ndarray, shape (n, m, 3)
         Angular velocity about the body axes, rad/s.
     status : ndarray of int8, shape (n,)
-        How the run of each body ended: the integer COMPLETE, STOPPED or OVERFLOW of
-        `pyharness.model.codes.Statuses`.
+        How each run ended: COMPLETE, STOPPED or OVERFLOW of `pyharness.model.codes.Statuses`.
     at : ndarray of int, shape (m,)
-        The steps to which the m rows belong, counted from 1.
+        The steps to which the rows belong, counted from 1.
     velocity : ndarray, shape (n, m, 3), or None
         Translational velocity along the body axes, m/s; None if it was not requested.
     recorded_time : ndarray, shape (m,), or (n, m) where the step sizes differ
-        The variable TIME of the program, which it writes to its file TAPE5, s. If one row applies
-        to all bodies, it has NaN at a step that no body reached.
+        The program's variable TIME, s. A row for all bodies has NaN at a step that no body reached.
     n_rows : ndarray of int32, shape (n,)
         The number of steps of each body that have a result.
     stop_variable : ndarray of int8, shape (n,)
-        The variable that failed the stop test, or 0 if this test did not end the run: 1-3 for
-        U1-U3, 4-6 for V1-V3, 7 for the norm of U, 8 for the norm of U and V. U is the angular
-        velocity and V the translational velocity.
+        The variable that failed the stop test, or 0: 1-3 for U1-U3 (angular velocity), 4-6 for
+        V1-V3 (translational velocity), 7 for the norm of U, 8 for the norm of U and V.
     stop_quotient : ndarray, shape (n,)
-        The change of the right-hand side over the change of the variable that failed the stop test
-        (1/s). It is infinite if the variable did not change, and NaN if the test did not end the
-        run.
+        The change of the right-hand side over that of the variable (1/s); infinite if the variable
+        did not change, NaN if the test did not end the run.
     ier : ndarray of int32, shape (n, m), or None
-        The error code IER of the linear solver, as the collocation programs print it; None for the
-        Runge-Kutta program.
+        The error code of the collocation programs' linear solver; None for Runge-Kutta.
     """
 
     at: NDArray[np.int32]
@@ -102,50 +96,44 @@ def run_many(
 ) -> ProgramEnsemble:
     """Run a compiled program of the thesis for n bodies in one call.
 
-    Each result is bit-for-bit identical to the result of `run_program`.
+    Each result is bit-for-bit that of `run_program`.
 
     Parameters
     ----------
     scene : Scene
         The scene that supplies every value for which no array is specified.
     listing : Listing
-        The program with its active defects (mistakes that are not corrected), readings
-        (interpretations of doubtful cards) and conjectures (assumptions about missing cards).
+        The program with its active defects, readings and conjectures.
     omega0, moments, coefficients, torque_constant : array_like, shape (n, 3) or (3,), optional
-        Values that replace those of the scene: initial angular velocities (rad/s), moments of
-        inertia (kg m2) or Euler coefficients A, B, C, and constant torques. Torques are in N m, or
-        in 1/s2 for bodies specified by coefficients. At most one of `moments` and `coefficients`
-        may be specified.
+        Initial angular velocities (rad/s), moments of inertia (kg m2) or Euler coefficients A, B,
+        C, and constant torques (N m; 1/s2 for bodies specified by coefficients). At most one of
+        `moments` and `coefficients` may be specified.
     step_size, lipschitz : array_like, shape (n,) or one number, optional
-        Step sizes (s; by default the step size of the scene) and constants of the Lipschitz
-        condition in the stop test (1/s).
+        Step sizes (s; by default the scene's) and Lipschitz constants of the stop test (1/s).
     may_stop : bool
         Whether the stop test, which only the Runge-Kutta program has, may end runs.
     velocity : bool
         Whether to return the translational velocities.
     at : sequence of int, optional
-        The steps whose results are returned, counted from 1, in any order; by default only the last
-        step.
+        The steps whose results are returned, from 1, in any order; by default only the last.
     threads : int
-        The number of threads among which the bodies are divided. The results do not depend on it.
+        The number of threads. The results do not depend on it.
     effort : float
-        Factor on the work limit. The work is the product of the number of bodies, the number of
-        steps, and one plus the number of sines and cosines in the torque.
+        Factor on the work limit. The work is bodies times steps times (1 + the number of sines and
+        cosines in the torque).
     progress : bool
         Whether to show a progress bar, in a terminal or in a notebook.
 
     Returns
     -------
     ProgramEnsemble
-        The results of n bodies. An array of one row applies to all bodies; if no array has more
-        rows, n is 1.
+        The results of n bodies. An array of one row applies to all; if no array has more, n is 1.
 
     Raises
     ------
     InputError
-        If `run_program` would reject a body; the message names the row of this body. Also if the
-        arrays differ in their numbers of rows, if the results do not fit in memory, or if the work
-        limit would be exceeded.
+        If `run_program` would reject a body (the message names its row), the arrays differ in
+        their numbers of rows, the results do not fit in memory, or the work limit is exceeded.
     NotBuiltError
         If the extension is not built.
 
@@ -210,11 +198,10 @@ def _run(
     scene: Scene, listing: Listing, by_moments: bool, inputs: dict[str, Array], n: int,
     wanted: NDArray[np.int32], may_stop: bool, velocity: bool, threads: int,
 ) -> ProgramEnsemble:  # fmt: skip
-    """Run a compiled program of the thesis for n bodies, with arguments that have been checked.
+    """Run a compiled program for n bodies, with checked arguments.
 
-    The arguments are those of `run_many`. `inputs` contains its arrays by name. ``inputs["body"]``
-    contains the moments of inertia if `by_moments`, else the coefficients A, B, C of Euler's
-    equations. `wanted` contains the steps whose results are returned.
+    `inputs` contains the arrays of `run_many` by name; ``inputs["body"]`` contains the moments of
+    inertia if `by_moments`, else A, B, C. `wanted` contains the steps whose results are returned.
     """
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
@@ -265,11 +252,10 @@ def _run(
 
 
 def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
-    """Yield the range of bodies for each call of the kernel, the compiled program.
+    """Yield the range of bodies for each call of the kernel.
 
-    A single thread processes all n bodies in one call. Several threads share a larger number of
-    calls. The number of bodies in each call but the last is a multiple of the number of bodies that
-    the kernel processes simultaneously. `steps` is the number of steps of each body.
+    One thread makes one call; several share a larger number of calls. Each but the last has a
+    multiple of the number of bodies that the kernel processes simultaneously.
     """
     size = n
     if threads > 1:
@@ -292,10 +278,9 @@ def _check_ends(step_size: Array, steps: int) -> None:
 
 
 def _steps(at: Sequence[SupportsIndex] | None, steps: int) -> NDArray[np.int32]:
-    """Return the requested steps `at` as an array; if `at` is None, only the last step.
+    """Return the requested steps as an array, by default the last.
 
-    `steps` is the number of steps of the run. Raise InputError if a requested step is not from 1 to
-    `steps`.
+    Raise InputError if a requested step is not from 1 to `steps`.
     """
     if at is None:
         return np.array([steps], dtype=np.int32)

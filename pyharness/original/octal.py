@@ -25,12 +25,11 @@ _INSTRUCTIONS = tuple(
 
 
 def from_octal(text: str) -> Pair:
-    """Return the number m 2**e that a CDC word represents, as the pair (m, e).
+    """Return the number m 2**e that 20 octal digits represent, as the pair (m, e).
 
-    `text` is the 60-bit word as 20 octal digits; blanks are ignored. A word whose bits are all 0 or
-    all 1 represents the number zero. For zero, infinity and nan, m is 0 and e is the value as a
-    float. Raise InputError if the text is not 20 octal digits, or if the coefficient is not
-    normalised.
+    Blanks are ignored. A word whose bits are all 0 or all 1 is zero. For zero, infinity and nan, m
+    is 0 and e is the value as a float. Raise InputError if the text is not 20 octal digits, or if
+    the coefficient is not normalised.
     """
     digits = "".join(text.split()) if isinstance(text, str) else ""
     if not _WORD.fullmatch(digits):
@@ -53,11 +52,7 @@ def from_octal(text: str) -> Pair:
 
 
 def to_octal(number: Pair) -> str:
-    """Return the CDC word of a number, as 20 octal digits in groups of four.
-
-    `number` is a pair (m, e), which represents m 2**e. m has 48 bits. For zero, infinity and nan, m
-    is 0 and e is the value as a float.
-    """
+    """Return the CDC word of a number (m, e) as in `from_octal`, in groups of four digits."""
     m, e = number
     if m:
         return _written(m < 0, e, abs(m))
@@ -68,11 +63,11 @@ def to_octal(number: Pair) -> str:
 
 
 def operated(name: str, x: str, y: str) -> str:
-    """Return the result of a CDC instruction on the CDC words `x` and `y`, all in octal.
+    """Return the result of a CDC instruction on the words `x` and `y`, all in octal.
 
-    `name` is the instruction: F (truncating) or R (rounding), X, and the operator +, -, * or /, as
-    in ``FX*``. A sum or difference is normalised only if NX follows, as in ``RX+ NX``. Raise
-    InputError if the instruction is unknown, or if `x` or `y` is not a CDC word.
+    `name` is F (truncating) or R (rounding), X, and +, -, * or /, as in ``FX*``. A sum or
+    difference is normalised only if NX follows, as in ``RX+ NX``. Raise InputError if the
+    instruction is unknown, or if `x` or `y` is not a CDC word.
     """
     if name not in _INSTRUCTIONS:
         raise unknown("instruction", name, _INSTRUCTIONS)

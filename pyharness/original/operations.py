@@ -1,9 +1,9 @@
-"""Counts of the floating-point operations in a step of a program, made on the cards themselves.
+"""Counts of the floating-point operations in a step of a program, made on the cards.
 
 The statements of a deck are interpreted as the author wrote them, with numbers that count the
-operations applied to them. The linear solver LEQT1F is our own version, because the original source
-is not published. `T**2` counts as one multiplication, and `T**3` and `T**4` count as two each.
-Operations in subscripts, jumps, ABS and WRITE are not counted.
+operations on them. LEQT1F is our own version, because the original source is not published. `T**2`
+counts as one multiplication, `T**3` and `T**4` as two each. Operations in subscripts, jumps, ABS
+and WRITE are not counted.
 """
 
 import re
@@ -25,17 +25,11 @@ ALIKE = {"+": 1, "-": 1, "*": 1, "/": 1}
 
 
 class Count(NamedTuple):
-    """The number of additions, subtractions, multiplications and divisions in a program's step.
+    """The number of additions, subtractions, multiplications and divisions in a step.
 
-    With unit times it is the time that these operations take one after the other.
-
-    Attributes
-    ----------
-    written : int
-        The number of all operations that the statements on the cards perform.
-    once : int
-        The number of distinct operations. An operation is not counted if the same operation was
-        applied to the same operands earlier in the step.
+    `written` counts all that the cards perform; `once` only distinct ones, without repetitions of
+    an operation on the same operands. With unit times they are the times of these operations in
+    sequence.
     """
 
     written: int
@@ -43,7 +37,7 @@ class Count(NamedTuple):
 
 
 class _Counter:
-    """A counter of the operations in a step, which stores the result of each distinct operation."""
+    """A counter that stores the result of each distinct operation."""
 
     def __init__(self, times: Mapping[str, int]) -> None:
         self.times, self.written = times, 0
@@ -69,11 +63,10 @@ def _value(x: Any) -> float:
 
 
 class _Number:
-    """A floating-point value of a program, with the counter that counts each operation on it.
+    """A floating-point value, with the counter of the operations on it.
 
-    If an operation was already applied to the same operands in the same order, the object that
-    resulted then is returned again. Therefore two objects are identical exactly if their values
-    were computed in the same way.
+    A repeated operation on the same operands in the same order returns the same object. Therefore
+    two objects are identical exactly if their values were computed in the same way.
     """
 
     def __init__(self, counter: _Counter, value: float) -> None:
@@ -123,18 +116,17 @@ class _Number:
 
 
 class _Array(defaultdict[tuple[int, ...], Any]):
-    """An array whose elements are read with subscripts in parentheses, as in FORTRAN."""
+    """An array with FORTRAN's subscripts in parentheses."""
 
     def __call__(self, *subscripts: int) -> Any:
         return self[subscripts]
 
 
 def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> Count:
-    """Return the number of arithmetic operations of a listing's program in its first step.
+    """Return the operations of a listing's program in its first step.
 
-    The result is a `Count`. A listing is a program with a choice of its defects. The scene is the
-    case of Table 1 of the thesis that is on the published cards of the program. `times` has the
-    weight of each operation, for example its unit time on a machine.
+    The scene is the case on the published cards. `times` has the weight of each operation, for
+    example its unit time on a machine.
     """
     statements = list(_statements(deck_text(listing)))
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))
@@ -153,10 +145,10 @@ def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> C
 
 
 def _moved(value: Any, counter: _Counter) -> Any:
-    """Return a copy of a program's value from before a step, for counting the step's operations.
+    """Return a copy of a value from before a step, without the operations that computed it.
 
-    The operations that computed the value are not counted. Operations on the copy are counted by
-    `counter`. `value` is a number or an array of numbers. Any other object is returned unchanged.
+    `counter` counts operations on the copy. Anything but a number or an array of numbers is
+    returned unchanged.
     """
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}
@@ -165,10 +157,7 @@ def _moved(value: Any, counter: _Counter) -> Any:
 
 
 def _statements(text: str) -> Iterator[tuple[str, str]]:
-    """Return the label and the text of every statement of a deck, both without blanks.
-
-    `text` is the deck as fixed-form FORTRAN.
-    """
+    """Yield the label and the text of every statement of a deck, without blanks."""
     found: list[list[str]] = []
     for line in text.splitlines():
         label, goes_on, rest = line[:5].strip(), line[5], "".join(line[6:72].split())

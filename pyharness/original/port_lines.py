@@ -1,7 +1,6 @@
-"""Lines of the programs in Fortran (the ports) and in Python (the twins), and their cards.
+"""Lines of the Fortran ports and of the twins, and their cards.
 
-A card is a line of a printed program. The Fortran port names its cards in comments, and
-`data/cards/places.toml` names the lines of the twin.
+The port names its cards in comments; `data/cards/places.toml` names the lines of the twin.
 """
 
 import re
@@ -19,7 +18,7 @@ PORT = "fortran/original"
 
 
 class Place(NamedTuple):
-    """A line of a source file: the file's name, the line number from 1, and the text."""
+    """A line of a source file: name, number from 1, and text."""
 
     file: str
     line: int
@@ -27,15 +26,14 @@ class Place(NamedTuple):
 
 
 def port_file(program: str) -> str:
-    """Return the name of the file in the folder `PORT` with the Fortran port of a program."""
+    """Return the name of a program's port in the folder `PORT`."""
     return f"{program.replace('-', '_')}.fypp"
 
 
 def port_lines(program: str) -> Iterator[tuple[Place, str]]:
-    """Yield each line of a program's Fortran port that corresponds to cards, with their numbers.
+    """Yield each line of a port that corresponds to cards, with their numbers as text.
 
-    A card is a line of the printed program. The Fortran port names the cards in a comment at the
-    end of the line. Their numbers are yielded as text, as in ``750-770, 800``.
+    The numbers are in the comment at the end of the line, as in ``750-770, 800``.
     """
     file = port_file(program)
     for number, text in enumerate(_lines(shipped(PORT) / file), 1):
@@ -44,11 +42,9 @@ def port_lines(program: str) -> Iterator[tuple[Place, str]]:
 
 
 def switch_at(place: Place) -> tuple[str, bool] | None:
-    """Return the switch of the Fortran port that decides whether a line of the port is executed.
+    """Return the defect or reading on which a line of the port depends, and whether it is active.
 
-    A switch selects between a defect, or a reading, of the printed program and its correction. The
-    result is the name of the defect or reading, and whether it is active where the line is
-    executed. It is None for a line that does not depend on a single switch.
+    The result is None for a line that does not depend on a single switch.
     """
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])
@@ -64,7 +60,7 @@ def switch_at(place: Place) -> tuple[str, bool] | None:
 
 
 def twin_line(file: str, text: str) -> Place:
-    """Return the line of a twin's file that has this text; raise ValueError unless it is one."""
+    """Return the line of a twin with this text; raise ValueError unless it is one."""
     where = [n for n, line in enumerate(_lines(_TWINS / file), 1) if line.strip() == text]
     if len(where) != 1:
         raise ValueError(f"{text!r} occurs {len(where)} times in {file}")

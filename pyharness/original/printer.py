@@ -1,9 +1,8 @@
 """The line-printer output of a program, made from its trajectory.
 
-The page is the text that appeared on paper. It lacks the first character of each record, which
-controls the carriage and is always a blank. `data/printer.toml` contains the FORMATs of the
-programs, and marks which parts of them are conjecture. The library `fortranformat` writes the
-values by the FORMATs. Only zeros and values that are not finite are treated in this module.
+The page lacks the first character of each record, the carriage control, always a blank.
+`data/printer.toml` contains the FORMATs, and marks which parts of them are conjecture.
+`fortranformat` writes the values; only zeros and values that are not finite are treated here.
 """
 
 import math
@@ -29,12 +28,11 @@ _PLACES = re.compile(r"F\d+\.(\d+)")
 
 
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
-    """Return the text that `program` prints for its run, written by the program's FORMATs.
+    """Return the text that `program` prints for its run.
 
-    The header contains the moments and torques of `scene`, which must have moments. It is followed
-    by one line for each row of `trajectory`, which contains the results of the run. If the stop
-    test ended the run, the last line is the row of the step that failed the test. Lines have no
-    trailing blanks.
+    A header with the moments and torques of `scene`, which must have moments, is followed by a line
+    for each row of `trajectory`. If the stop test ended the run, the last line is the row of the
+    step that failed the test. Lines have no trailing blanks.
     """
     formats = formats_of(program)
     assert scene.moments is not None
@@ -50,10 +48,10 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
 
 
 def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
-    """Return omega (rad/s) and velocity (m/s) of each row of a trajectory, as six floats.
+    """Return omega (rad/s) and velocity (m/s) of each row, as six floats.
 
-    If the arithmetic of the run was not binary64, its numbers are rounded to as many decimals as
-    `form`, the FORMAT of the rows, prints. The floats are then printed like the exact numbers.
+    Numbers that are not binary64 are rounded to the decimals of `form`, so that the floats are
+    printed like the exact numbers.
     """
     if trajectory.exact is None:
         assert trajectory.velocity is not None
@@ -63,10 +61,9 @@ def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
 
 
 def _to_places(x: Any, places: int) -> float:
-    """Return the number `x` rounded to `places` decimals, with ties away from zero, as a float.
+    """Return a number rounded to `places` decimals, ties away from zero, as a float.
 
-    `x` is a float, or a `Number` in another floating-point format. A number that is not finite
-    becomes nan.
+    A number that is not finite becomes nan.
     """
     if not is_finite(x):
         return math.nan
@@ -79,11 +76,9 @@ def _to_places(x: Any, places: int) -> float:
 
 
 def formats_of(program: str) -> dict[str, Any]:
-    """Return the FORMATs of a program, by the keys ``header``, ``heads`` and ``rows``.
+    """Return a program's FORMATs: ``header`` (moments, torques), ``heads`` and ``rows``.
 
-    ``header`` is the FORMAT of moments and torques, ``heads`` of the column heads, and ``rows`` of
-    a row of results. Further keys name the cards of the FORMATs, and say which characters are
-    certain and which are conjecture.
+    Further keys name their cards, and say which characters are certain and which are conjecture.
     """
     formats: dict[str, dict[str, Any]] = {
         each["name"]: each for each in facts("printer")["program"]
@@ -92,11 +87,10 @@ def formats_of(program: str) -> dict[str, Any]:
 
 
 def _torque_cards(scene: Scene) -> tuple[float, float, float]:
-    """Return the three torques (N m) on the punched input cards for a scene.
+    """Return the three torques (N m) on the input cards for a scene.
 
-    No card can express a torque that varies with time. Therefore, if the scene is a case of Table 1
-    of the thesis that specifies initial torques, the result is these torques. For any other scene
-    the result is its constant torques.
+    No card can express a torque that varies with time. Therefore these are the initial torques of a
+    case of Table 1, else the constant torques.
     """
     cards = {entry["case"]: entry["torque"] for entry in facts("printer")["initial_torque"]}
     first, second, third = cards.get(scene.case, scene.law.constant)
@@ -104,11 +98,7 @@ def _torque_cards(scene: Scene) -> tuple[float, float, float]:
 
 
 def write(text: str, values: Sequence[float]) -> list[str]:
-    """Return the records (lines) that a WRITE statement of FORTRAN makes of some values.
-
-    `text` is the FORMAT of the statement, and `values` are the values. Each record begins with its
-    carriage-control character.
-    """
+    """Return the records that a FORTRAN WRITE makes of values, with carriage control."""
     printed: str = _writer(text).write([x if math.isfinite(x) else _TOO_WIDE for x in values])
     return [_MINUS_ZERO.sub(r" \1", record) for record in printed.split("\n")]
 

@@ -1,4 +1,4 @@
-"""The three programs of the thesis's appendix, to be run as compiled programs or Python twins."""
+"""The three programs of the appendix, run as compiled programs or as twins."""
 
 import importlib
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ WORD_NAMES = (*COMPILED_WORDS, "cdc48", "cdc48-rounded")
 
 @dataclass(frozen=True)
 class Program:
-    """One of the three programs from the appendix of the thesis.
+    """One of the three programs from the appendix.
 
-    Its corrected version has a global error of O(h**order), where h is the step size. `source`
-    names the equation and the sections of the thesis that describe the program.
+    Its corrected version has a global error of O(h**order), h the step size. `source` names its
+    equation and sections.
     """
 
     name: str
@@ -41,10 +41,9 @@ class Program:
         effort: float = 1.0,
         word: str = BINARY64,
     ) -> Trajectory:
-        """Run this program, with the defects that `listing` selects, and return its trajectory.
+        """Run this program and return its trajectory; see `run_program`.
 
-        The parameters, the result and the exceptions are those of the function `run_program`. In
-        addition, InputError is raised if the listing belongs to another program.
+        InputError is also raised if the listing belongs to another program.
         """
         checked_scene(scene)
         checked_listing(listing)
@@ -71,10 +70,9 @@ class Program:
     def _computed(
         self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
-        """Run the program in binary64, with arguments that have been checked.
+        """Run the program in binary64, with checked arguments.
 
-        The further arguments, `options`, are the arguments `lipschitz`, `may_stop` and `velocity`
-        of `run`, in this order. `implementation` is ``fortran`` or ``python``.
+        `options` are `lipschitz`, `may_stop` and `velocity`, in this order.
         """
         if implementation == "fortran":
             return compiled.run(scene, listing, *options)
@@ -85,24 +83,14 @@ class Program:
 
 
 def work_of(word: str, implementation: str) -> str:
-    """Return the key under which the function `check_steps` finds the work limit of a program.
-
-    The limit depends on the arithmetic and the implementation. `word` is the name of the
-    arithmetic, as in ``binary64``. `implementation` is ``fortran`` for the compiled program or
-    ``python`` for its Python port.
-    """
+    """Return the key of `check_steps` for an arithmetic and an implementation."""
     if word == BINARY64:
         return implementation
     return "another word" if implementation == "python" else word
 
 
 def checked_word(word: object, implementation: str) -> str:
-    """Return `word` if it is the name of an arithmetic in which the implementation can run.
-
-    `implementation` is ``fortran`` for the compiled programs, or ``python`` for their Python ports,
-    the twins. Raise InputError if the name is unknown, or if the compiled programs do not support
-    the arithmetic.
-    """
+    """Return `word` if the implementation can run in it; raise InputError otherwise."""
     if not isinstance(word, str) or word not in WORD_NAMES:
         raise unknown("word", word, WORD_NAMES, "--word")
     if word not in COMPILED_WORDS and implementation == "fortran":
@@ -139,29 +127,28 @@ def run_program(
     scene : Scene
         The body, the initial condition, the torque, the step size and the number of steps.
     listing : Listing
-        The program with its active defects (mistakes that are not corrected), readings
-        (interpretations of doubtful cards) and conjectures (assumptions about missing cards).
+        The program with its active defects, readings and conjectures.
     implementation : {"fortran", "python"}
-        The compiled program or its Python port, the twin. Their results are bit-for-bit identical.
+        The compiled program or its Python port, the twin; the results are bit-for-bit identical.
     lipschitz : float
         Lipschitz constant of the stop test (1/s), which only the Runge-Kutta program has.
     may_stop : bool
         Whether the stop test may end the run.
     velocity : bool
         Whether the translational velocity is needed. If False, the compiled program computes it
-        only if the stop test reads it, and does not return it. The other results are the same.
+        only if the stop test reads it. The other results are the same.
     effort : float
         Factor on the work limit. The work is the number of steps, plus a contribution of each sine
         or cosine of the torque in each step.
     word : str
-        The arithmetic, one of `pyharness.original.programs.WORD_NAMES`. An arithmetic that is not
-        in `pyharness.original.programs.COMPILED_WORDS` needs `implementation="python"`.
+        The arithmetic, one of `pyharness.original.programs.WORD_NAMES`. One that is not in
+        `pyharness.original.programs.COMPILED_WORDS` needs `implementation="python"`.
 
     Returns
     -------
     Trajectory
-        One row of results for each step, up to a stop or an overflow. In an arithmetic other than
-        binary64, the attribute `exact` contains the results as numbers of that arithmetic.
+        One row for each step, up to a stop or an overflow. In an arithmetic other than binary64,
+        the attribute `exact` contains the results as numbers of that arithmetic.
 
     Raises
     ------

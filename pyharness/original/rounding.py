@@ -1,12 +1,12 @@
-"""Rounding rules: the sum, the product and the quotient of two numbers of a floating-point format.
+"""Rounding rules: sum, product and quotient of two numbers of a floating-point format.
 
-A number is a pair (m, e) of integers with the value m 2**e. m has p bits, or fewer for a subnormal
-number. If m is 0, e is the float that the pair represents: 0.0, -0.0, inf, -inf or nan. The
-operands of an `Operation` must have m other than 0, but its result may have m = 0.
+A number is a pair of integers (m, e) with the value m 2**e; m has p bits, or fewer if subnormal. If
+m is 0, e is the value as a float: 0.0, -0.0, inf, -inf or nan. The operands of an `Operation` have
+m other than 0, its result may not.
 
-No library of software floating-point arithmetic has all the rules that the project needs. mpmath
-and gmpy2 round correctly, but have no limited range of exponents. SoftFloat and numpy have only the
-formats of IEEE 754. No library has the rules of the CDC machines (`cdc.py`).
+No library has all the rules that the project needs: mpmath and gmpy2 have no limited range of
+exponents, SoftFloat and numpy only the formats of IEEE 754, and none has the rules of the CDC
+machines (`cdc.py`).
 """
 
 import math
@@ -19,24 +19,20 @@ Operation = Callable[[int, int, int, int], Pair]
 
 
 class Rules(NamedTuple):
-    """The arithmetic of a word, which is a floating-point format, as functions.
-
-    Each function takes numbers m 2**e as integers m and e, and returns a pair (m, e).
+    """The arithmetic of a floating-point format, as functions of integers m and e.
 
     Attributes
     ----------
     nearest : Rounding
-        Rounds to nearest, ties to even. It is used for square roots, sines, cosines and literals.
+        To nearest, ties to even; for square roots, sines, cosines and literals.
     cut : Rounding
-        Truncates towards zero. It is used for literals if the word truncates them.
+        Towards zero; for literals if the word truncates them.
     add, multiply, divide : Operation
-        Sum, product and quotient of two numbers. A difference is computed as the sum with the
-        negative.
+        A difference is the sum with the negative.
     difference : Operation
-        A sum that is used only to compare two numbers: one number plus the negative of the other.
-        The two numbers are equal if this sum is zero.
+        One number plus the negative of the other, for comparison only: equal if it is zero.
     signed_zero : bool
-        Whether the word has -0.0 besides 0.0.
+        Whether there is -0.0 besides 0.0.
     """
 
     nearest: Rounding
@@ -51,10 +47,9 @@ class Rules(NamedTuple):
 def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Rounding:
     """Return a function that rounds m 2**e to p bits and an exponent from `least` to `most`.
 
-    The integer m may have any length. The function truncates towards zero if `cut`, else it rounds
-    to nearest, ties to even. If the exponent of the result would exceed `most`, the result is
-    infinite. If it would be below `least`, the result underflows gradually, as in IEEE 754, if
-    `gradual`; else it is zero.
+    The integer m may have any length. Rounding is towards zero if `cut`, else to nearest, ties to
+    even. A larger exponent gives infinity; a smaller one underflows gradually, as in IEEE 754, if
+    `gradual`, else to zero.
     """
     shortened = _cut if cut else _to_even
 
@@ -92,12 +87,11 @@ def _to_even(m: int, shift: int) -> int:
 
 
 def ieee(p: int, largest: int, cut: bool) -> Rules:
-    """Return the `Rules` of IEEE 754 for coefficients of p bits and exponents up to `largest`.
+    """Return the rules of IEEE 754 for p-bit coefficients and numbers below 2**(largest + 1).
 
-    `Rules` contains the arithmetic as functions. Numbers are below 2**(largest + 1). If `cut`,
-    sums, products and quotients are truncated towards zero, else rounded to nearest. A truncated
-    result that is too large becomes infinite, as on machines that truncated. In this point the
-    arithmetic deviates from IEEE 754, by which the result would become the largest number.
+    If `cut`, sums, products and quotients are truncated towards zero. A result that is then too
+    large becomes infinite, as on machines that truncated; by IEEE 754 it would be the largest
+    number.
     """
     least, most = 2 - largest - p, largest - p + 1
     fit = rounding(p, least, most, cut, gradual=True)

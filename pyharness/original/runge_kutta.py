@@ -1,7 +1,7 @@
 """Runge-Kutta: the third program of the appendix, Jacobs 1982, eq. 31 and IV.3.
 
-The stop test is the thesis's use of the Lipschitz condition (eq. 19). It ends a run if, within a
-step, the change of the right-hand sides exceeds a constant times the change of the unknowns.
+The stop test uses the Lipschitz condition (eq. 19): it ends a run if, within a step, the change of
+the right-hand sides exceeds a constant times the change of the unknowns.
 """
 
 import math
@@ -24,11 +24,9 @@ from pyharness.original.equations import (
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the Runge-Kutta program on a scene, and return its trajectory.
+    """Run the program on a scene, and return its trajectory.
 
-    `listing` is the program with its active defects, readings (interpretations of doubtful cards)
-    and conjectures (about missing cards). `lipschitz` is the Lipschitz constant of the stop test
-    (1/s). If `may_stop` is false, the stop test is skipped.
+    `lipschitz` is the constant of the stop test (1/s), which is skipped unless `may_stop`.
     """
     a, b, c = scene.euler_coefficients
     acceleration = accelerations(scene, listing)
@@ -106,16 +104,12 @@ def run(
 def lipschitz_test(
     listing: Listing, change_k: Vector, change_u: Vector, lipschitz: float
 ) -> tuple[str, float] | None:
-    """Return the name of a variable that violates eq. 19, and its quotient (1/s), or None.
+    """Return a variable that violates eq. 19, and its quotient (1/s), or None.
 
-    Equation 19 of the thesis is the Lipschitz condition, by which the program may stop. `change_k`
-    and `change_u` are the magnitudes of the changes of the six right-hand sides and of the six
-    unknowns within one step. The condition is violated if the change of the right-hand sides
-    exceeds `lipschitz` (1/s) times the change of the unknowns. For each change the norm over the
-    three components of omega is compared. With the defect `lipschitz-per-component` in `listing`,
-    each component is compared by itself. With the defect `lipschitz-tests-velocity` the velocity is
-    included. The quotient is the change of the right-hand sides divided by the change of the
-    unknowns. It is infinite if the unknowns do not change.
+    `change_k` and `change_u` are the magnitudes of the changes of the six right-hand sides and
+    unknowns within a step. The norms over omega are compared; with the defect
+    `lipschitz-per-component` each component, and with `lipschitz-tests-velocity` the velocity too.
+    The quotient is infinite if the unknowns do not change.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

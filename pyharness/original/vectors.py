@@ -1,10 +1,9 @@
-"""Test vectors for the arithmetic of CDC machines, and the results that we compute for them.
+"""Test vectors for the arithmetic of CDC machines, and the results that we compute.
 
-A test vector is an instruction with two operands and the expected result. The vectors in
-`data/words/cdc.json` follow from the rules of the CYBER 170 hardware reference (CDC 60463560). A
-public emulator of the floating-point unit of this machine gives the same results. A file of test
-vectors is a JSON object with `schema`, and with `vectors`, a list of objects. Each object has
-`name`, `op` (an instruction as in `octal.operated`), and `x`, `y` and `result` in octal.
+`data/words/cdc.json` follows from the CYBER 170 hardware reference, CDC 60463560; a public emulator
+of its floating-point unit gives the same results. A file is a JSON object with `schema` and
+`vectors`, a list of objects with `name`, `op` (an instruction as in `octal.operated`), and `x`, `y`
+and `result` in octal.
 """
 
 import json
@@ -23,10 +22,7 @@ _FIELDS = ("name", "op", "x", "y", "result")
 
 
 class Vector(NamedTuple):
-    """A test vector of CDC arithmetic: its name, an instruction, two operands, expected result.
-
-    `op` is the instruction. The operands `x` and `y` and the result are CDC words in octal.
-    """
+    """An instruction with two operands and the expected result, in octal."""
 
     name: str
     op: str
@@ -36,23 +32,21 @@ class Vector(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A test vector of CDC arithmetic, and our own result of its instruction, `found` (octal)."""
+    """A test vector and our own result, `found` (octal)."""
 
     vector: Vector
     found: str
 
     @property
     def agrees(self) -> bool:
-        """Return whether our result equals the vector's expected result; blanks are ignored."""
+        """Return whether our result equals the expected one; blanks are ignored."""
         return "".join(self.vector.result.split()) == "".join(self.found.split())
 
 
 def answers(path: str | Path = OURS) -> list[Answer]:
-    """Return the test vectors of a JSON file, each with the result that we compute.
+    """Return the test vectors of a JSON file, by default ours, with our results.
 
-    A test vector is an instruction of CDC arithmetic with operands and expected result. By default
-    `path` is our own file, `data/words/cdc.json`. Raise InputError if the file cannot be read, does
-    not have the form of a vector file, or has no vectors.
+    Raise InputError if the file cannot be read, is not of this form, or has no vectors.
     """
     content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:

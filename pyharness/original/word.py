@@ -1,9 +1,8 @@
-"""Words: floating-point formats of p bits with a rounding rule, for runs of the Python twins.
+"""Words: floating-point formats of p bits with a rounding rule, for runs of the twins.
 
 A number of a word behaves like a float: it has operators, comparisons, `abs` and `float`. The other
 operand may be a number of the same word, an integer or a float. A float is treated as a literal of
-a source text, as in 0.1. Therefore its shortest decimal representation is rounded to the word, and
-not its exact binary value.
+a source text: its shortest decimal representation is rounded, not its exact binary value.
 """
 
 import math
@@ -22,10 +21,11 @@ _GUARD_BITS = 40
 
 
 class Number:
-    """An immutable number of a word, which is a floating-point format: `m` times 2**`e`.
+    """An immutable number of a word: the integer `m` times 2**`e`.
 
-    `m` and `e` are integers. If `m` is 0, `e` is instead the value as a float: 0.0, -0.0, inf, -inf
-    or nan. `Word` makes a subclass of Number for each word.
+    If `m` is 0, `e` is the value as a float: 0.0, -0.0, inf, -inf or nan. `Word` makes a subclass
+    for each word. Square roots, sines and cosines are rounded to nearest even if the word
+    truncates.
     """
 
     __slots__ = ("e", "m")
@@ -33,11 +33,11 @@ class Number:
     rules: ClassVar[Rules]
 
     def __init__(self, m: int, e: Any) -> None:
-        """Store `m` and `e` of a number m 2**e that the word can represent; nothing is rounded."""
+        """Store `m` and `e` of a number that the word can represent."""
         self.m, self.e = m, e
 
     def __add__(self, other: Any) -> "Number":
-        """Return the sum of this number and `other`, rounded by the rounding rule of the word."""
+        """Return the rounded sum."""
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -48,7 +48,7 @@ class Number:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> "Number":
-        """Return this number minus `other`, computed as the sum with the negative of `other`."""
+        """Return the sum with the negative of `other`."""
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -57,11 +57,11 @@ class Number:
         return self._special(operator.add, -other)
 
     def __rsub__(self, other: Any) -> "Number":
-        """Return `other` minus this number; `other` is first converted to this number's format."""
+        """Return `other`, converted to the word, minus this number."""
         return self.word(other) - self
 
     def __mul__(self, other: Any) -> "Number":
-        """Return this number times `other`, rounded by the rounding rule of the word."""
+        """Return the rounded product."""
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -72,10 +72,7 @@ class Number:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> "Number":
-        """Return this number divided by `other`, rounded by the rounding rule of the word.
-
-        A nonzero number divided by zero is infinite; zero divided by zero is nan.
-        """
+        """Return the rounded quotient: infinite for x/0, nan for 0/0."""
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -84,26 +81,25 @@ class Number:
         return self._special(_quotient, other)
 
     def __rtruediv__(self, other: Any) -> "Number":
-        """Return `other`, converted to this number's format, divided by this number."""
+        """Return `other`, converted to the word, divided by this number."""
         return self.word(other) / self
 
     def __neg__(self) -> "Number":
-        """Return this number with the opposite sign."""
+        """Return the number with the opposite sign."""
         return self.__class__(-self.m, self.e) if self.m else self._plain(-self.e)
 
     def __abs__(self) -> "Number":
-        """Return the magnitude of this number."""
+        """Return the magnitude."""
         return self.__class__(abs(self.m), self.e if self.m else abs(self.e))
 
     def __bool__(self) -> bool:
-        """Return whether the number differs from zero; True for nan."""
+        """Return whether the number is not zero; True for nan."""
         return bool(self.m or self.e)
 
     def __eq__(self, other: object) -> bool:
-        """Return whether the difference from `other`, computed in the word's arithmetic, is zero.
+        """Return whether the difference computed in the word is zero.
 
-        In a CDC word the computed difference of two different, neighbouring numbers can be zero.
-        Such numbers are regarded as equal.
+        In a CDC word it can be zero for two neighbouring numbers, which are then regarded as equal.
         """
         x, y = self, self.word(other)
         if x.m and y.m:
@@ -114,23 +110,23 @@ class Number:
     __hash__ = None  # type: ignore[assignment]
 
     def __lt__(self, other: Any) -> bool:
-        """Return whether the exact difference, this number minus `other`, is below zero."""
+        """Return whether the exact difference is below zero."""
         return self._order(other) < 0
 
     def __gt__(self, other: Any) -> bool:
-        """Return whether the exact difference, this number minus `other`, is above zero."""
+        """Return whether the exact difference is above zero."""
         return self._order(other) > 0
 
     def __le__(self, other: Any) -> bool:
-        """Return whether this number minus `other` is exactly zero or below; False for nan."""
+        """Return whether the exact difference is at most zero; False for nan."""
         return self._order(other) <= 0
 
     def __ge__(self, other: Any) -> bool:
-        """Return whether this number minus `other` is exactly zero or above; False for nan."""
+        """Return whether the exact difference is at least zero; False for nan."""
         return self._order(other) >= 0
 
     def __float__(self) -> float:
-        """Return the nearest float; beyond the range of floats, infinity with the same sign."""
+        """Return the nearest float, or infinity with the same sign."""
         if not self.m:
             return float(self.e)
         try:
@@ -139,7 +135,7 @@ class Number:
             return math.copysign(math.inf, self.m)
 
     def __repr__(self) -> str:
-        """Return the word (the format) and the value as text: ``Word(48, 'FX')(m * 2**e)``."""
+        """Return the word and the value: ``Word(48, 'FX')(m * 2**e)``."""
         value = f"{self.m} * 2**{self.e}" if self.m else str(self.e)
         return f"{self.word}({value})"
 
@@ -153,11 +149,7 @@ class Number:
         return Fraction(self.m) * Fraction(2) ** self.e if self.m else Fraction(self.e)
 
     def sqrt(self) -> "Number":
-        """Return the square root of this number, correctly rounded to nearest.
-
-        It is rounded to nearest even if the other operations of the word truncate. The root of a
-        number below zero is nan.
-        """
+        """Return the square root, rounded to nearest; nan below zero."""
         if self.m <= 0:
             return self._plain(self.e if not self.m and not self.e < 0.0 else math.nan)
         shift = 2 * self.word.p + 4 + (self.e & 1)
@@ -166,17 +158,11 @@ class Number:
         return self.__class__(*self.rules.nearest(root << 1 | rest, (self.e - shift) // 2 - 1))
 
     def sin(self) -> "Number":
-        """Return the sine of this number (rad), rounded to nearest.
-
-        It is rounded to nearest even if the other operations of the word truncate.
-        """
+        """Return the sine of this number (rad), rounded to nearest."""
         return self._wave("mpf_sin")
 
     def cos(self) -> "Number":
-        """Return the cosine of this number (rad), rounded to nearest.
-
-        It is rounded to nearest even if the other operations of the word truncate.
-        """
+        """Return the cosine of this number (rad), rounded to nearest."""
         return self._wave("mpf_cos")
 
     def _wave(self, name: str) -> "Number":
@@ -191,12 +177,10 @@ class Number:
         return self.__class__(*self.rules.nearest(-int(m) if sign else int(m), e))
 
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
-        """Return the result of an operation in which an operand is zero, infinite or nan.
+        """Return the result of an operation with an operand that is zero, infinite or nan.
 
-        The operands are this number and `other`. `operation` is the same operation on floats, such
-        as their sum. It is applied to a float for each operand: the same zero, infinity or nan, or
-        1.0 or -1.0 for any other number. If this yields zero, infinity or nan, the result has this
-        value. Otherwise zero was added to a number, and the result is the other operand of the sum.
+        `operation` is applied to floats that stand for the operands. If it yields zero, infinity or
+        nan, so is the result. Otherwise zero was added to a number, which is the result.
         """
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):
@@ -208,20 +192,13 @@ class Number:
 
     @property
     def _shadow(self) -> float:
-        """Return a float of the same sign and kind (zero, finite, infinite or nan) as this number.
-
-        The float is 1.0 or -1.0 if the number is finite and not zero. Otherwise it is the zero,
-        infinity or nan that the number represents.
-        """
+        """Return the zero, infinity or nan of this number, else 1.0 or -1.0."""
         if self.m:
             return 1.0 if self.m > 0 else -1.0
         return float(self.e)
 
     def _order(self, other: Any) -> float:
-        """Return a number with the sign of the exact difference, this number minus `other`.
-
-        The result is nan if this number or `other` is nan.
-        """
+        """Return a number with the sign of the exact difference; nan if an operand is nan."""
         x, y = self, self.word(other)
         if not (x.m and y.m):
             return 0.0 if x._shadow == y._shadow else x._shadow - y._shadow
@@ -238,24 +215,21 @@ def _quotient(x: float, y: float) -> float:
 class Word:
     """A floating-point format with its arithmetic: a number of bits p, and a rounding rule.
 
-    A word is called like a function, with a float, an integer, a fraction or the text of a decimal.
-    It returns this value as a `Number` of the word.
+    A word is called with a float, an integer, a fraction or the text of a decimal, and returns this
+    value as a `Number`.
 
     Parameters
     ----------
     p : int
         Number of bits of the coefficient (significand).
     rule : {"nearest-even", "chop", "FX", "RX"}
-        Rounding to nearest with ties to even; truncation towards zero; or the rules of the CDC's
-        instructions FX, which truncate, and RX, which round.
+        To nearest with ties to even; towards zero; or the CDC's FX (truncating) or RX (rounding).
     largest : int, optional
-        Largest exponent for the rules `nearest-even` and `chop`: numbers are below
-        2**(largest + 1), and the smallest exponent follows as in IEEE 754. By default it is the
-        largest exponent of binary64 if p is at most 53, else of binary128. It has no effect on `FX`
-        and `RX`, which have the exponents of CDC words.
+        Largest exponent, except for FX and RX: numbers are below 2**(largest + 1), and the smallest
+        exponent follows as in IEEE 754. The default is that of binary64 if p is at most 53, else of
+        binary128.
     cut_literals : bool
-        Whether a value that is converted to the word is truncated towards zero, instead of rounded
-        to the nearest number.
+        Whether converted values are truncated instead of rounded to nearest.
 
     Raises
     ------
@@ -270,11 +244,7 @@ class Word:
         largest: int | None = None,
         cut_literals: bool = False,
     ) -> None:
-        """Select the arithmetic for p bits and the rounding rule; make the word's class of numbers.
-
-        A word is a floating-point format. `largest` is its largest exponent, and `cut_literals`
-        says whether values that are converted to the format are truncated.
-        """
+        """Select the arithmetic, and make the word's class of numbers."""
         if rule not in RULES:
             raise unknown("rounding", rule, RULES)
         if p < 4:
@@ -292,16 +262,14 @@ class Word:
         self._literals: dict[float, Number] = {}
 
     def __repr__(self) -> str:
-        """Return the format's number of bits and rounding rule as text: ``Word(48, 'FX')``."""
+        """Return bits and rounding rule: ``Word(48, 'FX')``."""
         return f"Word({self.p}, {self.rule!r})"
 
     def __call__(self, value: Any) -> Number:
-        """Return `value` as a number of the word, which is a floating-point format.
+        """Return a float, integer, fraction, decimal text or own number as a number of the word.
 
-        The value is truncated if the word was made with `cut_literals`, and rounded to nearest
-        otherwise. `value` is a float, which is converted from its shortest decimal representation,
-        an integer, a fraction, the text of a decimal, or a number of this word. Raise TypeError for
-        any other type, and for a number of another word.
+        A float is converted from its shortest decimal representation. Raise TypeError for any other
+        type, and for a number of another word.
         """
         if isinstance(value, Number) and value.word is self:
             return value

@@ -1,1 +1,1 @@
-"""Reference solutions of a scene in multiple-precision arithmetic, with bounds of their errors."""
+"""Reference solutions of a scene in multiple precision, with bounds of their errors."""

@@ -1,8 +1,7 @@
 """Exact solution of a symmetric body with a torque along its axis, in decimal arithmetic.
 
-The spin, omega about the symmetry axis, is the initial spin plus the integral of the torque over
-the moment. The vector of the other two components of omega rotates by an angle proportional to the
-integral of the spin. The solution is tested against the reference (`truth/reference.py`).
+The spin is the initial spin plus the integral of the torque over the moment. The other two
+components of omega rotate by an angle proportional to the integral of the spin.
 """
 
 import decimal
@@ -20,8 +19,7 @@ DIGITS = 50
 def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
     """Return omega (rad/s) at `times` (s) of a body with I1 = I2 and its torque along axis 3.
 
-    The result has a row of three decimal numbers for each time. Raise InputError if the scene has
-    other moments or another torque.
+    Raise InputError if the scene has other moments or another torque.
     """
     law, moments = scene.body_torque, scene.moments
     vectors = [law.constant, law.rate, *(a for a, _ in law.sines + law.cosines)]
@@ -58,11 +56,9 @@ def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
 
 
 def _arithmetic(*sizes: Sequence[float]) -> "decimal._ContextManager":
-    """Return a context manager that sets a decimal precision sufficient for large angles.
+    """Return a context whose precision suffices for angles of the size of a product.
 
-    `sizes` are sequences of numbers: the times (s), the initial omega (rad/s) and the frequencies
-    of the torque (rad/s). The precision allows for angles up to the product of the largest absolute
-    value of each sequence.
+    Each of `sizes` gives its largest absolute value as a factor.
     """
     context = decimal.Context(Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN)
     largest = [max(map(abs, each), default=1.0) for each in sizes]

@@ -1,6 +1,6 @@
-"""Numbers of the enclosures: balls, power series of balls, complex balls, and functions of them.
+"""Numbers of the enclosures: balls, power series of balls, complex balls, and functions.
 
-A ball is an interval given by its middle and its radius. Every operation of python-flint returns a
+A ball is an interval given by its middle and its radius. Each operation of python-flint returns a
 ball that contains the exact result for all numbers in its operands.
 """
 
@@ -17,7 +17,7 @@ from pyharness.truth.enclosed import Balls
 
 
 def ball(x: Fraction) -> Any:
-    """Return a ball that contains a fraction, and that is exact if the precision suffices."""
+    """Return a ball that contains a fraction; it is exact if the precision suffices."""
     return arb(fmpq(x.numerator, x.denominator))
 
 
@@ -28,7 +28,7 @@ def fraction(x: Any) -> Fraction:
 
 
 def balls(row: Sequence[Any]) -> Balls:
-    """Return the balls of a row with their exact middles, and with the largest of their radii."""
+    """Return a row's exact middles, with the largest of their radii."""
     return Balls(tuple(map(fraction, row)), max(fraction(x.rad()) for x in row))
 
 
@@ -61,9 +61,9 @@ def _cosine(x: Any) -> Any:
 
 
 def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
-    """Return the functions of a tape, with the pieces of its tables that hold from `time` (s) on.
+    """Return a tape's functions, with the pieces of its tables that hold after `time` (s).
 
-    If `forward` is false, these are the pieces that hold before `time`.
+    Before `time`, if `forward` is false.
     """
 
     def table(each: Table, at: Any) -> Any:

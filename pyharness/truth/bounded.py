@@ -1,8 +1,7 @@
-"""The error of the reference: a proved bound where a proof is possible and cheap, or the estimate.
+"""The error of the reference: a proved bound where a proof is cheap, or the estimate.
 
-A proof encloses the true solution in balls. The distance of the reference's values from the
-farthest points of the balls is then a bound of their error. The values themselves, and the estimate
-of their error, do not depend on whether a proof is found.
+A proof encloses the solution in balls; the distance of the reference from the farthest points of
+the balls bounds its error. The reference and its estimate do not depend on the proof.
 """
 
 import math
@@ -41,11 +40,11 @@ class ErrorBound(NamedTuple):
     value : float
         Bound of the error of any component of omega, rad/s.
     basis : {"proved", "estimated"}
-        Whether the bound is proved, or follows from an estimate.
+        What the bound rests on.
     angle, angle_basis : float and str, or None
-        The same for the attitude (rad); None if the reference has no attitude.
+        The same for the attitude (rad); None without attitude.
     warning : str
-        A sentence if the estimate is wrong, because the proved error exceeds it; otherwise empty.
+        A sentence if the proved error exceeds the estimate; otherwise empty.
     """
 
     value: float
@@ -55,19 +54,16 @@ class ErrorBound(NamedTuple):
     warning: str = ""
 
     def text(self, unit: str = "rad/s") -> str:
-        """Return the bound of omega with its unit and its basis; two digits are rounded up."""
+        """Return the bound of omega, two digits rounded up, with unit and basis."""
         return f"{' '.join(filter(None, (at_most(self.value), unit)))} ({self.basis})"
 
     def over(self, scale: float) -> "ErrorBound":
-        """Return the statement with the error of omega relative to `scale` (rad/s), unless it is 0.
-
-        The errors of the attitude do not change.
-        """
+        """Return the statement relative to `scale` (rad/s) unless it is 0; the angle stays."""
         return self._replace(value=self.value / scale) if scale else self
 
     @property
     def larger(self) -> "ErrorBound":
-        """Return a statement on the larger of the errors of omega and of the attitude."""
+        """Return a statement on the larger of the errors of omega and attitude."""
         turned = self.turned
         return (
             self
@@ -77,7 +73,7 @@ class ErrorBound(NamedTuple):
 
     @property
     def turned(self) -> "ErrorBound | None":
-        """Return the statement on the attitude alone, as its value (rad); None without attitude."""
+        """Return the statement on the attitude alone (rad); None without attitude."""
         if self.angle is None or self.angle_basis is None:
             return None
         return ErrorBound(self.angle, self.angle_basis, warning=self.warning)
@@ -94,7 +90,7 @@ class ErrorBound(NamedTuple):
 
 
 def at_most(x: float) -> str:
-    """Return a positive number as text with two digits, as `short` does, but rounded up."""
+    """Return a positive number as text with two digits, rounded up."""
     if not math.isfinite(x):
         return short(x)
     with localcontext(rounding=ROUND_CEILING):
@@ -111,9 +107,8 @@ def bound_of(
 ) -> ErrorBound:
     """Return a statement on the error of the reference `known` of a scene.
 
-    If `before_rounding` is true, the statement is on the sum of omega and its `remainder`. This is
-    the part that rounding to binary64 has removed, and is itself rounded. `any_torque` and `effort`
-    are those of `error_bound`; an effort of None means 1.
+    If `before_rounding`, it is on omega plus its `remainder`, the part that rounding to binary64
+    removed.
     """
     exact = before_rounding and known.remainder is not None
     largest = float(np.abs(known.omega).max(initial=0.0))
@@ -144,14 +139,11 @@ def error_bound(
 ) -> ErrorBound:
     """Return a statement on the error of values of the reference at `times` (s).
 
-    `omega` (rad/s) and `remainder`, which is added to it, have the shape (n, 3), and `attitude` has
-    the shape (n, 4). `claimed` and `claimed_angle` are the estimated errors of omega (rad/s) and of
-    the attitude (rad).
-
-    The error of omega is proved if the scene has a certificate, which needs no library. With
-    python-flint, the error of the attitude is proved in torque-free motion, and if `any_torque` is
-    true, both errors are proved under any recorded torque. The estimates are stated if a proof
-    would exceed a work limit of about half a second, times `effort`.
+    `omega` (rad/s) and `remainder`, which is added to it, have the shape (n, 3), `attitude` (n, 4).
+    `claimed` (rad/s) and `claimed_angle` (rad) are the estimates. Omega is proved if the scene has
+    a certificate, which needs no library. With python-flint the attitude is proved in torque-free
+    motion, and if `any_torque`, both under any recorded torque. The limit of a proof is about half
+    a second times `effort`.
     """
     rows = _exact(omega, remainder)
     order = sorted(range(len(times)), key=lambda k: abs(times[k]))
@@ -184,10 +176,7 @@ def _exact(omega: Array, remainder: Array | None) -> Sequence[Row]:
 
 
 def joined(found: Sequence[ErrorBound]) -> ErrorBound:
-    """Return one statement that holds for all given ones; it is proved only if all are proved.
-
-    At least one must be given.
-    """
+    """Return a statement that holds for all given ones, of which there is at least one."""
     angles = [each.angle for each in found if each.angle is not None]
     bases = [each.angle_basis for each in found if each.angle_basis is not None]
     return ErrorBound(
@@ -214,7 +203,7 @@ class _Statement(NamedTuple):
     claimed_angle: float  # rad
 
     def bound(self, any_torque: bool, effort: float) -> ErrorBound:
-        """Return the bound of the errors, which is proved as far as a proof is found."""
+        """Return the bound of the errors, proved as far as possible."""
         value, basis, warnings = self.claimed, ESTIMATED, []
         angle = None if self.attitude is None else self.claimed_angle
         angle_basis = None if self.attitude is None else ESTIMATED
@@ -265,7 +254,7 @@ class _Statement(NamedTuple):
         return omega, attitude
 
     def _digits(self) -> int | None:
-        """Return the digits with which balls are small beside the estimate, or None if too many."""
+        """Return the digits that make balls small beside the estimate; None if too many."""
         largest = max(1.0, *(abs(float(x)) for row in self.omega for x in row))
         if not (0.0 < self.claimed < math.inf):
             # Omega is 0 at all times, or the estimate says nothing.
@@ -282,7 +271,7 @@ def _tried(prove: Callable[[], Enclosure]) -> Enclosure | None:
 
 
 def _extremes(rows: Sequence[Row], found: Sequence[Balls]) -> tuple[float, float]:
-    """Return the least and the largest error that rows of omega may have in view of the balls."""
+    """Return the least and the largest error that rows of omega may have."""
     least = most = 0.0
     for row, (middle, radius) in zip(rows, found, strict=True):
         apart = max(map(_distance, row, middle))
@@ -294,7 +283,7 @@ def _extremes(rows: Sequence[Row], found: Sequence[Balls]) -> tuple[float, float
 
 
 def _distance(x: float | Fraction, y: Fraction) -> float:
-    """Return abs(x - y), rounded to nearest; integers are faster here than fractions."""
+    """Return abs(x - y) rounded to nearest; integers are faster than fractions."""
     n, d = x.as_integer_ratio()
     m, e = y.as_integer_ratio()
     return abs(n * e - m * d) / (d * e)
@@ -305,11 +294,10 @@ def _extreme_angles(
 ) -> tuple[float, float]:
     """Return the least and the largest error (rad) that quaternions may have.
 
-    The error is twice the angle between the line of a quaternion and the line of the true one. The
-    sine s of the angle between its line and the line of the middle of the ball is exact before it
-    is rounded. If s <= 1/2, arcsin(s) is less than s (1 + s**2). The norm of four radii r is 2 r.
-    The angle between the lines of the middle and of the true quaternion is thus at most
-    arcsin(2 r), which is less than 4 r.
+    The error is twice the angle between the lines of a quaternion and the true one. The sine s of
+    its angle to the ball's middle is exact before rounding, and arcsin(s) < s (1 + s**2) for s <=
+    1/2. Four radii r have the norm 2 r, so middle and true quaternion differ by at most arcsin(2 r)
+    < 4 r.
     """
     least = most = 0.0
     for row, (middle, radius) in zip(rows, found, strict=True):

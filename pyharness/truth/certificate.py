@@ -1,7 +1,7 @@
 """Proofs by Taylor steps in integer arithmetic, and the certificates that state them.
 
-The bounds of a step are those of the checker (`certificate_checker`), which does not trust this
-module: a certificate has the steps and their balls, and the checker verifies each of them.
+The bounds of a step are those of `certificate_checker`, which verifies each step and ball of a
+certificate and does not trust this module.
 """
 
 import math
@@ -64,7 +64,7 @@ class Proof:
 
 
 class _AmplifiedError(Exception):
-    """The errors grow so much that the run needs this number of digits more."""
+    """The errors grow so much that this many more digits are needed."""
 
     def __init__(self, digits: float) -> None:
         super().__init__()
@@ -72,7 +72,7 @@ class _AmplifiedError(Exception):
 
 
 def has_certificate(scene: Scene) -> bool:
-    """Return whether a scene has constant principal moments and a torque law about body axes."""
+    """Return whether moments are constant and the torque is a law about body axes."""
     constant = scene.changing is None and scene.inertia is None
     return constant and isinstance(scene.torque, TorqueLaw) and not scene.torque.in_space
 
@@ -86,11 +86,10 @@ def prove(
 ) -> Proof:
     """Return balls that contain omega at `times` (s), and a certificate of them.
 
-    The times have one sign, and each is farther from 0 than the one before. The radius of a ball is
-    at most 10**-digits rad/s, times the largest component of omega if it exceeds 1 rad/s. `effort`
-    is a factor on the limit of the number of steps, and `progress` is called after each step. Raise
-    InputError if the scene has no certificate, if omega grows without bound, or if the work limit
-    is exceeded.
+    The times have one sign and lead away from 0. A radius is at most 10**-digits rad/s, times the
+    largest component of omega if that exceeds 1 rad/s. `effort` is a factor on the limit of steps.
+    Raise InputError if the scene has no certificate, if omega grows without bound, or if the work
+    limit is exceeded.
     """
     if not has_certificate(scene):
         raise InputError(
@@ -176,7 +175,7 @@ class _Run:
         self.omega: list[Balls] = []
 
     def prove(self, limit: float, effort: float, progress: Progress, early: float) -> None:
-        """Find the steps from time 0 to the last requested time, and the balls of omega.
+        """Find the steps up to the last time, and the balls of omega.
 
         Raise _AmplifiedError if the radius grows too fast after the share `early` of the time.
         """
@@ -227,7 +226,7 @@ class _Run:
     def _expected_excess(
         self, radius: int, source: int, middle: Sequence[int], share: float
     ) -> float:
-        """Return by how many digits the radius will exceed its limit at the last time.
+        """Return how many digits the last radius will be too large.
 
         The logarithm of the amplification is extrapolated at its mean rate since half the time.
         """
@@ -240,18 +239,18 @@ class _Run:
         return math.log10(radius) - math.log10(unit) + self._goal + rate * (1.0 - share)
 
     def _source(self, radius: int, wave_radius: int, expansion: Expansion, h: int) -> int:
-        """Return a bound of the error at the end of a step without amplification."""
+        """Return a bound of the error of one step without amplification."""
         _, residuals, wave_residual = expansion
         forced = self._system.forced(h) * (wave_radius + wave_residual) >> 64
         return radius + self._system.norm(residuals) + forced
 
     def _tube(self, source: int, expansion: Expansion) -> int:
-        """Return the radius of a tube that is larger than the error of an ordinary step."""
+        """Return a radius larger than the error of an ordinary step."""
         thick: int = max(max(map(abs, each)) for each in expansion[0][:3]) >> _TUBE_BITS
         return 8 * source + thick + 8
 
     def _add_balls(self, series: list[list[int]], radius: int, time: int, h: int) -> None:
-        """Add the balls at the requested times that are in a step, or at its begin if h is 0."""
+        """Add the balls at the requested times in a step, or at its begin if h is 0."""
         unit = 1 << self._bits
         for t in self._times[len(self.omega) :]:
             passed = t * (1 << self._clock) - time
@@ -261,7 +260,7 @@ class _Run:
             self.omega.append(Balls(tuple(Fraction(x, unit) for x in middle), size / unit))
 
     def certificate(self) -> dict[str, Any]:
-        """Return the certificate of the balls at all requested times but 0."""
+        """Return the certificate of the balls at all times but 0."""
         rows = zip(self._times, self.omega, strict=True)
         return {
             "format": FORMAT,

@@ -81,7 +81,7 @@ class System:
         self.factors = [abs(parts[i] + parts[j]) * scales[i] * scales[j] / 2 for i, j in pairs]
 
     def expand(self, state: Sequence[int], time: int, h: int, order: int) -> Expansion:
-        """Return polynomials, and bounds of the residuals of omega and all waves, over 2**bits."""
+        """Return polynomials and bounds of the residuals of omega and all waves, over 2**bits."""
         series, bits, clock, wave_residual = [[x] for x in state], self.bits, self.clock, 0
         # Coefficient k is rounded down by less than 1. This changes the residual by less than k.
         rounding = order * (order + 1) // 2
@@ -141,7 +141,7 @@ class System:
     def radii(
         self, radius: int, wave_radius: int, expansion: Expansion, tube: int, h: int
     ) -> tuple[int, int]:
-        """Return radii of omega and of the waves for a whole step, or raise NotProvedError."""
+        """Return radii of omega and waves for a whole step, or raise NotProvedError."""
         series, residuals, wave_residual = expansion
         growth = self.growth(series, tube, h)
         if growth > 2 * UNIT:
@@ -157,7 +157,7 @@ class System:
     def ball(
         self, series: Sequence[list[int]], place: Fraction, radius: int
     ) -> tuple[list[int], Fraction]:
-        """Return the middle and radius of omega at a place of a step, from 0 to 1, over 2**bits."""
+        """Return omega's middle and radius at a place of a step, from 0 to 1, over 2**bits."""
         middle, (n, d) = [0, 0, 0], place.as_integer_ratio()
         for i, each in enumerate(series[:3]):
             for x in reversed(each):
@@ -167,7 +167,7 @@ class System:
 
 
 def mean(polynomial: Sequence[int]) -> int:
-    """Return a bound of the mean absolute value of a polynomial from 0 to 1."""
+    """Return a bound of the mean absolute value of a polynomial on [0, 1]."""
     # The mean absolute value of the first terms is at most their root mean square.
     head, total = polynomial[:12], 0
     for k in range(2 * len(head) - 1):
@@ -177,7 +177,7 @@ def mean(polynomial: Sequence[int]) -> int:
 
 
 def exponential(x: int) -> int:
-    """Return a bound of the exponential of a number from 0 to 2; both are over UNIT."""
+    """Return a bound of exp(x), x from 0 to 2; both over UNIT."""
     total = term = UNIT
     for k in range(1, 20):
         term = over(term * x, k * UNIT)
@@ -210,7 +210,7 @@ def fits(value: Any, form: Any) -> bool:
 
 
 def check(certificate: dict[str, Any]) -> int:
-    """Return the number of steps of a certificate; raise NotProvedError if it does not hold."""
+    """Return a certificate's number of steps; raise NotProvedError if it does not hold."""
     scene = certificate["scene"]
     body = "coefficients" if "coefficients" in scene else "moments"
     if not fits(certificate, {**FORM, "scene": {**SCENE, body: (EXACT,) * 3}}):
@@ -246,7 +246,7 @@ def check(certificate: dict[str, Any]) -> int:
 
 
 def check_file(name: str) -> tuple[dict[str, Any] | None, str]:
-    """Return a certificate that holds, or None if it fails, and why it fails."""
+    """Return a certificate that holds, or None and why it fails."""
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         return dict(pairs) if len(dict(pairs)) == len(pairs) else {"a key occurs twice": None}
@@ -263,7 +263,7 @@ def check_file(name: str) -> tuple[dict[str, Any] | None, str]:
 
 
 def main(names: Sequence[str]) -> int:
-    """Check certificates in files, and print what they prove; return 1 if one does not hold."""
+    """Check certificates in files, print what they prove; return 1 if one does not hold."""
     found = [(name, *check_file(name)) for name in names]
     for name, proved, why in found:
         lines = [f"not proved: {why}"]

@@ -11,8 +11,7 @@ Row = list[Decimal]
 def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
     """Return the sine and the cosine of any angle (rad).
 
-    The angle is reduced modulo 2 pi and halved eight times. Power series yield sine and cosine of
-    this small angle, and the formulas of the double angle are then applied eight times.
+    The angle is reduced modulo 2 pi and halved eight times before the power series.
     """
     with decimal.localcontext() as context:
         context.prec += 12 + max(0, angle.adjusted())
@@ -30,9 +29,9 @@ def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
 
 
 def _alternating(term: Decimal, square: Decimal, n: int) -> Decimal:
-    """Return the sum of x**k / k! with alternating signs over k = n, n + 2, n + 4, ...
+    """Return the sum of x**k / k! with alternating signs over k = n, n + 2, ...
 
-    `term` is the first term of the sum, x**n / n!, and `square` is x**2.
+    `term` is x**n / n!, `square` x**2.
     """
     total = term
     while abs(term) > Decimal(1).scaleb(-decimal.getcontext().prec):
@@ -60,10 +59,7 @@ def _arctan_inverse(n: int) -> Decimal:
 
 
 def product(x: Row, reversed_y: Row) -> Decimal:
-    """Return the sum of the products of corresponding elements of two lists.
-
-    It is a Taylor coefficient of the product of two series if the second list is in reversed order.
-    """
+    """Return a Taylor coefficient of the product of two series, the second one reversed."""
     if x and not x[-1]:
         # Polynomials, such as those of time, end in many zeros, which change no digit of the sum.
         n = len(x) - 1

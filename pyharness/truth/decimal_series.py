@@ -1,6 +1,6 @@
-"""Integration of omega, velocity and attitude by Taylor series in decimal arithmetic.
+"""Omega, velocity and attitude by Taylor series of equations 13-15 in decimal arithmetic.
 
-Omega obeys Euler's equations, numbers 13-15 of the thesis.
+The list `coefficients` has the Taylor coefficients of each unknown.
 """
 
 from collections.abc import Callable, Sequence
@@ -45,15 +45,12 @@ def taylor_series(
 ) -> list[Row]:
     """Return a row of omega, velocity and attitude at each of `times` (s).
 
-    There are fewer rows if omega grows without bound before the last time, or if a torque that
-    depends on the state is singular at an earlier time. Omega is in rad/s. The
-    translational velocity (m/s) is included if `velocity` is true. The attitude is included if the
-    scene has one. It is a quaternion, which has the same norm as the scene's quaternion.
-    `coefficients` are the Euler coefficients A, B, C of the scene, and `order` is the degree of the
-    Taylor polynomials, which is larger for a torque with high powers. `tolerance` is the local
-    tolerance, relative to omega and to the attitude. `effort` is a factor on a work limit of some
-    ten seconds; if it is None, the limit is 100 000 steps, and fewer if the torque depends on the
-    state. Raise InputError if the work limit is exceeded.
+    Rows are missing from where omega grows without bound or a torque that depends on the state is
+    singular. Velocity (m/s) is included if requested, the attitude if the scene has one, with the
+    norm of the scene's quaternion. `coefficients` are A, B, C; `order` is the degree, larger for a
+    torque with high powers; `tolerance` is local and relative to omega and to the attitude.
+    `effort` is a factor on a work limit of some ten seconds; None means 100 000 steps, fewer if the
+    torque depends on the state. Raise InputError if it is exceeded.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     if equations.least_order > order:
@@ -109,7 +106,7 @@ def taylor_series(
 
 
 class _Limit:
-    """The limit on the number of Taylor steps of an integration, and a forecast of this number."""
+    """The limit on the number of Taylor steps, and a forecast of this number."""
 
     def __init__(self, scene: Scene, effort: float | None) -> None:
         self._effort = None if effort is None else checked_effort(effort)
@@ -122,13 +119,10 @@ class _Limit:
         self._before: tuple[int, Decimal] = (0, Decimal(0))
 
     def check(self, step: int, stops: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
-        """Raise InputError if the number of steps, so far or by forecast, exceeds the work limit.
+        """Raise InputError if the number of steps, so far or by forecast, exceeds the limit.
 
-        The number is checked before each step of an integration by Taylor series. The forecast is
-        the expected number of steps until the end. `step` is the number of steps taken, without the
-        number `stops` of those that ended early because a table changed. `begin` is the time
-        reached (s), `length` the length of the next step (s) if no table changes, and `rest` the
-        time left until the end (s).
+        `step` is the number of steps, without the `stops` that ended early at a change of a table;
+        `begin` the time reached, `length` the next step and `rest` the time left (s).
         """
         if step + stops >= self._most:
             self._refuse(stops + (self._forecast(step, abs(begin), rest) if step else 0))
@@ -176,10 +170,7 @@ class _Limit:
 
 
 def _torque_work(scene: Scene) -> int:
-    """Return the work for the torque of a scene in each step, in fifths of a step without torque.
-
-    The torque is a torque law, or a recorded torque.
-    """
+    """Return the work for the torque in each step, in fifths of a step without torque."""
     if isinstance(scene.torque, StateTorque) and scene.torque.tape is not None:
         return series_products(scene.torque.tape)
     law = _law_of(scene)
@@ -187,20 +178,17 @@ def _torque_work(scene: Scene) -> int:
 
 
 def _law_of(scene: Scene) -> TorqueLaw:
-    """Return the torque law about the body axes of a scene, whose inertia may change with time."""
+    """Return the scene's torque law about the body axes."""
     if scene.changing is not None and isinstance(scene.torque, TorqueLaw):
         return scene.torque
     return scene.body_torque
 
 
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
-    """Return the length (s) of the step for which the last two Taylor terms are small.
+    """Return the length (s), at most `rest`, of the step with small last two Taylor terms.
 
-    The last two terms are at most `tolerance` times the largest absolute value of the first
-    `leading` unknowns. If these unknowns are zero, as for a body at rest, the last terms are small
-    relative to the first Taylor terms that are not zero. `coefficients` contains the Taylor
-    coefficients of each unknown. The step is not longer than `rest`, the time left until the end
-    (s).
+    They are at most `tolerance` times the largest absolute value of the first `leading` unknowns
+    or, if these are 0, relative to the first Taylor terms that are not.
     """
     order = len(coefficients[0]) - 1
     begun = next((j for j in range(order - 1) if _size(coefficients, j, leading)), None)
@@ -219,11 +207,7 @@ def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: i
 
 
 def _size(coefficients: list[Row], k: int, unknowns: int | None = None) -> Decimal:
-    """Return the largest absolute value of Taylor coefficient number k of several unknowns.
-
-    `coefficients` contains the Taylor coefficients of each unknown. The first `unknowns` unknowns
-    are compared, or all of them if `unknowns` is None.
-    """
+    """Return the largest absolute Taylor coefficient k of the first `unknowns` unknowns, or all."""
     return max(abs(series[k]) for series in coefficients[:unknowns])
 
 
@@ -252,10 +236,8 @@ def _is_continued(
 ) -> bool:
     """Return whether the derivatives at the end of a step are those of the Taylor series.
 
-    A pulse of the torque within the step may be too small to be seen at its beginning. `series`
-    contains the Taylor coefficients of the unknowns around the beginning, and `state` their values
-    at the end. The step has the length `length` and ends at the time `end` (s). `tolerance` is the
-    local tolerance, relative to omega.
+    A pulse of the torque within the step may be too small to be seen at its beginning. `state` is
+    at the end, `end` and `length` are in s, and `tolerance` is relative to omega.
     """
     slopes = _derivatives(series, length)
 
@@ -278,21 +260,16 @@ def _is_continued(
 
 
 def divisors(scene: Scene) -> tuple[Fraction, Fraction, Fraction]:
-    """Return, as exact fractions, the numbers by which the torques of a scene are divided.
-
-    The numbers are the moments of inertia (kg m2), or 1 for a body specified by coefficients.
-    """
+    """Return the exact moments of inertia (kg m2), or 1 for a body by coefficients."""
     return scene.exact_moments or (Fraction(1), Fraction(1), Fraction(1))
 
 
 class _Equations:
-    """Euler's equations (13-15 of the thesis) of one scene, as recurrences of Taylor coefficients.
+    """The equations of one scene as recurrences of Taylor coefficients.
 
-    If `velocity` is true, the equation dV/dt = F/m - omega x V of the translational velocity V is
-    added, with the force F on the mass m. If the scene has an attitude, the equation dq/dt = q (0,
-    omega)/2 of its quaternion q is added. `coefficients` are A, B, C of Euler's equations. For
-    an inertia I that changes with time, the equations are (I omega)' = N - omega x (I omega), with
-    the torque N, and `coefficients` are not used.
+    With `velocity`, dV/dt = F/m - omega x V is added; with an attitude, dq/dt = q (0, omega)/2. For
+    an inertia that changes the equations are (I omega)' = N - omega x (I omega), and `coefficients`
+    (A, B, C) are not used.
     """
 
     def __init__(self, scene: Scene, coefficients: Row, velocity: bool) -> None:
@@ -312,9 +289,7 @@ class _Equations:
     def expand(self, time: Decimal, state: Row, order: int, forward: bool) -> list[Row]:
         """Return the Taylor coefficients 0 ... order of every unknown around `time` (s).
 
-        `state` contains the values of the unknowns at that time. If a table of the torque changes
-        at that time, the coefficients are those of the motion after it if `forward` is true, and
-        otherwise of the motion before it.
+        Where a table changes, they hold after `time` if `forward`, else before.
         """
         series = [[x] for x in state]
         torque = self._torque_series(time, order, series, forward)
@@ -345,10 +320,9 @@ class _Equations:
         return series
 
     def _inertia_series(self, time: Decimal) -> list[list[Row]]:
-        """Return the Taylor coefficients of an inertia matrix that changes, around `time` (s).
+        """Return the Taylor coefficients of a changing inertia matrix around `time` (s).
 
-        The result has three rows of three elements, each with a list of coefficients. It is empty
-        for a constant inertia.
+        It is empty for a constant inertia.
         """
         if self._changing is None:
             return []
@@ -360,33 +334,24 @@ class _Equations:
         return 0 if self._tape is None else self._tape.least_order
 
     def reach(self, length: Decimal) -> Decimal:
-        """Return the length (s) of the step, reduced so that no pulse of the torque is skipped.
-
-        The series is that of the last call of `expand`.
-        """
+        """Return the step (s), reduced so that no pulse of the last expansion is skipped."""
         return length if self._tape is None else self._tape.reach(length)
 
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
-        """Return the next time (s) at which a table of the torque changes, or None.
-
-        It is after `time` if `forward` is true, and otherwise before it.
-        """
+        """Return the next time (s) in the direction at which a table changes, or None."""
         return None if self._tape is None else self._tape.next_change(time, forward)
 
     def is_singular_before(self, offset: Decimal) -> bool:
-        """Return whether the torque is singular between the expansion's time and `offset` (s) on.
-
-        The series is that of the last call of `expand`. A torque law is never singular.
-        """
+        """Return whether the torque is singular up to `offset` (s) from the last expansion."""
         return self._tape is not None and self._tape.crosses_a_branch(offset)
 
     def _torque_series(
         self, time: Decimal, order: int, series: list[Row], forward: bool
     ) -> Callable[[int], Row]:
-        """Return a function that returns Taylor coefficient k of the torque over the moments.
+        """Return a function for Taylor coefficient k of the torque over the moments.
 
-        The expansion is around `time` (s). The function is called with 0, 1 ... `order` - 1. When
-        it is called with k, the lists in `series` contain the coefficients 0 to k of the unknowns.
+        Calls are with k = 0, 1 ... `order` - 1, when `series` has the coefficients 0 to k of the
+        unknowns.
         """
         if self._tape is not None:
             tape, moments = self._tape, self._moments
@@ -396,10 +361,7 @@ class _Equations:
         return lambda k: [each[k] for each in terms]
 
     def _law_series(self, time: Decimal, order: int) -> list[Row]:
-        """Return Taylor coefficients of a torque law over the moment of inertia around `time` (s).
-
-        For each axis there are `order` coefficients, numbers 0 to `order` - 1.
-        """
+        """Return coefficients 0 to `order` - 1 of a torque law over the moments, by axis."""
         law = self._law
         assert law is not None
         series = [
@@ -425,7 +387,7 @@ class _Equations:
 
 
 def _moved(polynomial: Sequence[float], time: Decimal) -> Row:
-    """Return the Taylor coefficients around `time` of a polynomial with given ones around 0."""
+    """Return the Taylor coefficients around `time` of a polynomial around 0."""
     row = [Decimal(c) for c in polynomial]
     # Horner's scheme, repeated, moves the centre of a polynomial.
     for first in range(len(row) - 1):
@@ -441,11 +403,10 @@ def _rates_by_momentum(
     series: list[Row],
     backward: list[Row],
 ) -> Row:
-    """Return Taylor coefficient k of the derivative of omega, for an inertia that changes.
+    """Return Taylor coefficient k of the derivative of omega, from L' = N - omega x L.
 
-    `torque` contains Taylor coefficient k of the torque N. `momentum` and `series` contain the
-    coefficients 0 to k of the momentum L = I omega and of omega; `backward` has those of omega in
-    reversed order. `inertia` has those of the matrix I. The equation is L' = N - omega x L.
+    `torque` is coefficient k of N; `momentum`, `series` and `inertia` have 0 to k of L = I omega,
+    omega and I, and `backward` has omega's reversed.
     """
     right = []
     for i in range(3):
@@ -479,12 +440,9 @@ def _triple(x: Row, y: Row, z: Row) -> Decimal:
 
 
 def _attitude_rates(q: list[Row], omega: list[Row]) -> Row:
-    """Return Taylor coefficient k of q (0, omega)/2, the derivative of the quaternion q.
+    """Return Taylor coefficient k of q (0, omega)/2.
 
-    The result is four numbers. The product is Hamilton's product, in which each product of two
-    components is a Cauchy product. `q` contains the Taylor coefficients 0 to k of the four
-    components of the quaternion. `omega` contains the coefficients k to 0 of the three components
-    of the angular velocity, in this reversed order.
+    `q` has the coefficients 0 to k of its components, `omega` those from k to 0.
     """
     (a, b, c, d), (x, y, z) = q, omega
     return [

@@ -1,9 +1,8 @@
-"""Torque-free motion in decimal arithmetic by Jacobi's elliptic functions, to check other methods.
+"""Torque-free motion by Jacobi's elliptic functions in decimals, to check other methods.
 
-Unlike the solution by Taylor series, this solution loses no digits with time. Therefore a long time
-with many flips near the separatrix takes no more work than a short time. The module shares no code
-with the closed form that it checks. Unlike the closed form it uses decimal arithmetic and Landen's
-transformation.
+Unlike the solution by Taylor series, this solution loses no digits with time. Many flips near the
+separatrix take no more work than a short time. The module shares no code with the closed form that
+it checks, and uses Landen's transformation.
 """
 
 import decimal
@@ -24,11 +23,9 @@ _DIGITS = 90
 def torque_free(scene: Scene, time: float | Decimal, rounded: bool = False) -> Row:
     """Return omega (rad/s) of a scene without torque at `time` (s).
 
-    The motion must be bounded. It is if the coefficients A, B and C belong to moments, if all are
-    0, or if one of them is above 0 and one below 0. A steady rotation is bounded for any
-    coefficients. If `rounded` is true, A, B and C rounded to binary64 are used instead of the exact
-    coefficients. Raise InputError if the torque depends on the state, or if the coefficients allow
-    unbounded motions and the rotation is not steady.
+    Motions are bounded if A, B, C belong to moments, are all 0, or one is above and one below 0;
+    and in steady rotation. If `rounded`, A, B and C are rounded to binary64. Raise InputError if
+    the torque depends on the state, or an unsteady motion may be unbounded.
     """
     i = checked_scene(scene).exact_moments
     a, w = [Fraction(x) for x in scene.euler_coefficients], [Fraction(x) for x in scene.omega]
@@ -44,10 +41,7 @@ def torque_free(scene: Scene, time: float | Decimal, rounded: bool = False) -> R
 
 
 def _decades(values: Sequence[Fraction]) -> int:
-    """Return the difference of the decimal exponents of the largest and the smallest magnitude.
-
-    Zeros among `values` are ignored.
-    """
+    """Return the difference of the largest and smallest decimal exponents; zeros are ignored."""
     powers = [_decimal(value).adjusted() for value in values if value]
     return max(powers) - min(powers) if powers else 0
 
@@ -78,11 +72,11 @@ def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time:
 
 
 def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) -> Row:
-    """Return omega (rad/s) at `time` (s) if no coefficient is 0 and the second one is negative.
+    """Return omega (rad/s) at `time` (s) if no coefficient is 0 and the second is negative.
 
-    Multiplied by factors, the components satisfy x' = y z, y' = -z x, z' = x y. The invariants
-    p = x**2 + y**2 and q = z**2 + y**2 (1/s**2) are compared as fractions, because on the
-    separatrix, where p = q, a rounding error would cause flips.
+    Multiplied by factors, x' = y z, y' = -z x, z' = x y. The invariants p = x**2 + y**2 and q =
+    z**2 + y**2 (1/s**2) are compared as fractions, because on the separatrix, where p = q, a
+    rounding error would cause flips.
     """
     s1, s2, s3 = (abs(each) for each in a)
     squares = [s2 * s3, s1 * s3, s1 * s2]
@@ -100,11 +94,9 @@ def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) ->
 
 
 def _turned(a: Row, omega: Row, time: Decimal) -> Row:
-    """Return omega (rad/s) at `time` (s) of a motion in which the first or third coefficient is 0.
+    """Return omega (rad/s) at `time` (s) if the first or third coefficient is 0.
 
-    The component of omega about the axis with coefficient 0 is constant, and the two other
-    components move on an ellipse. `a` contains the three Euler coefficients, of which the second
-    one is negative. `omega` contains the initial components (rad/s).
+    That component is constant; the others move on an ellipse. The second coefficient is negative.
     """
     axis = 0 if not a[0] else 2
     other = 2 - axis
@@ -124,9 +116,8 @@ def _turned(a: Row, omega: Row, time: Decimal) -> Row:
 def _normal(start: Row, p: Fraction, q: Fraction, time: Decimal) -> Row:
     """Return x, y, z at `time` (s), where x' = y z, y' = -z x, z' = x y.
 
-    `start` contains x, y, z at time 0 (1/s), and z is not 0. The invariants are p = x**2 + y**2
-    and q = z**2 + y**2 (1/s**2), where q is not less than p and p is not 0. The solution uses the
-    addition theorems of the elliptic functions sn, cn and dn.
+    `start` is in 1/s, with z not 0. p = x**2 + y**2 is not 0, and q = z**2 + y**2 is at least p.
+    The solution uses the addition theorems of sn, cn and dn.
     """
     x, y, z = start
     sign = -1 if z < 0 else 1
@@ -142,10 +133,9 @@ def _normal(start: Row, p: Fraction, q: Fraction, time: Decimal) -> Row:
 
 
 def jacobi(u: Decimal, comodulus: Decimal) -> tuple[Decimal, Decimal, Decimal]:
-    """Return Jacobi's elliptic functions sn, cn and dn of the argument `u`.
+    """Return sn, cn and dn of `u`; `comodulus` is 1 - k**2 with the modulus k.
 
-    `comodulus` is the square of the complementary modulus, 1 - k**2 with the modulus k. The method
-    is the descending Landen transformation (Abramowitz and Stegun 16.12).
+    The method is the descending Landen transformation (Abramowitz and Stegun 16.12).
     """
     if not comodulus:
         e = (-abs(u)).exp()

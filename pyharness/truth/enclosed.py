@@ -1,4 +1,4 @@
-"""The results of an enclosure: balls that contain the solution of a scene at requested times."""
+"""Balls that contain the solution of a scene at requested times."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from pyharness.model.scene import Scene
 
 
 class Balls(NamedTuple):
-    """Balls at one time: their middles, as exact fractions, and one radius for all of them."""
+    """The middles of balls as exact fractions, and one radius for all."""
 
     middle: tuple[Fraction, ...]
     radius: Fraction
@@ -18,11 +18,11 @@ class Balls(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """Balls that contain the true solution of one scene at requested times.
+    """Balls that contain the solution of one scene at requested times.
 
     The attitude is a unit quaternion, scalar first. The transition matrix has the derivatives of
-    omega (and of the quaternion, which is not normalised, if the scene has an attitude) by the
-    three components of omega at time 0, row by row. A quantity that was not requested is None.
+    omega, and of the quaternion without normalisation, by omega at time 0, row by row. What was not
+    requested is None.
     """
 
     time: tuple[float, ...]  # s
@@ -40,9 +40,9 @@ class Enclosure:
         return max((rounded_up(each.radius) for each in self.omega), default=0.0)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a dictionary for JSON for each time, with decimal numbers as strings.
+        """Return a dictionary for JSON for each time, decimals as strings.
 
-        The numbers are rounded, and each radius includes the rounding error.
+        Each radius includes the rounding error.
         """
         rows = []
         for n, time in enumerate(self.time):
@@ -56,7 +56,7 @@ class Enclosure:
 
 
 def with_energy(scene: Scene, found: Enclosure) -> Enclosure:
-    """Return an enclosure with the balls of the rotational energy, if the scene has moments."""
+    """Return an enclosure with the rotational energy, if the scene has moments."""
     if scene.moments is None:
         return found
     moments = scene.exact_moments or ()
@@ -70,20 +70,20 @@ def with_energy(scene: Scene, found: Enclosure) -> Enclosure:
 
 
 def row_of(time: float, omega: Balls) -> dict[str, Any]:
-    """Return balls of omega at `time` (s) as a dictionary for JSON, rounded outward."""
+    """Return balls of omega at `time` (s) for JSON, rounded outward."""
     texts, radius = decimals(omega)
     return {"time": time, "omega": texts, "radius": radius}
 
 
 def decimals(balls: Balls) -> tuple[list[str], float]:
-    """Return the middles of balls as decimal strings, and a radius that includes their rounding."""
+    """Return middles as decimal strings, and a radius that includes their rounding."""
     digits = _digits(balls.radius)
     radius = rounded_up(balls.radius + Fraction(1, 2 * 10**digits))
     return [_decimal(x, digits) for x in balls.middle], radius
 
 
 def rounded_up(x: Fraction) -> float:
-    """Return a binary64 number of four digits that is at least x, which is not negative."""
+    """Return a binary64 number of four digits that is at least x >= 0."""
     # One of the factors exceeds the rounding errors of the conversion to a decimal string.
     candidates = (float(f"{float(x) * factor:.3e}") for factor in (1.0, 1.001, 1.01))
     # Near the least binary64 number, the factors may change nothing.
@@ -92,7 +92,7 @@ def rounded_up(x: Fraction) -> float:
 
 
 def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
-    """Return the largest radius of balls of omega, over the largest one that is allowed.
+    """Return the largest radius over the one that is allowed.
 
     The allowed radius is 10**-digits, times the largest component of omega if it exceeds 1 rad/s.
     """
@@ -103,7 +103,7 @@ def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
 
 
 def _digits(radius: Fraction) -> int:
-    """Return a number of digits after the point with which rounding adds little to a radius."""
+    """Return the digits after the point with which rounding adds little to a radius."""
     if not radius:
         return 40
     excess = radius.denominator.bit_length() - radius.numerator.bit_length()
@@ -111,7 +111,7 @@ def _digits(radius: Fraction) -> int:
 
 
 def _decimal(x: Fraction, digits: int) -> str:
-    """Return a fraction as a decimal string with so many digits after the point."""
+    """Return a fraction as a decimal string with `digits` after the point."""
     whole = (abs(x.numerator) * 10**digits * 2 + x.denominator) // (2 * x.denominator)
     sign = "-" if x < 0 and whole else ""
     text = str(whole).rjust(digits + 1, "0")

@@ -1,9 +1,8 @@
 """Proved enclosures: balls that contain the true solution of a scene.
 
-There are three provers. Torque-free motion has a closed form (`enclosure_free`). Taylor steps in
-integer arithmetic (`certificate`) are for torques that depend on time alone, and need no library.
-Taylor steps in ball arithmetic (`enclosure_steps`) are for everything else. The first and the last
-need python-flint.
+There are three provers: a closed form for torque-free motion (`enclosure_free`), Taylor steps in
+integers (`certificate`) for torques that depend on time alone, and Taylor steps in balls
+(`enclosure_steps`) for everything else. The first and the last need python-flint.
 """
 
 from collections.abc import Sequence
@@ -21,7 +20,7 @@ MOST_DIGITS = 1000
 
 
 def can_enclose(scene: Scene) -> bool:
-    """Return whether the libraries that are installed suffice for the enclosure of a scene."""
+    """Return whether the installed libraries suffice for a scene."""
     return _has_flint() or (has_certificate(scene) and scene.attitude is None)
 
 
@@ -40,33 +39,31 @@ def enclose(
     Parameters
     ----------
     scene : Scene
-        The problem. Its torque must be recorded; if it depends on the attitude, the scene needs
-        one.
+        Its torque must be recorded; one that depends on the attitude needs the scene's.
     times : sequence of numbers
         Times (s) of one sign, each farther from 0 than the one before; the first may be 0.
     digits : int
-        A ball of omega has at most the radius 10**-digits rad/s, times the largest component of
-        omega if it exceeds 1 rad/s; of the initial omega for a solution in closed form.
+        A radius of omega is at most 10**-digits rad/s, times the largest component of omega if it
+        exceeds 1 rad/s; of the initial omega for a closed form.
     velocity, transition : bool
-        Whether to enclose the translational velocity (m/s), and the derivatives of omega and of the
+        Whether to enclose the translational velocity (m/s), and the derivatives of omega and
         attitude by omega at time 0.
     effort : number
         A factor on the limit of the number of steps.
     progress : function
-        It is called with the percentage of the last time that is done, 100, and the time reached.
+        Called with the percentage of the last time that is done, 100, and the time reached.
 
     Returns
     -------
     Enclosure
-        The balls of omega, of the attitude if the scene has one, of the requested quantities, and
-        of the rotational energy if the scene has moments.
+        Omega, the attitude if the scene has one, what was requested, and the rotational energy if
+        the scene has moments.
 
     Raises
     ------
     InputError
-        If the times are not in order, if python-flint is needed and not installed, if the torque is
-        opaque, if the solution can't be enclosed up to the last time, or if the work limit is
-        exceeded.
+        If the times are not in order, python-flint is needed and missing, the torque is opaque, the
+        solution can't be enclosed up to the last time, or the work limit is exceeded.
     """
     checked_scene(scene, True, True, True, True)
     if not 1 <= integer("digits", digits) <= MOST_DIGITS:
@@ -107,7 +104,7 @@ def _in_closed_form(scene: Scene, times: Sequence[float], digits: int) -> Enclos
 
 
 def _is_bounded(scene: Scene) -> bool:
-    """Return whether the body has constant moments, or coefficients with bounded motions.
+    """Return whether moments are constant, or coefficients allow only bounded motions.
 
     A body with coefficients has no attitude in closed form.
     """

@@ -1,4 +1,4 @@
-"""The equations of motion of a scene, for numbers of any kind that `balls` has."""
+"""The equations of motion of a scene, for any numbers of `balls`."""
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
@@ -26,11 +26,10 @@ Rates = Callable[[Any, Sequence[Any]], list[Any]]
 class Equations:
     """The equations of motion of a scene, with exact coefficients.
 
-    The unknowns are omega (rad/s); then, if the scene has one, the quaternion of its attitude; if
-    `velocity` is true, the translational velocity (m/s); and if `transition` is true, the
-    derivatives of omega, and of the attitude, by the three components of omega at time 0, row by
-    row. `blocks` are the slices of the four groups, without those that are absent. `scales` are the
-    units of the unknowns in which errors are measured.
+    The unknowns are omega (rad/s); the quaternion, if the scene has an attitude; the velocity
+    (m/s), if `velocity`; and if `transition`, the derivatives of omega and attitude by omega at
+    time 0, row by row. `blocks` are the slices of the present groups. `scales` are the units of
+    errors.
     """
 
     def __init__(self, scene: Scene, velocity: bool, transition: bool) -> None:
@@ -56,7 +55,7 @@ class Equations:
         self._exact()
 
     def _exact(self) -> None:
-        """Convert the numbers of the body to balls of the current precision."""
+        """Convert the body's numbers to balls of the current precision."""
         scene = self._scene
         self._principal: list[Any] | None = None
         self._moments = [arb(1)] * 3
@@ -71,7 +70,7 @@ class Equations:
         self._push = [arb(force) / arb(scene.masses[0]) for force in scene.forces]
 
     def at(self, begin: Fraction, forward: bool) -> Rates:
-        """Return the right-hand side for a step from `begin` (s) on, or back if not `forward`."""
+        """Return the right-hand side for a step from `begin` (s) on, or back."""
         functions = functions_at(begin, forward)
 
         def rates(time: Any, state: Sequence[Any]) -> list[Any]:
@@ -130,8 +129,8 @@ class Equations:
 def _tapes(scene: Scene) -> list[Tape]:
     """Return the tapes whose sum is the torque of a scene.
 
-    A torque law has a tape for each wave. One tape for all waves would have rounded sums of the
-    amplitudes of equal frequencies.
+    A law has a tape for each wave, because sums of the amplitudes of equal frequencies would be
+    rounded.
     """
     law = scene.torque
     if isinstance(law, TorqueLaw):

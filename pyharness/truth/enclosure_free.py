@@ -1,10 +1,9 @@
 """Proved enclosures of torque-free motion at any time, in ball arithmetic (python-flint).
 
-A ball is an interval, given by its middle and its radius. It contains the true value, because
-python-flint rounds outward. Omega is expressed by Jacobi's elliptic functions
-(`enclosure_omega.py`), and the attitude by a theta function (Jacobi 1850; Whittaker, Analytical
-Dynamics, section 69). Each decision between formulas compares fractions, never balls: the binary64
-numbers of a scene are exact. Import this module only where python-flint is installed.
+Omega is expressed by Jacobi's elliptic functions, and the attitude by a theta function (Jacobi
+1850; Whittaker, Analytical Dynamics, section 69). Decisions between formulas compare fractions,
+never balls: a scene's binary64 numbers are exact. Import this module only where python-flint is
+installed.
 """
 
 import math
@@ -34,15 +33,12 @@ _MOST_BITS = 20_000
 def enclose_free(
     scene: Scene, times: Sequence[float], digits: int, attitude: bool = False
 ) -> list[Balls]:
-    """Return balls that contain omega (rad/s) of a scene without torque at each of `times` (s).
+    """Return balls that contain omega (rad/s) without torque at each of `times` (s).
 
-    If `attitude` is true, four more balls in each row contain the unit quaternion from body to
-    space, scalar first, whose sign is continuous in time. Each radius is at most 10**-`digits`.
-    For omega it is at most 10**-`digits` times the largest initial component, if that exceeds
-    1 rad/s. A time may be negative.
-
-    Raise InputError if the scene has a torque, if its coefficients allow unbounded motions, if the
-    attitude is requested and cannot be computed, or if 20 000 bits do not suffice.
+    With `attitude`, four more contain the unit quaternion from body to space, scalar first,
+    continuous in time. Radii are at most 10**-`digits`, for omega times the largest initial
+    component if that exceeds 1 rad/s. Times may be negative. Raise InputError if there is a torque,
+    motions may be unbounded, the attitude cannot be computed, or 20 000 bits do not suffice.
     """
     _check(scene, times, digits, attitude)
     scale = max(Fraction(1), *(abs(Fraction(w)) for w in scene.omega))
@@ -64,7 +60,7 @@ def enclose_free(
 
 
 def _check(scene: Scene, times: Sequence[float], digits: int, attitude: bool) -> None:
-    """Raise InputError if the arguments of `enclose_free` are not allowed."""
+    """Raise InputError if arguments of `enclose_free` are not allowed."""
     if not checked_scene(scene).torque.is_zero:
         raise InputError("the scene has a torque; allowed: a scene without torque")
     if not all(map(math.isfinite, times)):
@@ -82,7 +78,7 @@ def _check(scene: Scene, times: Sequence[float], digits: int, attitude: bool) ->
 
 
 def _solution(scene: Scene, attitude: bool) -> Callable[[Fraction], Balls]:
-    """Return the function of time (s) that encloses omega, and the attitude if it is requested."""
+    """Return the function of time (s) that encloses omega and attitude."""
     a, w = exact_body(scene)[1], [Fraction(x) for x in scene.omega]
     moments = scene.exact_moments if attitude else None
     begin = _unit([Fraction(x) for x in scene.attitude or ()]) if attitude else []
@@ -112,18 +108,17 @@ class _Attitude:
     Let e be the direction of the axis of dn in the body, n the direction of the angular momentum L
     in the body, and T the kinetic energy. Then n e = c dn(u) with c > 0. The attitude is the
     product of a constant, the rotation by an angle psi about e, and the smallest rotation from n to
-    e. Euler's equations give psi' = (2 T/L + omega e)/(1 + n e).
-
-    As functions of a complex u, psi' and dn have the periods 2K and 4iK'. The poles of psi' are
-    where dn(u) = -1/c, at u = 2iK' + iy and 2iK' - iy. The residues of psi'/(2 rate) are 1/2i and
-    -1/2i, or the opposite numbers. The derivative of the phase of theta4((u - iy)/2K | 2 tau), or
-    of its conjugate, has the same periods, poles and residues. The difference is thus constant.
+    e. Euler's equations give psi' = (2 T/L + omega e)/(1 + n e). As functions of a complex u, psi'
+    and dn have the periods 2K and 4iK'. The poles of psi' are where dn(u) = -1/c, at u = 2iK' + iy
+    and 2iK' - iy. The residues of psi'/(2 rate) are 1/2i and -1/2i, or the opposite numbers. The
+    derivative of the phase of theta4((u - iy)/2K | 2 tau), or of its conjugate, has the same
+    periods, poles and residues. The difference is thus constant.
     """
 
     def __init__(
         self, orbit: Orbit, moments: Sequence[Fraction], w: list[Fraction], begin: Balls
     ) -> None:
-        """Compute the constants for the initial omega `w` (rad/s) and the quaternion `begin`."""
+        """Compute the constants for initial omega `w` (rad/s) and quaternion `begin`."""
         self.orbit = orbit
         energy = sum((i * x**2 for i, x in zip(moments, w, strict=True)), Fraction(0))
         square = sum(((i * x) ** 2 for i, x in zip(moments, w, strict=True)), Fraction(0))
@@ -159,7 +154,7 @@ class _Attitude:
         return [*omega, *product(product(self.begin, about), self._tilt(omega))]
 
     def _turn(self, u: arb) -> acb:
-        """Return the number of modulus 1 with the phase of psi/2 that is no multiple of time."""
+        """Return exp(i psi/2) without the part that is linear in time."""
         if self.orbit.m == 1:
             return _direction(self.factor * (self.slope * (u / 2).tanh()).atan())
         z = u / self.orbit.period
@@ -167,7 +162,7 @@ class _Attitude:
         return value / abs(value)
 
     def _tilt(self, omega: Balls) -> Balls:
-        """Return the unit quaternion of the smallest rotation from n to e.
+        """Return the quaternion of the smallest rotation from n to e.
 
         Its angle is less than a right angle, because n e is above 0.
         """
@@ -181,10 +176,7 @@ class _Attitude:
 
 
 def _rotated(q: Balls, half: list[Fraction]) -> Balls:
-    """Return the quaternion `q` times that of the rotation by the vector 2 `half` (rad).
-
-    If `q` is empty, because no attitude is requested, the result is empty.
-    """
+    """Return `q` times the rotation by the vector 2 `half` (rad); empty if `q` is."""
     angle = ball(sum((x**2 for x in half), Fraction(0))).sqrt()
     vector = [ball(x) * angle.sinc() for x in half]
     return list(product(q, [angle.cos(), *vector])) if q else []

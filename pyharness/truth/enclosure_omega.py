@@ -1,7 +1,6 @@
-"""Enclosures of omega in torque-free motion, in ball arithmetic (python-flint).
+"""Omega in torque-free motion by Jacobi's elliptic functions, in ball arithmetic.
 
-Omega is expressed by Jacobi's elliptic functions. `enclosure_free.py` states what the balls
-contain. Import this module only where python-flint is installed.
+Import this module only where python-flint is installed.
 """
 
 from fractions import Fraction
@@ -14,9 +13,9 @@ Balls = list[arb]
 
 
 def omega_on_ellipse(axis: int, a: list[Fraction], w: list[Fraction], t: Fraction) -> Balls:
-    """Return omega (rad/s) at time `t` (s) if the coefficient of `axis` is 0.
+    """Return omega (rad/s) at `t` (s) if the coefficient of `axis` is 0.
 
-    The component about this axis is constant, and the two others move on an ellipse.
+    That component is constant; the others move on an ellipse.
     """
     j, k = axis - 2, axis - 1
     angle = ball(-a[j] * a[k] * (w[axis] * t) ** 2).sqrt()
@@ -30,14 +29,13 @@ def omega_on_ellipse(axis: int, a: list[Fraction], w: list[Fraction], t: Fractio
 class Orbit:
     """A motion that is not steady, with coefficients that are not 0.
 
-    The components of omega about three `axes` are `sizes` (rad/s) times cn(u), sn(u) and dn(u),
-    where u = `start` + `rate` t, with `rate` in 1/s. By DLMF Table 22.13.1 they satisfy Euler's
-    equations. The parameter is `m` = k**2, and `square` is the square of the size of dn. On the
-    separatrix m = 1; cn and dn are then sech, and sn is tanh.
+    Omega about three `axes` is `sizes` (rad/s) times cn(u), sn(u) and dn(u), where u = `start` +
+    `rate` t, with `rate` in 1/s; see DLMF Table 22.13.1. `m` = k**2, and `square` is the square of
+    the size of dn. On the separatrix m = 1; cn and dn are then sech, and sn is tanh.
     """
 
     def __init__(self, a: list[Fraction], w: list[Fraction]) -> None:
-        """Compute the constants for coefficients `a` and the initial omega `w` (rad/s)."""
+        """Compute the constants for coefficients `a` and initial omega `w` (rad/s)."""
         s = [abs(x) for x in a]
         # The sign of the coefficient of the axis of sn differs from the two others.
         y = next(k for k in range(3) if a[k] * a[k - 1] < 0 and a[k] * a[k - 2] < 0)
@@ -76,7 +74,7 @@ class Orbit:
         return row
 
     def _functions(self, u: arb) -> tuple[arb, arb, arb]:
-        """Return cn, sn and dn of the argument `u` (DLMF 22.2.4 to 22.2.6)."""
+        """Return cn, sn and dn of `u` (DLMF 22.2.4 to 22.2.6)."""
         if self.m == 1:
             return u.sech(), u.tanh(), u.sech()
         whole = integer_near(u / self.period)
@@ -88,11 +86,11 @@ class Orbit:
 
 
 def integer_near(x: arb) -> int:
-    """Return an integer near the midpoint of `x`; any integer would be right for a reduction."""
+    """Return an integer near the middle of `x`; any would be right for a reduction."""
     mantissa, exponent = map(int, x.mid().man_exp())
     return round(mantissa * Fraction(2) ** exponent)
 
 
 def carlson(x: Fraction, y: Fraction, z: Fraction) -> arb:
-    """Return Carlson's integral R_F of three nonnegative numbers; at most one of them is 0."""
+    """Return Carlson's R_F of nonnegative numbers, at most one of them 0."""
     return acb.elliptic_rf(ball(x), ball(y), ball(z)).real

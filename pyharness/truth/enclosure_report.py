@@ -1,4 +1,4 @@
-"""The reports of the verb `prove`: enclosures of a solution, and checked certificates."""
+"""The reports of the verb `prove`: enclosures and checked certificates."""
 
 import json
 from collections.abc import Sequence
@@ -21,10 +21,7 @@ _RADIUS = {"omega": "radius"}
 
 
 def enclosure_report(scene: Scene, digits: int, found: Enclosure) -> Report:
-    """Return the report of an enclosure: the proved digits of the solution, and radii.
-
-    `digits` is the number of digits that was requested.
-    """
+    """Return the report of an enclosure; `digits` were requested."""
     rows = found.rows()
     lines = [line for row in rows for line in _lines(row)]
     steps = f", {counted(found.steps, 'step')}" if found.steps else ""
@@ -58,7 +55,7 @@ def enclosure_report(scene: Scene, digits: int, found: Enclosure) -> Report:
 
 
 def _lines(row: dict[str, Any]) -> list[list[Any]]:
-    """Return a line for each component: time, name, value, radius and unit."""
+    """Return time, name, value, radius and unit for each component."""
     lines = []
     for quantity, unit in _UNITS.items():
         values = row.get(quantity, ())
@@ -75,10 +72,9 @@ def _lines(row: dict[str, Any]) -> list[list[Any]]:
 
 
 def certificates_report(found: Sequence[tuple[str, dict[str, Any] | None, str]]) -> Report:
-    """Return the report of checked certificates, with the scenes and rows that they prove.
+    """Return the report of checked certificates.
 
-    Each of `found` has the name of a file, the certificate or None if it does not hold, and the
-    reason why not.
+    Each of `found` has a file's name, the certificate or None if it does not hold, and why.
     """
     verdicts = [
         [name, "not proved", None, why]
@@ -115,7 +111,7 @@ def certificates_report(found: Sequence[tuple[str, dict[str, Any] | None, str]])
 
 
 def _table(lines: Sequence[Sequence[Sequence[Any]]]) -> Table:
-    """Return the table of the lines of each row, without their units."""
+    """Return the table of each row's lines, without units."""
     columns = [
         Column("time", lambda x: f"{x:.6g}", unit="s"),
         Column("quantity", left=True),

@@ -1,14 +1,14 @@
 """Proved enclosures of the solution of any scene with a recorded torque, by Taylor steps.
 
-In each step of the integration an approximate solution p is a polynomial of time. Its residual
-p' - f(t, p) in the equation y' = f(t, y) is bounded on the whole step. The unknowns are divided
-into blocks, such as omega and the attitude. The vector r of the norms of the blocks of the error
-y - p obeys r' <= M r + d, with the bounds d of the residual. On the diagonal of M are bounds of the
-logarithmic norms of the diagonal blocks of the Jacobian of f near p, or 0 instead of negative ones;
-elsewhere are bounds of the norms of the other blocks. Since no element of M is negative, r(h) is at
-most exp(h M) (r(0) + h d). For one block this is theorem I.10.6 of Hairer, Norsett and Wanner 1993,
-Solving Ordinary Differential Equations I. The proof does not depend on how p was found. All bounds
-are computed in ball arithmetic.
+In each step an approximate solution p is a polynomial of time, whose residual p' - f(t, p) in y' =
+f(t, y) is bounded on the whole step. The unknowns are divided into blocks, such as omega and the
+attitude. The vector r of the norms of the blocks of the error y - p obeys r' <= M r + d, with the
+bounds d of the residual. On the diagonal of M are bounds of the logarithmic norms of the diagonal
+blocks of the Jacobian of f near p, or 0 instead of negative ones; elsewhere are bounds of the norms
+of the other blocks. Since no element of M is negative, r(h) is at most exp(h M) (r(0) + h d). For
+one block this is theorem I.10.6 of Hairer, Norsett and Wanner 1993, Solving Ordinary Differential
+Equations I. The proof does not depend on how p was found. All bounds are computed in ball
+arithmetic.
 """
 
 import math
@@ -52,11 +52,8 @@ def enclose_steps(
 ) -> Enclosure:
     """Return balls that contain the solution of a scene at `times` (s).
 
-    The times have one sign, and each is farther from 0 than the one before. The radius of a ball of
-    omega is at most 10**-digits, times the largest component of omega if it exceeds 1 rad/s. The
-    result has balls of the attitude if the scene has one, and of the quantities that `velocity` and
-    `transition` request. `effort` is a factor on the limit of the number of steps. Raise InputError
-    if the torque is opaque, if no enclosure is found at some time, or if too many steps are needed.
+    The arguments are those of `enclosure.enclose`. Raise InputError if the torque is opaque, if no
+    enclosure is found at some time, or if too many steps are needed.
     """
     limit = _MOST_STEPS * checked_effort(effort)
     wanted = float(digits + 2)
@@ -108,7 +105,7 @@ class _NoStepError(Exception):
 
 @dataclass
 class _State:
-    """A middle and, for each block of unknowns, the radius of its ball in scaled units."""
+    """A middle and the radius of each block's ball in scaled units."""
 
     time: Fraction
     middle: list[Any]  # exact balls
@@ -116,7 +113,7 @@ class _State:
 
 
 def _upper(x: Any) -> Any:
-    """Return the upper end of a ball, exactly; raise _NoStepError if it is not finite."""
+    """Return a ball's exact upper end; raise _NoStepError if it is not finite."""
     end = arb(x).upper()
     if not end.is_finite():
         raise _NoStepError
@@ -124,13 +121,13 @@ def _upper(x: Any) -> Any:
 
 
 def _terms(x: Any, count: int) -> list[Any]:
-    """Return the first coefficients of a power series, or of a constant."""
+    """Return the first coefficients of a power series or constant."""
     found = x.coeffs() if isinstance(x, arb_series) else [arb(x)]
     return [*found, *[arb(0)] * (count - len(found))][:count]
 
 
 def _expanded(rates: Rates, begin: Any, middle: Sequence[Any], order: int) -> list[list[Any]]:
-    """Return Taylor coefficients 0 to `order` of the solution, approximately, as exact balls.
+    """Return approximate Taylor coefficients 0 to `order` of the solution, as exact balls.
 
     Each of Picard's iterations adds one coefficient.
     """
@@ -165,7 +162,7 @@ class _Proof:
         return _upper(sum((_upper(abs(x) / s) ** 2 for x, s in parts), arb(0)).sqrt())
 
     def balls(self, attitude: bool) -> list[Balls]:
-        """Return the balls of each group of unknowns; those of the attitude are normalised."""
+        """Return the balls of each group of unknowns, the attitude's normalised."""
         found = []
         for n, (block, radius) in enumerate(zip(self.blocks, self.state.radii, strict=True)):
             pairs = zip(self.state.middle[block], self.scales[block], strict=True)
@@ -202,7 +199,7 @@ class _Proof:
         raise InputError(f"prove: no enclosure is found beyond t = {float(state.time):.6g} s")
 
     def _length(self, terms: list[list[Any]]) -> Fraction:
-        """Return a length of a step (s) with which the last terms are about the tolerance."""
+        """Return a step (s) with which the last terms are about the tolerance."""
         least = 40.0  # binary logarithm of the longest step
         for block in self.blocks:
             size = max(0.0, *(_log2(each[0]) for each in terms[block]))
@@ -215,7 +212,7 @@ class _Proof:
         return Fraction(mantissa, 2**_LENGTH_BITS) * Fraction(2) ** exponent
 
     def _radii(self, rates: Rates, terms: list[list[Any]], h: Fraction) -> list[Any]:
-        """Return bounds of the errors in each block during a step of the length `h` (s)."""
+        """Return bounds of the errors of each block during a step `h` (s)."""
         length, state = abs(ball(h)), self.state
         begin = ball(state.time)
         sizes = [[abs(x) * length**k for k, x in enumerate(each)] for each in terms]
@@ -261,8 +258,8 @@ class _Proof:
     def _rests(self, rates: Rates, terms: list[list[Any]], h: Fraction, count: int) -> list[Any]:
         """Return bounds of the terms from number `count` on of the rates along the polynomials.
 
-        If the rates are at most M on a disc whose radius is c steps, term number k is at most
-        M c**-k at the end of the step, by Cauchy's estimate. The bounds are geometric series.
+        If the rates are at most M on a disc whose radius is c steps, term number k is at most M
+        c**-k at the end of the step, by Cauchy's estimate. The bounds are geometric series.
         """
         length = abs(ball(h))
         best: list[Any] | None = None
@@ -287,11 +284,7 @@ class _Proof:
         return best
 
     def _growth(self, rates: Rates, time: Any, inputs: list[Any]) -> Any:
-        """Return the matrix that bounds the growth of the radii (1/s).
-
-        On its diagonal are bounds of the logarithmic norms of the diagonal blocks of the Jacobian,
-        and 0 instead of negative ones; elsewhere are bounds of the norms of the other blocks.
-        """
+        """Return the matrix M of the module's docstring, which bounds the growth of radii (1/s)."""
         count = len(inputs)
         unit = [[arb(int(i == j)) for j in range(count)] for i in range(count)]
         found = rates(time, [Dual(x, row) for x, row in zip(inputs, unit, strict=True)])
@@ -313,7 +306,7 @@ class _Proof:
 
 
 def _log_norm(part: list[list[Any]]) -> Any:
-    """Return a bound, at least 0, of the logarithmic norm of a matrix (by Gershgorin's circles)."""
+    """Return a bound, at least 0, of a matrix's logarithmic norm, by Gershgorin's circles."""
     largest = arb(0)
     for i, row in enumerate(part):
         others = sum((_upper(abs(x + part[j][i]) / 2) for j, x in enumerate(row) if j != i), arb(0))
@@ -335,6 +328,6 @@ def _value(terms: Sequence[Any], offset: Any) -> Any:
 
 
 def _log2(x: Any) -> float:
-    """Return the binary logarithm of the middle of a ball, roughly; -inf for 0."""
+    """Return roughly the binary logarithm of a ball's middle; -inf for 0."""
     middle = abs(x.mid())
     return float(middle.log()) / math.log(2.0) if middle > 0 else -math.inf

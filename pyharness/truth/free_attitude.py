@@ -1,11 +1,9 @@
-"""Attitude of a torque-free body at any time in decimal arithmetic, to check other methods.
+"""Attitude of a torque-free body at any time in decimals, to check other methods.
 
-In each period of omega the body rotates about the angular momentum by the same angle. Therefore an
-integration of omega and attitude over one period, by Taylor series, determines the attitude at any
-time. Near the separatrix the motion amplifies the errors of omega exponentially. The integration
-therefore consists of segments, and each segment starts from omega of `elliptic.py`, which has no
-such errors. This module shares no code with the closed form that it checks. It uses no theta
-function.
+In each period of omega the body rotates about the angular momentum by the same angle, so that a
+Taylor integration over one period determines the attitude at any time. Near the separatrix errors
+of omega grow exponentially; the integration therefore consists of segments that start from omega of
+`elliptic.py`. It shares no code with the closed form that it checks, and uses no theta function.
 """
 
 import decimal
@@ -34,11 +32,10 @@ _MOST_RADIANS = 1e5
 def free_attitude(scene: Scene, time: float) -> Row:
     """Return the attitude of a scene without torque at `time` (s), as a unit quaternion.
 
-    The quaternion is a continuous function of time, which determines its sign. The scene must have
-    moments and an attitude. The motion is integrated over at most one period of omega, which is
-    long near the separatrix. On the separatrix omega has no period, but approaches a steady
-    rotation. There the motion is integrated until the rotation is steady to all digits. Raise
-    InputError if the integration takes too many steps, or if the torque depends on the state.
+    It is continuous in time, which determines its sign. The scene must have moments and an
+    attitude. On the separatrix, where omega has no period, the motion is integrated until the
+    rotation is steady to all digits. Raise InputError if the integration takes too many steps, or
+    if the torque depends on the state.
     """
     checked_scene(scene)
     assert scene.attitude is not None
@@ -65,18 +62,18 @@ def free_attitude(scene: Scene, time: float) -> Row:
 
 
 def period_of(scene: Scene) -> Decimal | None:
-    """Return the period of omega (s) of a torque-free scene, or None on the separatrix.
+    """Return the period of omega (s) without torque, or None on the separatrix.
 
-    The period is accurate to nearly all digits of the current decimal arithmetic.
+    It is accurate to nearly all digits of the current decimal arithmetic.
     """
     return _rate_and_period(scene)[1]
 
 
 def _rate_and_period(scene: Scene) -> tuple[Decimal, Decimal | None]:
-    """Return the rate (1/s) of the elliptic functions in omega, and the period of omega (s).
+    """Return the rate (1/s) of the elliptic functions, and omega's period (s) or None.
 
-    The period is None on the separatrix. There, and near the separatrix, perturbations grow by at
-    most some exp(rate * time).
+    The period is None on the separatrix. On it and near it perturbations grow by at most some
+    exp(rate * time).
     """
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     low, middle, high = sorted(range(3), key=lambda axis: i[axis])
@@ -100,10 +97,10 @@ def _rate_and_period(scene: Scene) -> tuple[Decimal, Decimal | None]:
 
 
 def _settling_time(scene: Scene, rate: Decimal) -> Decimal:
-    """Return a time (s) from which on a motion on the separatrix is steady to all digits.
+    """Return a time (s) beyond which, either way, a separatrix motion is steady to all digits.
 
-    The time is valid in both directions. The components about the outer axes are proportional to
-    sech(rate * time - u), where exp(abs(u)) is at most 2/sech(u).
+    The components about the outer axes are proportional to sech(rate * time - u), where exp(abs(u))
+    is at most 2/sech(u).
     """
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     low, middle, high = sorted(range(3), key=lambda axis: i[axis])
@@ -115,7 +112,7 @@ def _settling_time(scene: Scene, rate: Decimal) -> Decimal:
 
 
 def _rotated(q: Row, omega: Row, time: Decimal) -> Row:
-    """Return the attitude `q` after a rotation with constant `omega` (rad/s) for `time` (s)."""
+    """Return the attitude `q` after `time` (s) with constant `omega` (rad/s)."""
     speed = sum((w * w for w in omega), Decimal(0)).sqrt()
     sine, cosine = sine_cosine(speed * time / 2)
     across = [w * sine / speed for w in omega] if speed else omega
@@ -123,24 +120,21 @@ def _rotated(q: Row, omega: Row, time: Decimal) -> Row:
 
 
 def is_steady(scene: Scene) -> bool:
-    """Return whether omega of a scene without torque is constant (steady rotation or rest)."""
+    """Return whether omega is constant without torque."""
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     return all((i[a - 1] - i[a - 2]) * w[a - 1] * w[a - 2] == 0 for a in range(3))
 
 
 def conjugate(q: Row) -> Row:
-    """Return the conjugate of a quaternion whose scalar component comes first.
-
-    The conjugate of a unit quaternion represents the inverse rotation.
-    """
+    """Return the conjugate of a quaternion, scalar first."""
     return [q[0], -q[1], -q[2], -q[3]]
 
 
 def _followed(scene: Scene, times: Row, rate: Decimal) -> list[Row]:
-    """Return the attitude at each of `times` (s), which lead away from 0 on one side.
+    """Return the attitude at each of `times` (s), which lead away from 0.
 
-    In a segment of length 1/`rate` errors grow by a factor of some e. Raise InputError if the body
-    rotates by more than the work limit.
+    In a segment of length 1/`rate` errors grow by a factor of some e. Raise InputError beyond the
+    work limit.
     """
     angle = max(map(abs, scene.omega)) * float(abs(times[-1]))
     if angle > _MOST_RADIANS:

@@ -1,9 +1,8 @@
-"""A second reference for the solutions of scenes, by Taylor series in integer arithmetic.
+"""A second reference, by Taylor series in integer arithmetic.
 
-It shares no code with the first reference (`truth/reference.py`). A number is represented by an
-integer over 2**BITS. The units are chosen so that the last requested time is 1, and the largest
-omega is about 1. The sines and cosines of the torque are unknowns of the Taylor series, like omega.
-Therefore no library function is needed for them.
+It shares no code with the first (`truth/reference.py`). A number is an integer over 2**BITS, in
+units in which the last time is 1 and the largest omega about 1. The sines and cosines of the torque
+are unknowns like omega, so that no library function is needed.
 """
 
 from collections.abc import Sequence
@@ -34,7 +33,7 @@ Series = list[int]
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The true solution of one scene at the requested times, and at many times between them."""
+    """The solution of one scene at the requested times, and at many between them."""
 
     time: Array  # shape (n,); as requested, s
     omega: Array  # shape (n, 3); rounded to binary64, rad/s
@@ -43,10 +42,7 @@ class Path:
 
 
 class _OtherUnitError(Exception):
-    """An exception which reports that the unit of omega is too small or too large for omega.
-
-    The integration must be repeated with a unit that is 2**power times as large.
-    """
+    """The unit of omega must be 2**power times as large."""
 
     def __init__(self, power: int) -> None:
         super().__init__()
@@ -54,12 +50,11 @@ class _OtherUnitError(Exception):
 
 
 def integer_series(scene: Scene, times: Sequence[float]) -> Path:
-    """Return the true solution of a scene at `times` (s); the scene's step size is not used.
+    """Return the true solution of a scene at `times` (s).
 
-    The times are all positive or all negative, and each is farther from 0 than the one before.
-    Before it is rounded to binary64, the solution has an error of some 1e-29 of the largest omega,
-    times the error amplification of the motion. Raise InputError if omega grows without bound
-    before the last time, or if too many steps would be needed.
+    The times have one sign and lead away from 0. Before rounding to binary64 the error is some
+    1e-29 of the largest omega, times the error amplification. Raise InputError if omega grows
+    without bound before the last time, or if too many steps would be needed.
     """
     power = _power_of(_guess(scene, abs(Fraction(times[-1]))))
     for _ in range(_MOST_GUESSES):
@@ -71,10 +66,9 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
 
 
 def _guess(scene: Scene, span: Fraction) -> Fraction:
-    """Return a guess of the largest omega (rad/s) from time 0 to `span` (s).
+    """Return a guess of the largest omega (rad/s) up to `span` (s).
 
-    It is the larger of two numbers: the initial omega, and a bound of the omega that the torque
-    alone would cause.
+    The larger of the initial omega and a bound of what the torque alone would cause.
     """
     law = scene.body_torque
     found = [abs(Fraction(w)) for w in scene.omega]
@@ -90,9 +84,9 @@ def _power_of(size: Fraction) -> int:
 
 
 def _integrate(scene: Scene, times: Sequence[float], power: int) -> Path:
-    """Return the solution at `times` (s), integrated with omega in units of 2**power rad/s.
+    """Return the solution, integrated with omega in units of 2**power rad/s.
 
-    Raise _OtherUnitError if this unit is found to be too large or too small for omega.
+    Raise _OtherUnitError if the unit is too large or too small.
     """
     span = Fraction(times[-1])
     wanted = [Fraction(t) / span for t in times]
@@ -143,9 +137,9 @@ def _integrate(scene: Scene, times: Sequence[float], power: int) -> Path:
 
 
 def _at(terms: Series, part: Fraction) -> Fraction:
-    """Return the value of a Taylor series at the fraction `part` of its step.
+    """Return a Taylor series at the fraction `part` of its step.
 
-    `terms` are its Taylor terms at the end of the step, as integers in units of 2**-160.
+    `terms` are at the end of the step, in units of 2**-160.
     """
     fixed = _fixed(part)
     total = 0
@@ -162,9 +156,8 @@ def _fixed(value: Fraction) -> int:
 class _Wave:
     """All torque terms of one frequency, as two unknowns: a sine and a cosine.
 
-    The unknowns are integrated by Taylor series. If the angle, frequency times the last requested
-    time, is below 1 rad, the first unknown is the sine divided by this angle. A sine of large
-    amplitude then has its full number of digits.
+    If the angle up to the last time is below 1 rad, the first is the sine divided by this angle, so
+    that a sine of large amplitude has all its digits.
     """
 
     to_sine: int  # the derivative of the unknown sine is `to_sine` times the cosine
@@ -174,9 +167,9 @@ class _Wave:
 
 
 def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
-    """Return the exact divisors of torques, and the exact coefficients A, B, C of a scene's body.
+    """Return the exact divisors of torques, and A, B, C.
 
-    The divisors are the moments of inertia (kg m2), or 1 for a body specified by coefficients.
+    The divisors are the moments (kg m2), or 1 for a body specified by coefficients.
     """
     moments = list(scene.exact_moments or (Fraction(1),) * 3)
     if scene.coefficients is not None:
@@ -185,9 +178,9 @@ def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
 
 
 class _Equations:
-    """Euler's equations (13-15 of the thesis) of one scene, as recurrences of Taylor terms.
+    """Equations 13-15 of one scene, as recurrences of Taylor terms.
 
-    The unit of time is `span`, the last requested time (s). The unit of omega is `unit` (rad/s).
+    The unit of time is `span`, the last time (s), and that of omega `unit` (rad/s).
     """
 
     def __init__(self, scene: Scene, span: Fraction, unit: Fraction) -> None:
@@ -223,10 +216,8 @@ class _Equations:
     def expand(self, state: Series, begin: int, length: int) -> list[Series]:
         """Return the Taylor terms of all unknowns at the end of a step.
 
-        `state` contains the values of the unknowns at the beginning of the step. Term k is the
-        Taylor coefficient k times power k of the step, for k from 0 to the order. `begin` is the
-        time at the beginning of the step and `length` is its length, both in units of 2**-64 of the
-        last requested time.
+        `state` is at its beginning. Term k is coefficient k times power k of the step. `begin` and
+        `length` are in units of 2**-64 of the last time.
         """
 
         def stepped(x: int) -> int:

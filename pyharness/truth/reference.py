@@ -1,9 +1,8 @@
 """The reference: the true solution of a scene, with a bound of its error.
 
-A sphere, and a symmetric body without torque, have a known solution in closed form. Any other scene
-is solved by the Taylor series of equations 13-15 in decimal arithmetic. The reference shares no
-code with the methods that it checks. Unlike these methods, it uses exact Euler coefficients. Its
-arithmetic and its steps differ from those of the methods.
+A sphere, and a symmetric body without torque, have a closed form. Any other scene is solved by the
+Taylor series of equations 13-15 in decimals. It shares no code with the methods that it checks, and
+uses exact Euler coefficients.
 """
 
 import decimal
@@ -36,7 +35,7 @@ _BY_CHANCE = 4
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The true solution of one scene at requested times, rounded to binary64, with its error."""
+    """The solution at requested times, rounded to binary64, with its error."""
 
     time: Array  # shape (n,), s; the requested times, up to the last one with finite omega
     omega: Array  # shape (n, 3), rad/s
@@ -55,7 +54,7 @@ class Reference:
     def angle_error(self) -> float:
         """Return a bound of the error of any attitude (rad).
 
-        It is the estimated error before rounding plus the rounding errors of the attitude.
+        It is the estimated error plus the rounding error.
         """
         return self.angle_estimate + 4.0 * _HALF_ULP
 
@@ -63,7 +62,7 @@ class Reference:
     def error(self) -> float:
         """Return a bound of the error of any omega (rad/s).
 
-        It is the estimated error before rounding plus the rounding error of the largest omega.
+        It is the estimated error plus the rounding error of the largest omega.
         """
         largest = float(np.max(np.abs(self.omega), initial=0.0))
         return self.estimate + _HALF_ULP * largest
@@ -78,20 +77,15 @@ def reference(
 ) -> Reference:
     """Return the true solution of `scene` at `times` (s).
 
-    All times have the same sign, and each is farther from 0 than the one before; the first may be
-    0. An integration by Taylor series is accurate to more digits than binary64 has. If `precise` is
-    true, it is accurate to 1e-25 before rounding, unless the motion amplifies errors too much. The
-    error of the series is estimated by the largest difference between two integrations with
-    different order and steps, or by four times this difference if `precise` is true. `effort` is a
-    factor on a work limit of some ten seconds. The pace of the first steps decides whether the
-    whole integration would exceed the limit. If `effort` is None, the limit is 100 000 steps. If
-    the scene has an attitude, the result contains attitudes, which are always computed by the
-    series. `velocity` requests the translational velocity.
-
-    Raise InputError if the times are not in order, if a moment that changes with time reaches 0, or
-    if the series needs too many steps. A torque
-    that depends on the state must be recorded, and needs the scene's attitude if it depends on it.
-    The result ends before the first time at which such a torque is singular.
+    The times have one sign and lead away from 0; the first may be 0. If `precise`, the series is
+    accurate to 1e-25 before rounding, unless the motion amplifies errors too much. Its error is
+    estimated by the largest difference of two integrations with different order and steps; by four
+    times that if `precise`. `effort` is a factor on a work limit of some ten seconds, judged by the
+    pace of the first steps; None means 100 000 steps. Attitudes, if the scene has one, are always
+    by the series. Raise InputError if the times are not in order, if a moment that changes with
+    time reaches 0, or if the series needs too many steps. A torque that depends on the state must
+    be recorded, and needs the scene's attitude if it depends on it. The result ends before such a
+    torque is singular.
     """
     if scene.changing is not None:
         scene.changing.check(times)
@@ -133,7 +127,7 @@ def reference(
 
 
 def _check_torque(scene: Scene) -> None:
-    """Raise InputError if the torque depends on the state and has no Taylor series."""
+    """Raise InputError if the torque depends on the state without Taylor series."""
     if not isinstance(scene.torque, StateTorque):
         return
     if scene.torque.tape is None:
@@ -148,11 +142,10 @@ def _check_torque(scene: Scene) -> None:
 
 
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
-    """Return omega of a sphere, or of a symmetric body without torque, in closed form, else None.
+    """Return omega (rad/s) in closed form of a sphere or free symmetric body, else None.
 
-    The result has a row of omega (rad/s) for each of `times` (s). It has as many digits after the
-    decimal point as the current decimal arithmetic has digits. Therefore an angle of 1e41 rad is
-    computed with some 41 additional digits.
+    It has as many digits after the decimal point as the current arithmetic has digits: an angle of
+    1e41 rad is computed with some 41 more.
     """
     if isinstance(scene.torque, StateTorque) or scene.changing is not None:
         return None
@@ -162,10 +155,7 @@ def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 
 def _digits_before_the_point(scene: Scene, time: Decimal) -> int:
-    """Return a bound of the number of digits before the decimal point in a known solution.
-
-    The bound applies to all numbers that occur in the solution from time 0 to `time` (s).
-    """
+    """Return a bound of the digits before the point of all numbers up to `time` (s)."""
     law = scene.body_torque
     omega = max(Decimal(abs(w)) for w in scene.omega)
     rate = max(map(abs, exact_coefficients(scene))) * omega
@@ -205,10 +195,7 @@ def _known_rows(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 
 def _sphere(scene: Scene, t: Decimal) -> Row:
-    """Return omega (rad/s) of a sphere at time t (s).
-
-    It is omega at time 0 plus the time integral of the torque, divided by the moment of inertia.
-    """
+    """Return omega (rad/s) of a sphere at t (s), from the time integral of the torque."""
     torque = scene.body_torque
     row = []
     for axis in range(3):
@@ -229,7 +216,7 @@ def _sphere(scene: Scene, t: Decimal) -> Row:
 
 
 def exact_coefficients(scene: Scene) -> Row:
-    """Return A, B, C of Euler's equations to all digits of the current decimal arithmetic."""
+    """Return A, B, C to all digits of the current decimal arithmetic."""
     if scene.coefficients is not None:
         return [Decimal(x) for x in scene.coefficients]
     i1, i2, i3 = divisors(scene)
@@ -238,7 +225,7 @@ def exact_coefficients(scene: Scene) -> Row:
 
 
 def _is_number(x: Decimal) -> bool:
-    """Return whether a decimal number is finite after it is rounded to binary64."""
+    """Return whether a decimal is finite after rounding to binary64."""
     return math.isfinite(float(x))
 
 

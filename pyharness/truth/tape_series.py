@@ -1,7 +1,7 @@
 """Taylor coefficients, in decimal arithmetic, of a torque that is recorded on a tape.
 
-The recurrences are those of Jorba and Zou 2005, Experimental Mathematics 14. The coefficients of
-all operations are computed order by order, together with those of the solution.
+The recurrences, order by order together with the solution, are those of Jorba and Zou 2005,
+Experimental Mathematics 14.
 """
 
 from bisect import bisect_left, bisect_right
@@ -36,8 +36,7 @@ class _Power(NamedTuple):
     """A product of many factors.
 
     `factors` counts how often each slot is a factor. `scale` is the decimal logarithm of the
-    largest coefficient with which the product is used. `divisors` are the slots beside which it is
-    small or large.
+    product's largest coefficient. `divisors` are the slots beside which it is small or large.
     """
 
     factors: Counter[int]
@@ -50,10 +49,9 @@ _Sum = tuple[Decimal, list[tuple[Decimal, int]]]
 
 
 def series_products(tape: Tape) -> int:
-    """Return the number of products of two series that each order of a tape's series takes.
+    """Return the number of products of two series in each order of a tape.
 
-    A sine and a cosine are computed together, by two products, and so are a hyperbolic tangent and
-    its derivative. A table takes none.
+    A sine with its cosine, and a hyperbolic tangent with its derivative, take two; a table none.
     """
     waves = ("sine", "cosine")
     angles = {each.operands for each in tape.operations if each.kind in waves}
@@ -62,14 +60,14 @@ def series_products(tape: Tape) -> int:
 
 
 class TapeSeries:
-    """The Taylor series of the operations of a tape around a time.
+    """The Taylor series of a tape's operations around a time.
 
-    The method `begin` starts an expansion. Each call of `next` adds one coefficient to the series
-    of every operation. `least_order` is the order that shows the powers of the tape.
+    `begin` starts an expansion, and each `next` adds a coefficient to all series. `least_order` is
+    the order that shows the tape's powers.
     """
 
     def __init__(self, tape: Tape) -> None:
-        """Convert the numbers of the tape to Decimal, in the current arithmetic."""
+        """Convert the tape's numbers to the current decimal arithmetic."""
         self._operations = [(each, _sum(each.linear)) for each in tape.operations]
         self._outputs = [_sum(each) for each in tape.outputs]
         # Each table, by the slot of its operation, and the exact times at which its pieces begin.
@@ -90,10 +88,9 @@ class TapeSeries:
     ) -> None:
         """Begin an expansion around `time` (s).
 
-        `omega` and `attitude` are the lists of the Taylor coefficients of the unknowns. The caller
-        extends these lists. `attitude` is empty if the tape does not depend on the attitude. If a
-        piece of a table ends at `time` and another begins, the later one is expanded if `forward`
-        is true, and otherwise the earlier one.
+        The caller extends `omega` and `attitude`, the coefficients of the unknowns; the latter is
+        empty if the tape does not use it. At a break of a table the later piece is expanded if
+        `forward`, else the earlier one.
         """
         self._order = 0
         self._tables = {
@@ -109,10 +106,10 @@ class TapeSeries:
         self._slopes: dict[int, Row] = {}
 
     def next(self) -> Row:
-        """Return the next Taylor coefficients of the three outputs, beginning with number 0.
+        """Return the next Taylor coefficients of the three outputs, from number 0.
 
-        The lists of the unknowns must contain the coefficients up to the same number. Raise
-        ArithmeticError if an operation is singular at the time of the expansion.
+        The unknowns must have the coefficients up to the same number. Raise ArithmeticError if an
+        operation is singular.
         """
         k = self._order
         if k > 0:
@@ -128,7 +125,7 @@ class TapeSeries:
         return sum((factor * self._slots[slot][k] for factor, slot in terms), start)
 
     def _coefficient(self, operation: Operation, linear: _Sum, slot: int, k: int) -> Decimal:
-        """Return Taylor coefficient k of an operation, whose series has coefficients 0 to k - 1."""
+        """Return Taylor coefficient k of an operation, whose series has 0 to k - 1."""
         kind, operands, _, table = operation
         if kind == "linear":
             return self._combined(linear, k)
@@ -152,7 +149,7 @@ class TapeSeries:
         return (sine if kind == "sine" else cosine)[k]
 
     def _wave(self, operand: int, k: int) -> tuple[Row, Row]:
-        """Return the series of sine and cosine of a slot, with the coefficients 0 to k."""
+        """Return coefficients 0 to k of sine and cosine of a slot."""
         if k == 0 and operand not in self._waves:
             angle = self._slots[operand][0]
             if abs(angle) > _LARGEST_ANGLE:
@@ -169,10 +166,7 @@ class TapeSeries:
         return sine, cosine
 
     def _tangent(self, operand: int, found: Row, k: int) -> Decimal:
-        """Return coefficient k of the hyperbolic tangent of a slot.
-
-        `found` contains the coefficients 0 to k - 1.
-        """
+        """Return coefficient k of the hyperbolic tangent of a slot; `found` has 0 to k - 1."""
         if k == 0:
             x = self._slots[operand][0]
             small = (-2 * abs(x)).exp()
@@ -184,21 +178,20 @@ class TapeSeries:
         return new
 
     def _slope(self, operand: int, k: int) -> Row:
-        """Return the coefficients 1 to k of a slot, each multiplied by its number."""
+        """Return the coefficients 1 to k of a slot, each times its number."""
         slope = self._slopes.setdefault(operand, [])
         if len(slope) < k:
             slope.append(k * self._slots[operand][k])
         return slope
 
     def reach(self, length: Decimal) -> Decimal:
-        """Return the length (s) of the step, reduced so that every operation's series converges.
+        """Return the step (s), reduced so that every operation's series converges.
 
-        An exponential may be so small at the beginning of a step that it changes no digit, and
-        large a little later. Therefore its argument changes by at most half the order, unless the
-        exponential stays invisible. The derivative of a hyperbolic tangent is such a pulse too. A
-        divisor has no zero in the circle around the beginning of the step. The terms of a product
-        of many factors, such as a power, are of at most half the order in the mean, unless the
-        product stays invisible.
+        An exponential may be invisible at the beginning of a step and large a little later.
+        Therefore its argument changes by at most half the order, unless it stays invisible; a
+        hyperbolic tangent's derivative is such a pulse too. A divisor has no zero in the circle
+        around the beginning. The terms of a product of many factors are of at most half the order
+        in the mean, unless it stays invisible.
         """
         for operation, _ in self._operations:
             most = self._largest_change(operation)
@@ -232,7 +225,7 @@ class TapeSeries:
         return 2 * order > self._order and size > least
 
     def _largest_change(self, operation: Operation) -> Decimal | None:
-        """Return by how much the last operand of an operation may change in a step, if limited."""
+        """Return by how much an operation's last operand may change in a step, or None."""
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
         x = self._slots[operation.operands[-1]][0]
@@ -244,18 +237,14 @@ class TapeSeries:
         return max(Decimal(self._order) / 2, 2 * abs(x) - _INVISIBLE) / 2
 
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
-        """Return the next time (s) after `time` at which a table changes, or None if there is none.
-
-        If `forward` is false, it is the next time before `time`.
-        """
+        """Return the next time (s) after (or before) `time` at which a table changes, or None."""
         place = (bisect_right if forward else bisect_left)(self._changes, time) - (not forward)
         return self._changes[place] if 0 <= place < len(self._changes) else None
 
     def crosses_a_branch(self, offset: Decimal) -> bool:
-        """Return whether a square root reaches 0 between the expansion's time and `offset` (s) on.
+        """Return whether a square root reaches 0 up to `offset` (s) from the expansion.
 
-        Beyond a double zero of its operand, the Taylor series of a square root is its negative. For
-        example, the series of sqrt(x**2) is that of x or -x, whereas the root is abs(x).
+        Beyond a double zero the series is the negative of the root: that of sqrt(x**2) is x or -x.
         """
         for slot, (operation, _) in enumerate(self._operations, N_INPUTS):
             if operation.kind == "sqrt":
@@ -267,7 +256,7 @@ class TapeSeries:
 
 
 def _powers(tape: Tape) -> tuple[list[_Power], int]:
-    """Return the products of many factors that are not merely factors, and the most factors.
+    """Return the products that are not merely factors of others, and the most factors.
 
     A sum has as many factors as one of its terms.
     """
@@ -296,7 +285,7 @@ def _powers(tape: Tape) -> tuple[list[_Power], int]:
 
 
 def _divisors(tape: Tape) -> dict[int, set[int]]:
-    """Return the divisors of the quotients that each slot is a part of, and arguments of roots."""
+    """Return the divisors and arguments of roots of which each slot is a part."""
     found: dict[int, set[int]] = {}
     for slot, (kind, operands, linear, _) in reversed([*enumerate(tape.operations, N_INPUTS)]):
         parts = operands if linear is None else [each for each, _ in linear.terms]
@@ -312,10 +301,10 @@ def _divisors(tape: Tape) -> dict[int, set[int]]:
 
 
 def _sum(linear: Linear | None) -> _Sum:
-    """Return a linear combination in the current decimal arithmetic; 0 for None.
+    """Return a linear combination in the current arithmetic; 0 for None.
 
-    The numbers of a tape are exact binary fractions. They are rounded to the current arithmetic
-    like all others, so that equal numbers have the difference 0.
+    A tape's exact binary fractions are rounded like all others, so that equal numbers have the
+    difference 0.
     """
     if linear is None:
         return Decimal(0), []
@@ -323,11 +312,7 @@ def _sum(linear: Linear | None) -> _Sum:
 
 
 def _expanded(table: Table, breaks: Row, time: Decimal, forward: bool) -> Row:
-    """Return the Taylor coefficients 0 to 3 of a piece of a table around `time` (s).
-
-    It is the piece that holds from `time` on, or if `forward` is false, until `time`. `breaks` are
-    the breaks of the table.
-    """
+    """Return coefficients 0 to 3 of the piece of a table from (or until) `time` (s)."""
     piece = max(0, (bisect_right if forward else bisect_left)(breaks, time) - 1)
     c0, c1, c2, c3 = map(Decimal, table.pieces[piece])
     s = time - breaks[piece]
@@ -335,10 +320,10 @@ def _expanded(table: Table, breaks: Row, time: Decimal, forward: bool) -> Row:
 
 
 def _root_coefficient(x: Row, root: Row, k: int) -> Decimal:
-    """Return Taylor coefficient k of the square root of x.
+    """Return Taylor coefficient k of the square root of x; `root` has 0 to k - 1.
 
-    `root` contains the coefficients 0 to k - 1 of the root. If x is 0 throughout, so is its root.
-    Raise ArithmeticError where x is 0 and changes, because the root then has no Taylor series.
+    If x is 0 throughout, so is its root. Raise ArithmeticError where x is 0 and changes, because
+    the root then has no Taylor series.
     """
     if k == 0:
         return x[0].sqrt()

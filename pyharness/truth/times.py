@@ -8,7 +8,7 @@ from pyharness.model.errors import InputError
 
 
 def check_order(times: Sequence[float], who: str) -> None:
-    """Raise InputError unless times are finite, of one sign, and each farther from 0 than before.
+    """Raise InputError unless times are finite, of one sign, and lead away from 0.
 
     The first time may be 0. The text `who` names the computation in the message.
     """

@@ -58,11 +58,9 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 
 
 def _agreement(name: Name, listing: Listing, scene: Scene, is_listed: bool, *options: Any) -> Check:
-    """Return the check that the Fortran and the Python version of a program agree to the last bit.
+    """Return the check that both versions agree; a listed difference must still occur.
 
-    If `is_listed`, a difference is known (`data/divergences.toml`), and the check fails if it no
-    longer occurs. `options` are the constant of the Runge-Kutta program's stop test (1/s) and
-    whether the test may stop the run.
+    `options` are the stop constant (1/s) and whether the stop test may end the run.
     """
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))

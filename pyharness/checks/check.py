@@ -31,10 +31,9 @@ BITS = Basis(
 class Name:
     """The name of a check; its parts, joined by slashes, form the id, as in ``cells/two-term``.
 
-    `suite` is a kind of checks of `verify` or a trial of `stress`, `subject` the program or method,
-    `circumstance` the problem (``case-3``), `setting` the tolerance, step size or listing, and
-    `quantity` the number that is compared. `options` repeat the check in addition to ``--only``;
-    `scene` can be saved in a file.
+    `suite` is a kind of checks of `verify` or a trial of `stress`, `subject` a program or method,
+    `circumstance` a problem, `setting` a tolerance, step size or listing, and `quantity` the number
+    that is compared. `options` repeat the check, beside ``--only``.
     """
 
     suite: str
@@ -48,10 +47,7 @@ class Name:
 
     @property
     def id(self) -> str:
-        """Return the non-empty parts of the name joined by slashes; ids are unique within a run.
-
-        In the suites ``random`` and ``external`` the circumstance is before the subject.
-        """
+        """Return the id, unique within a run; in some suites circumstance is before subject."""
         who = self.subject, self.circumstance
         who = who[::-1] if self.suite in _CIRCUMSTANCE_FIRST else who
         return "/".join(filter(None, (self.suite, *who, self.setting, self.quantity)))
@@ -84,10 +80,7 @@ class Name:
         limit: float | None = None,
         basis: Basis | None = None,
     ) -> "Check":
-        """Return a check whose result `passed` the caller has decided, with `note` as the reason.
-
-        `value` and `limit` are only shown.
-        """
+        """Return a check that the caller has decided; `value` and `limit` are only shown."""
         return Check(self, bool(passed), value, limit, basis, note)
 
     def described(self, value: float | None, note: str = "") -> "Check":
@@ -176,10 +169,7 @@ Attempts = Iterable[Check | Attempt]
 def made(
     attempts: Attempts, only: Sequence[str], raised: tuple[type[Exception], ...] = (NotBuiltError,)
 ) -> Iterator[Check]:
-    """Yield the finished checks of `attempts`, and of the deferred ones those that are requested.
-
-    An exception, except those in `raised`, becomes a failed check.
-    """
+    """Yield finished checks and requested deferred ones; exceptions not `raised` fail."""
     for each in attempts:
         if isinstance(each, Check):
             yield each
@@ -202,11 +192,10 @@ def run_suites(
     command: str,
     of_the_user: Sequence[str] = (),
 ) -> Iterator[Check]:
-    """Yield the requested checks of all suites, computed one after another.
+    """Yield the requested checks of all suites; an exception becomes a failed check.
 
-    `suites` maps names to functions that return finished or deferred checks. An exception becomes a
-    failed check, and the rest is computed; NotBuiltError is raised again, and in the suites
-    `of_the_user` also InputError, which a mistake in the user's input causes.
+    NotBuiltError is raised again, and in the suites `of_the_user` InputError, which a mistake in
+    the user's input causes.
     """
     for suite, attempts in suites.items():
         if not may_hold(suite, only):
@@ -221,7 +210,6 @@ def run_suites(
 
 
 def _ended(name: Name, error: Exception) -> Check:
-    """Return the failed check of a computation that an exception ended."""
     said = f"ended here: {error}"
     if not isinstance(error, InputError):
         place = traceback.extract_tb(error.__traceback__)[-1]
@@ -236,10 +224,7 @@ def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
 
 
 def severity(check: Check) -> tuple[bool, float]:
-    """Return a sort key for checks: failed ones last, then by the ratio of value to limit.
-
-    The ratio is 0 without a value or a limit, and infinite for NaN.
-    """
+    """Return a sort key for checks: failed ones last, then by the ratio of value to limit."""
     if check.value is None or check.limit is None or check.value == check.limit == 0.0:
         return not check.passed, 0.0
     ratio = abs(check.value) / check.limit if check.limit else math.inf
@@ -248,11 +233,7 @@ def severity(check: Check) -> tuple[bool, float]:
 
 
 def selected(id: str, only: Sequence[str]) -> bool:
-    """Return whether `only` requests the check with this id; an empty `only` requests all checks.
-
-    The leading parts in `only` match by whole parts: ``cells/two-term`` selects
-    ``cells/two-term/case-3``, but not ``cells/two-terms``.
-    """
+    """Return whether `only` requests the check with this id, by whole parts; if empty, it does."""
     return not only or any(id == each or id.startswith(each + "/") for each in only)
 
 

@@ -1,8 +1,7 @@
 """Checks of the Fortran port against the decks, which are compiled from the author's own cards.
 
-A deck shares nothing with the port or the Python twins. TAPE5, the file of results, is compared bit
-for bit, the printed page as text. An overflow ends a run of the port; the deck continues, but must
-not produce finite omega.
+The results of a deck depend on no work of ours. TAPE5 is compared bit for bit, the printed page as
+text. An overflow ends a run of the port; the deck continues, but must not produce finite omega.
 """
 
 from collections.abc import Iterator
@@ -28,10 +27,7 @@ _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/
 
 
 def listings(program: str) -> list[Listing]:
-    """Return the versions of a program to check: original, corrected, and each with one change.
-
-    The change activates or corrects a single defect, conjecture or reading.
-    """
+    """Return the original, the corrected, and both with each single change."""
     names = frozenset(switches(program))
     found = [Listing.original(program), Listing.corrected(program)]
     found += [Listing(program, frozenset([name])) for name in switches(program)]
@@ -42,10 +38,7 @@ def listings(program: str) -> list[Listing]:
 
 
 def decks(chosen: Selection) -> Iterator[Check]:
-    """Yield checks that every deck gives the same results as the Fortran port.
-
-    There are none without a Fortran compiler; `verify` then reports that the decks were not run.
-    """
+    """Yield checks that every deck agrees with the port; none without a Fortran compiler."""
     asked = [
         (of_cell("decks", listing, case), listing, case)
         for program in PROGRAMS
@@ -86,11 +79,7 @@ def _compared(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
 
 
 def _after(deck: Run, steps: int, overflowed: bool) -> list[str]:
-    """Return texts that describe faults in the deck's records after the port's last row.
-
-    If the port overflowed, the deck must have further records, none with three finite components of
-    omega; otherwise it must have none.
-    """
+    """Return faults after the port's last row; only an overflow is followed, by no finite omega."""
     rest = deck.tape5[steps:]
     if not overflowed:
         return [f"{len(rest)} records more"] if len(rest) else []

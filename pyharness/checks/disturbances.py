@@ -1,8 +1,7 @@
 """Propagation of small perturbations by a step of each program, measured by running it.
 
-The measurements are compared with `pyharness.theory.amplification`, which derives the same from the
-schemes alone. The theory is exact, so that limits allow only for rounding. J is the Jacobian of
-Euler's equations (13-15 of the thesis).
+`pyharness.theory.amplification` derives the same from the schemes alone, exactly, so that limits
+allow only for rounding. J is the Jacobian of Euler's equations (13-15 of the thesis).
 """
 
 from collections.abc import Callable, Sequence
@@ -63,7 +62,7 @@ class Probe:
 def steady_scene(coefficients: Triple, omega: Triple, step: float) -> Scene:
     """Return a scene of one `step` (s) in which a constant torque keeps `omega` (rad/s) constant.
 
-    If all numbers have few binary digits, the torque balances the other terms without rounding.
+    The balance is exact if all numbers have few binary digits.
     """
     a, b, c = coefficients
     x, y, z = omega
@@ -86,11 +85,10 @@ def eigenvalues(scene: Scene) -> Array:
 
 
 def first_step(scene: Scene, listing: Listing) -> Probe:
-    """Return the derivative of a program's first step at a steady rotation, measured and derived.
+    """Return the 3 x 3 derivative of a first step at a steady rotation, measured and derived.
 
-    It is the 3 x 3 matrix of omega after the step with respect to omega before. A step is a
-    polynomial of known degree, so that differences over enough neighbours are exact but for
-    rounding.
+    A step is a polynomial of known degree, so that differences over enough neighbours are exact but
+    for rounding.
     """
 
     def stepped(omega: Array) -> Array:
@@ -107,8 +105,8 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 def later_steps(scene: Scene, listing: Listing) -> Probe:
     """Return a spinning top's perturbation after all steps of a scene, measured and derived.
 
-    C and the torque are zero, omega3 is the spin, omega1 and omega2 are the perturbation. The
-    equations are then linear, so that the perturbation may be of any size.
+    omega3 is the spin, the others are the perturbation. C and the torque are zero, so that the
+    equations are linear and the perturbation may have any size.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
@@ -131,7 +129,7 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
     """Return the growth factor of a collocation step on x' = z x, measured and derived.
 
-    The Python version computes it, in step number `step` of a run with steps of 1 s.
+    It is step number `step` of a run of the Python version with steps of 1 s.
     """
     program = listing.program
     moved = _moved(listing, step)
@@ -152,9 +150,9 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
 def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
 
-    z is varied along `direction`, -1 or 1j, and bisected over runs of a spinning top. With the
-    defect `base-not-restored`, a second vector is propagated and omega may have a constant part,
-    which would hide the growth; growth is then measured by the change of omega from step to step.
+    z is bisected along `direction`, -1 or 1j, over runs of a spinning top. With the defect
+    `base-not-restored` omega may have a constant part, which would hide the growth; its change from
+    step to step is then measured.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -192,9 +190,9 @@ def _moved(listing: Listing, step: int) -> float:
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
     """Return the derivative of a collocation step at an unsteady omega, measured and derived.
 
-    It is measured with the Python version, in step number `step`. With step size h, omega becomes
-    omega + h F + h**2/2 J F + w h**3 Q(F), where F is the right-hand side and Q its quadratic part.
-    Only the weight w depends on the positions of the collocation points.
+    With step size h, omega becomes omega + h F + h**2/2 J F + w h**3 Q(F), where F is the
+    right-hand side and Q its quadratic part. Only the weight w depends on the positions of the
+    points.
     """
     program, h = listing.program, scene.step_size
     moved = _moved(listing, step)
@@ -225,11 +223,7 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
 def _differentiated(
     stepped: Callable[[Array], Array], omega: Sequence[float], count: int
 ) -> tuple[Array, float, float]:
-    """Return the derivative of a step by differences, their reach (rad/s), and a factor.
-
-    There are `count` pairs of neighbouring omegas along each axis. The factor is the rounding error
-    of the derivative over that of a step.
-    """
+    """Return a derivative by differences, their reach (rad/s), and its rounding over a step's."""
     base = np.array(omega)
     reach = _REACH * float(np.abs(base).max())
     spread = reach / count
@@ -245,10 +239,10 @@ def _differentiated(
 
 
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
-    """Return a bound on the rounding error of each omega in a step, in units of 2**-53 rad/s.
+    """Return a bound on the rounding error of omega in a step, in units of 2**-53 rad/s.
 
-    `sizes` bounds abs(omega) before the step; `moved` is the factor of `_moved`. Rounding errors
-    are proportional to the terms of the step, which are summed with all signs positive.
+    It is proportional to the terms of the step, summed with positive signs; `sizes` bounds
+    abs(omega).
     """
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":

@@ -28,9 +28,9 @@ DOUBLING = Basis(
 class Divergence:
     """The smallest step size (s) for which runs diverge, as found by running and as predicted.
 
-    A run diverges if a component of omega overflows or exceeds twice its true maximum; `found` is 0
-    if the smallest step tried does. With `predicted`, the wobble about axis 3 doubles by linear
-    stability. `limit` bounds the relative difference.
+    A run diverges if a component overflows or exceeds twice its true maximum; `found` is 0 if it
+    does with the smallest step tried. By linear stability, the wobble about axis 3 doubles with
+    `predicted`. `limit` is relative.
     """
 
     found: float
@@ -41,12 +41,7 @@ class Divergence:
 def divergence(
     scene: Scene, time: float, matrix: Amplification, runner: Runner, smallest: float
 ) -> Divergence:
-    """Return the step sizes at which runs of a spinning body diverge, as found and as predicted.
-
-    The body has no torque, and spins about a stable axis 3 for `time` (s). `matrix` is the
-    amplification matrix of the method that `runner` runs; `smallest` is the smallest step tried
-    (s).
-    """
+    """Return the divergent steps of a body that spins about its stable axis 3 for `time` (s)."""
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
     spin = abs(scene.omega[2])
@@ -70,8 +65,7 @@ def divergence(
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
     """Return the smallest step (s) with which a run exceeds twice the largest true omega.
 
-    Each component has its own bound. The number of steps is found by bisection. Return 0 if even
-    the step `smallest` (s) exceeds it, infinity if none does.
+    Return 0 if it is below `smallest` (s), infinity if there is none.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 
@@ -95,8 +89,7 @@ def _doubling(
 ) -> float:
     """Return the smallest step (s) for which, by theory, a wobble grows 2 exp(`missed`)-fold.
 
-    `missed` allows for a peak between two steps; `rate` is the wobble's angular frequency (1/s).
-    The step is bisected between `smallest` and `time` (s).
+    `missed` allows for a peak between two steps; `rate` is an angular frequency (1/s).
     """
     wanted = math.log(2.0) + missed
 
@@ -112,7 +105,6 @@ def _doubling(
 
 
 def _bounds(scene: Scene, time: float) -> Sequence[float]:
-    """Return the largest magnitude of each component of omega (rad/s) from 0 to `time` (s)."""
     times = np.linspace(0.0, time, _SAMPLES + 1)[1:].tolist()
     omega: Array = solve(scene, times, "taylor", 1e-12).omega
     largest: list[float] = np.abs(np.vstack([scene.omega, omega])).max(axis=0).tolist()

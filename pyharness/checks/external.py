@@ -63,8 +63,7 @@ _Result = tuple[Array, float]
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
     """Yield checks of every method that takes a problem: ``external/<problem>/<time>/<method>``.
 
-    Value and limit, in the problem's unit, are those of the component of omega with the largest
-    ratio.
+    Value and limit, in the problem's unit, are those of the component with the largest ratio.
     """
     for problem in problems:
         # Times of one sign are solved together, so that a replay of one check gives the same bits.
@@ -82,10 +81,6 @@ def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> It
 def _names(
     problem: Problem, values: Sequence[Value], method: str, only: Sequence[str], quantity: str = ""
 ) -> list[tuple[int, Name]]:
-    """Return index in `values` and name of each requested check of a method.
-
-    There are none if the method can't take the problem.
-    """
     given = "" if problem.path is None else f" --external {shlex.quote(problem.path)}"
     places = [f"{problem.name}/{value.time}" for value in values]
     names = [
@@ -98,11 +93,7 @@ def _names(
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
-    """Return the check of a method that has no result at the time of `value`.
-
-    `refusal` is empty if the run ended before. A method may refuse a problem from a user's file,
-    which may take it too long, except `auto` and `closed-form`.
-    """
+    """Return the check of a method without result: a user's problem may take it too long."""
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
         return name.judged(given, f"{REFUSED}{refusal}")
@@ -137,10 +128,9 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
-    """Return the change of attitude that rounding the scene's numbers causes at each time (rad).
+    """Return the change of attitude by rounding the scene's numbers at each time (rad).
 
-    First-order changes by each number and the time are added in magnitude. If the scene can't be
-    solved, only the rounding of the quaternions is counted.
+    First-order changes are added in magnitude. Without a solution, only quaternions are rounded.
     """
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows
@@ -182,8 +172,7 @@ def _as_far_as_solved(
 ) -> tuple[list[_Row], str]:
     """Return the results of `solve` for as many values as possible, and its refusal or "".
 
-    If all together are refused, they are solved one by one, because an earlier time may be within
-    the work limit.
+    An earlier time may be within the work limit.
     """
     try:
         return solve(values), ""
@@ -203,17 +192,13 @@ def _as_far_as_solved(
 
 
 def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
-    """Return omega and its error bound (rad/s) by a method or program at each published value.
-
-    An element is None if the program's linear solver finds the equations singular with every step.
-    """
+    """Return omega and its error bound (rad/s) at each value; None if always singular."""
     if method in PROGRAMS:
         return [_program(problem, value, method) for value in values]
     return [*_solved(problem.scene, [float(value.time) for value in values], method)]
 
 
 def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
-    """Return whether a method can solve a scene at these times (s), whatever the tolerance."""
     if method == "closed-form":
         return closed_form(scene) is not None
     if method == "quick":
@@ -240,9 +225,9 @@ def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Resu
 def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     """Return omega by a corrected program at the time of `value`, and a bound on its error.
 
-    The step is halved until the error is below a tenth of the published accuracy, or is rounding
-    error. The last halving estimates it, doubled for safety; rounding may add half a unit in the
-    last place per step. Return None if even the longest step gives singular equations.
+    The step is halved until the error, twice the last change, is below a tenth of the published
+    accuracy or is rounding: half a unit in the last place per step. Return None if even the longest
+    step is singular.
     """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
@@ -294,17 +279,14 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
 
 
 def _scale(scene: Scene, omega: Array) -> float:
-    """Return the largest abs(omega) at the start and at the end (rad/s).
-
-    Values in between are left out, so that limits become no wider.
-    """
+    """Return the largest abs(omega) at both ends (rad/s), so that limits become no wider."""
     return max(*map(abs, scene.omega), float(np.abs(omega).max()))
 
 
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
     """Return the change of omega by rounding a scene's numbers (rad/s), by printed time.
 
-    It is zero at a time that no solution reaches; the method's check there reports why.
+    It is zero where no solution reaches; the method's check reports why.
     """
 
     def solve(values: Sequence[Value]) -> list[Array]:
@@ -321,10 +303,7 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
 
 
 def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
-    """Return a row for each time: the change of omega by rounding the scene's numbers (rad/s).
-
-    First-order changes by each number are added in magnitude; a row that is not reached is zero.
-    """
+    """Return the change of omega by rounding the scene's numbers (rad/s), to first order."""
     moved = np.zeros((len(times), 3))
     run = method_candidate(method, METHODS[method].finest).rows
     here = run(scene, times).omega

@@ -75,9 +75,8 @@ class Problem:
 def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
     """Return the published number with the digits `text`, and its accuracy.
 
-    The accuracy is half a unit of the last digit, or the error `good_to` that the source states if
-    that is larger. Raise InputError, whose message `where` begins, if `text` is no number or is too
-    large for binary64.
+    It is half a unit of the last digit, at least the stated error `good_to`. Raise InputError if
+    `text` is no number or is too large for binary64.
     """
     if not isinstance(text, str):
         raise InputError(f"{where}: {kind_of(text)}; allowed: the digits as text, '0.606'")
@@ -94,10 +93,7 @@ def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
 
 
 def read_problem(path: str | Path) -> Problem:
-    """Return the problem in a user's file (docs/how-to/external.md).
-
-    Raise InputError if the file can't be read, or a field is missing, unknown or no number.
-    """
+    """Return the problem in a user's file (docs/how-to/external.md), or raise InputError."""
     return _read(path, str(path))
 
 
@@ -195,10 +191,7 @@ def _value(entry: object, sequence: object) -> Value:
 def _pointing(
     where: str, entry: dict[str, Any], sequence: object, good_to: float
 ) -> Pointing | None:
-    """Return the attitude in one `[[value]]` entry, a quaternion or Euler angles, if any.
-
-    `sequence` names the axes of the three rotations.
-    """
+    """Return the attitude in one `[[value]]` entry, a quaternion or Euler angles, if any."""
     given = [key for key in ("attitude", "angles_deg") if key in entry]
     if not given:
         return None

@@ -91,9 +91,9 @@ def recorded() -> Iterator[Recorded]:
 def golden(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred comparisons with the golden record, if its folder `chosen.record` exists.
 
-    Programs and methods with a fixed step must agree to the last bit, methods that state an error
-    within twice this error, because processors and compilers round differently. With another
-    mathematical library, results under a torque with waves may differ by rounding.
+    Fixed steps must agree to the last bit, methods that state an error within twice this error,
+    because processors and compilers round differently; so may another mathematical library under
+    waves.
     """
     if not chosen.record.is_dir():
         return
@@ -167,10 +167,7 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
-    """Return the files of a new golden record, by name, and its differences from the old, in words.
-
-    A file none of whose trajectories is computed any more is left out.
-    """
+    """Return the files of a new golden record, by name, and its differences from the old."""
     try:
         known = read_record(folder) if folder.is_dir() else {}
     except InputError:
@@ -214,7 +211,6 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
 
 
 def _digest(rows: Array, run: Trajectory) -> str:
-    """Return 32 hexadecimal digits of SHA-256 of all rows and error codes; NaNs are alike."""
     digest = hashlib.sha256(np.where(np.isnan(rows), np.nan, rows).astype("<f8").tobytes())
     if run.ier is not None:
         digest.update(run.ier.astype("<i4").tobytes())
@@ -227,7 +223,6 @@ def _rows(entry: dict[str, Any]) -> Array:
 
 
 def _moved(old: dict[str, Any], new: dict[str, Any]) -> str:
-    """Return a text on how two entries differ, with numbers in units in the last place."""
     parts = [
         f"{key} {old[key] or 'none'} -> {new[key] or 'none'}"
         for key in ("ended", "steps", "evaluations", "stop")

@@ -1,7 +1,7 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
-The errors of the programs of the thesis are reported without a bound. `flow` or `truth.flow` is the
-conditioning: error amplification and rounding errors of the motion.
+The errors of the programs of the thesis are reported without a bound. A flow has the error
+amplification and rounding errors of the motion.
 """
 
 import math
@@ -54,11 +54,7 @@ FORMS = ("closed-form", "auto")
 
 
 def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Truth:
-    """Return the true omega of a scene at `time` (s), with its error bound and conditioning.
-
-    Without torque the solution consists of elliptic functions; else `pyharness.truth.reference`
-    computes it.
-    """
+    """Return the true omega of a scene at `time` (s): elliptic functions without torque."""
     flow = flow or conditioning(scene, time)
     if not _is_free(scene):
         return reference_truth(scene, [time], flow=flow)
@@ -84,11 +80,7 @@ def check_all(
     checks: Callable[[Name, float], Iterable[Attempt]] | None = None,
     has_programs: Callable[[Circumstance], bool] = lambda each: True,
 ) -> Iterator[Attempt]:
-    """Yield deferred checks of all methods in the extreme scenes of the trial named `suite`.
-
-    ``checks(name, time)``, by default `check_methods`, yields those of a scene; programs are
-    described where `has_programs` is true.
-    """
+    """Yield deferred checks of all methods in the extreme scenes of the trial named `suite`."""
     for each in EXTREMES[suite]():
         name = named(suite, "", each.name, scene=each.scene)
         yield from (checks or check_methods)(name, each.time)
@@ -106,14 +98,11 @@ def check_methods(
 ) -> Iterator[Attempt]:
     """Yield deferred checks of the error of each method at `time` (s) in the scene of `name`.
 
-    `tolerances`, by default `affordable`, returns those at which a method is tried; `judged` makes
-    the check of a method at a tolerance.
-
-    By default, the limit is the sum of three terms: the method's tolerance (for a fixed step
-    without torque, a bound that follows from the order) and the rounding error, both amplified, and
-    the error of the true solution. Without the first, or if the sum leaves fewer than two digits of
-    omega, no limit is set. Without torque, energy and momentum always have one, because the flow
-    does not amplify their errors. A method fails if it refuses a scene that it must solve.
+    By default, the limit is the sum of three terms: the tolerance (for a fixed step without torque,
+    a bound from the order) and the rounding error, both amplified, and the error of the true
+    solution. Without the first, or if the sum leaves fewer than two digits of omega, there is no
+    limit. Without torque, energy and momentum always have one, because the flow does not amplify
+    their errors. A method fails if it refuses a scene that it must solve.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -132,9 +121,8 @@ def check_methods(
 def run_method(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
     """Return omega at `time` (s) by the method `name`, and how the run ended.
 
-    Without a tolerance the method uses the scene's step size as a prepared solver; `auto` and
-    `quick` are always prepared. The result may state a refusal of these; any other raises
-    InputError.
+    Without a tolerance the solver is prepared with the scene's step size; `auto` and `quick` always
+    are. Only refusals of prepared solvers are returned; others raise InputError.
     """
     if name in ("auto", "quick") or tolerance is None:
         return prepared_candidate(name, tolerance or 1.0).end(scene, time)
@@ -148,8 +136,8 @@ def _steps(scene: Scene, time: float) -> int:
 def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse a scene; every other refusal is a fault.
 
-    `closed-form` may if there is no closed form, `quick` always (it requires A, B, C other than 0
-    and few steps), and methods of Taylor series if the phase of a wave exceeds 1e8 radians.
+    `closed-form` may without a closed form, `quick` always, and series if the phase of a wave
+    exceeds 1e8 radians.
     """
     method, scene = tried.method, tried.scene
     if method == "closed-form":
@@ -162,8 +150,7 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
 def _derived(truth: Truth, tried: MethodRun) -> float | None:
     """Return the limit of a method's error relative to the largest omega: steps and rounding.
 
-    Both are amplified by the motion, except for a closed form. It is None if no bound on the steps
-    is known, infinite if it leaves fewer than two digits of omega.
+    It is None if no bound on the steps is known, infinite if it leaves no two digits of omega.
     """
     made = promised_sum(tried, truth)
     if truth.exact and tried.method in FORMS:
@@ -183,7 +170,7 @@ DERIVED = Policy(_derived, promises.STEPS, refusable)
 
 
 def _roundings(tried: MethodRun, truth: Truth) -> float:
-    """Return the number of steps in which a run rounds omega without compensated summation."""
+    """Return the number of uncompensated roundings of omega in a run."""
     method, answer = tried.method, tried.answer
     if tried.tolerance is None:
         return 0.0 if method in GAUSS else float(_steps(tried.scene, truth.end))
@@ -219,11 +206,7 @@ def scene_of(name: Name) -> Scene:
 
 
 def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
-    """Return the bound that checks set on the sum of the errors of a method's steps.
-
-    It is relative to the largest omega: from the order for a fixed step without torque, else the
-    tolerance, if any.
-    """
+    """Return the bound on the sum of the errors of the steps, relative to the largest omega."""
     if tried.method in FIXED_STEP and truth.exact:
         radians = speed(tried.scene, truth.flow.largest) * abs(truth.end)
         steps = _steps(tried.scene, truth.end)
@@ -234,10 +217,9 @@ def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
 def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
     """Return the smallest error of `omega` that explains its drift of energy and momentum.
 
-    It is relative to `largest`, the largest abs(omega) (rad/s). Both quantities are sums of q w**2
-    over the components w, with q the moments or their squares. An error e of every component
-    changes the sum by at most 2 e times the sum of q abs(w), so that the change found requires at
-    least e.
+    It is relative to `largest` (rad/s). Both are sums of q w**2 over the components w, with q the
+    moments or their squares. An error e of every component changes the sum by at most 2 e times the
+    sum of q abs(w), so that the change found requires at least e.
     """
     assert scene.moments is not None
     if not np.isfinite(omega).all():
@@ -257,10 +239,7 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 
 
 def describe_programs(name: Name) -> Iterator[Attempt]:
-    """Yield deferred reports of the largest error of each program, original and corrected.
-
-    The error is relative to the largest omega, at about ten of the scene's steps.
-    """
+    """Yield deferred reports of the largest relative error of each program, both versions."""
     scene = scene_of(name)
     every = max(1, scene.steps // _ROWS)
     rows = slice(every - 1, None, every)

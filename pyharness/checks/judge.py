@@ -29,11 +29,7 @@ MOST = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A method's answer to a check: its results, or the reason why it refused the scene.
-
-    The results are at all requested times, or at the last. There are no rows after a refusal, or if
-    they are not those requested.
-    """
+    """A method's answer to a check: its results, at all times or the last, or its refusal."""
 
     omega: Array = field(default_factory=lambda: np.empty((0, 3)))  # shape (n, 3), rad/s
     attitude: Array | None = None  # shape (n, 4), where it was requested
@@ -89,10 +85,7 @@ def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float])
 def by_end(
     method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float
 ) -> MethodRun:
-    """Return a deferred run of a candidate until one `time` (s).
-
-    `method` decides on the error limit and the messages of the check.
-    """
+    """Return a deferred run until `time` (s); `method` decides on limit and messages."""
     return MethodRun(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
 
@@ -136,10 +129,7 @@ class Truth:
 
     @cached_property
     def bound(self) -> ErrorBound | None:
-        """Return the proved or estimated bound of the error of the reference, else None.
-
-        It is relative to the largest omega, or an angle (rad). Limits do not depend on it.
-        """
+        """Return the bound of the reference's error, relative or an angle (rad), else None."""
         if self.scene is None or self.reference is None:
             return None
         bound = bound_of(self.scene, self.reference, any_torque=True, effort=self.effort)
@@ -160,10 +150,7 @@ class Truth:
         return self.error / (self.flow.largest or 1.0)
 
     def error_of(self, answer: Answer) -> float:
-        """Return the largest error of an answer: an angle (rad), or relative to the largest omega.
-
-        It is NaN if a row contains NaN.
-        """
+        """Return the largest error of an answer: an angle (rad), or omega's, relative."""
         if self.attitude is None:
             difference = float(np.abs(answer.omega - self.omega[-len(answer.omega) :]).max())
             if self.flow.largest == 0.0:
@@ -189,8 +176,7 @@ def reference_truth(
 ) -> Truth:
     """Return the true solution of a scene at all `times` (s) by the high-precision reference.
 
-    `effort` is a factor on its work limit. Raise InputError if the solution does not reach all
-    times.
+    Raise InputError if it does not reach them.
     """
     flow = flow or conditioning_at(scene, times)
     # The reference's steps are accurate to 1e-22. The precise series is requested where the flow
@@ -217,7 +203,7 @@ def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> flo
     """Return the limit of a method's error: its steps' and roundings', and the truth's own.
 
     It is relative to the largest omega, or an angle (rad), as is `made`, the sum of the errors of
-    the steps, which `growth` multiplies. `steps` is the number of roundings of omega.
+    the steps, which `growth` multiplies.
     """
     if truth.attitude is not None:
         return truth.flow.angle_limit(made * growth, truth.end) + truth.angle_error
@@ -230,11 +216,7 @@ def lively(growth: float) -> float:
 
 
 def linear(limit: float) -> float:
-    """Return an error limit, or infinity above `LINEAR`.
-
-    Larger errors are not predicted by the linearised equations, and leave fewer than two digits of
-    omega.
-    """
+    """Return an error limit, or infinity above `LINEAR`, where linearised equations fail."""
     return limit if limit <= LINEAR else math.inf
 
 
@@ -245,10 +227,7 @@ def tolerance_of(tried: MethodRun) -> float:
 
 
 def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether the refusal `why` is of a scene without closed form, or of `quick`.
-
-    `quick` may refuse if A, B or C is 0.
-    """
+    """Return whether `closed-form` refuses without a form, or `quick` because A, B or C is 0."""
     if tried.method == "quick":
         # `quick` requires that A, B and C are not 0.
         return why == "quick: refused" and not all(tried.scene.euler_coefficients)
@@ -256,10 +235,6 @@ def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
 
 
 def _granting(factor: Callable[[float], float]) -> Callable[[Truth, MethodRun], float]:
-    """Return a function for limits: tolerance times ``factor(K)``, rounding and the truth's error.
-
-    K is the error amplification of the motion.
-    """
     return lambda truth, tried: allowed(
         truth, tolerance_of(tried), factor(truth.flow.amplification)
     )
@@ -277,10 +252,10 @@ AMPLIFIED = Policy(_granting(lambda growth: growth), FLOW)
 
 
 def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
-    """Return the check that the error of a method's answer is within the limit of the policy.
+    """Return the check that a method's error is within the limit, or its refusal permitted.
 
-    A refusal passes if the policy permits it. Without a limit, a finite error is only reported.
-    `closed-form` fails if it solves a scene that has no closed form.
+    Without a limit, a finite error is only reported. `closed-form` fails if it solves a scene that
+    has no closed form.
     """
     answer = tried.answer
     if answer.refusal:

@@ -56,10 +56,9 @@ def methods(chosen: Selection) -> Iterator[Attempt]:
 
 
 def prepared(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of prepared solvers against the reference, forward and back in time.
+    """Yield deferred checks of prepared solvers, forward and back in time.
 
-    With a fixed step, and by Gauss collocation with the scene's step size, they must agree bit for
-    bit with the unprepared method.
+    With the scene's step size, they must agree bit for bit with the unprepared method.
     """
     for case in cases(chosen):
         scene = case_scene(case)
@@ -112,11 +111,7 @@ def _prepared(
 
 
 def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
-    """Return a deferred run by `solve`, with results at all `times` (s).
-
-    For a method of SciPy in a scene with attitude, the tolerance is at least the finest that it
-    meets.
-    """
+    """Return a deferred run by `solve` at all `times` (s), with a tolerance that SciPy can meet."""
     if method in SCIPY_METHODS and scene.attitude:
         # SciPy's methods can't be requested to have so small an error over a long time.
         tolerance = max(tolerance, 1.01 * finest(method, scene, times[-1]))
@@ -124,10 +119,7 @@ def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[fl
 
 
 def run_of_call(method: str, tolerance: float, scene: Scene, time: float) -> MethodRun:
-    """Return a deferred call of a prepared solver with a result at one `time` (s).
-
-    The solver is first called with another initial omega, which must not affect the result.
-    """
+    """Return a deferred call of a prepared solver at `time` (s), after one with another omega."""
     prepare = attitude_candidate if scene.attitude else prepared_candidate
     return by_end(method, prepare(method, tolerance, primed=True), tolerance, scene, time)
 
@@ -137,10 +129,7 @@ def _judged(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Na
 
 
 def _same_steps(scene: Scene, name: Name) -> Check:
-    """Return the check that a prepared solver gives the required bits after 100 steps of a scene.
-
-    They are those of `solve` for a fixed step, and of the compiled kernel for Gauss collocation.
-    """
+    """Return the check of the bits after 100 steps against `solve` or the kernel."""
     method, time = name.subject, 100.0 * scene.step_size
     found = prepared_candidate(method, 1.0).end(scene, time).omega
     if method in FIXED_STEP:

@@ -1,7 +1,7 @@
 """Checks of the order of methods: the power with which errors decrease as the step is halved.
 
-Corrected programs are measured against `solve_ivp`, methods with a fixed step against the
-reference; so is the programs' translational velocity, which no other method computes.
+Programs are measured against `solve_ivp`, fixed-step methods and the programs' translational
+velocity, which no other method computes, against the reference.
 """
 
 from collections.abc import Callable, Iterator
@@ -42,10 +42,7 @@ _FEWEST, _MOST = 16, 4096
 
 
 def orders(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of the order of each corrected program and each fixed-step method.
-
-    The value is the theoretical order minus the measured one.
-    """
+    """Yield deferred checks of orders; the value is the theoretical minus the measured one."""
     for case in cases(chosen, (5,)):
         scene = case_scene(case)
         known = cache(partial(reference, scene, scene.times()))
@@ -92,9 +89,8 @@ def in_few_steps(scene: Scene, time: float) -> Scene:
 def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
     """Return the check of the order of a fixed-step method, the setting or subject of `name`.
 
-    `scene` has the steps of `in_few_steps`. The order is only described if it is too fast or
-    sensitive for so few steps, or if the torque has a table: steps do not end where it changes,
-    which lowers the order.
+    It is only described if the scene is too fast or sensitive for so few steps, or has a table:
+    steps do not end where it changes, which lowers the order.
     """
     method = name.setting or name.subject
     run, due = method_candidate(method, 1.0), METHODS[method].order
@@ -110,11 +106,7 @@ def _has_tables(scene: Scene) -> bool:
 
 
 def judged_order(name: Name, found: Order) -> Check:
-    """Return the check that a measured order is at most `_ORDER_SLACK` below the theoretical one.
-
-    It also passes if the error is rounding before an order is seen, and fails if the order can't be
-    determined for another reason.
-    """
+    """Return the check that an order is at most `_ORDER_SLACK` too low, or the error rounding."""
     missing = None if found.value is None else found.due - found.value
     passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK
     return name.judged(passed, str(found), missing, _ORDER_SLACK, _SLACK)

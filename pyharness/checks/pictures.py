@@ -32,9 +32,8 @@ _COARSE = 1e-6
 class _Mark(NamedTuple):
     """A check as a plotted point, with the properties that place and style it.
 
-    `kind` is the circumstance's name before its first number. Marks with the same `rank`
-    (``coarse`` or ``fine`` for a tolerance, else the setting) and `what` (``error``, ``drift`` or
-    empty) form a series.
+    `kind` is the circumstance's name before its first number. Marks with the same `rank` and `what`
+    form a series.
     """
 
     method: str
@@ -46,7 +45,6 @@ class _Mark(NamedTuple):
 
     @property
     def style(self) -> dict[str, Any]:
-        """Return the marker and the colour of this point, as options of Matplotlib."""
         marker = _MARKERS.get(self.what, "s" if self.rank else "D")
         return {"marker": marker, "color": _COLORS.get(self.rank, "black"), "linestyle": "none"}
 
@@ -65,8 +63,7 @@ def _mark(check: Check) -> _Mark:
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
     """Return a picture of the checks of a trial: values and limits, in a panel for each method.
 
-    Problems are on the horizontal axis in the order of trial, but those whose names begin alike are
-    adjacent. Raise InputError if no check has a value.
+    Problems are in the order of trial, but kinds stay together. Raise InputError without values.
     """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -120,10 +117,7 @@ def _label(rank: str, what: str) -> str:
 
 
 def _places(marks: Sequence[_Mark]) -> dict[tuple[str, str], float]:
-    """Return the horizontal position of each problem, by its kind and name.
-
-    Problems of one kind are side by side, with space for the name of the kind above them.
-    """
+    """Return the horizontal position of each problem, with space for the name of its kind."""
     names = dict.fromkeys((mark.kind, mark.circumstance) for mark in marks)
     places = {}
     place = 0.0
@@ -186,10 +180,7 @@ _OF_METHODS: dict[str, dict[str, Any]] = {
 
 
 def length_picture(found: Sequence["Drift"]) -> Picture:
-    """Return a picture of the errors in a motion's energy and phase against the number of steps.
-
-    Each motion has a column. The phase is the position along the closed curve of torque-free omega.
-    """
+    """Return a picture of the errors in a motion's energy and phase against the number of steps."""
     from matplotlib.figure import Figure
 
     motions = list(dict.fromkeys(each.motion for each in found))
@@ -244,10 +235,7 @@ _LEAST = 1e-13
 
 
 def regions_picture(found: Regions) -> Picture:
-    """Return a picture of the regions of stability in the plane of z, step size times eigenvalue.
-
-    A second panel shows the growth of a perturbation in a step on the imaginary axis.
-    """
+    """Return a picture of the regions of stability in z, step size times eigenvalue."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 5.8), dpi=100, layout="constrained")

@@ -37,9 +37,8 @@ _LIBRARY = "the torque has sines or cosines, whose last bits differ between libr
 class Cell:
     """A run that is requested from a port: a program with its listing, and a scene.
 
-    `name` is that of the run, as in ``random/7/two-term``, `of` that of its check; `options` of
-    ``verify --port`` request it alone. `lipschitz` is the constant of the Runge-Kutta program's
-    stop test (1/s), which ends the run only if it `may_stop`.
+    `of` is the name of its check, and `options` of ``verify --port`` request it alone. `lipschitz`
+    is the constant of the stop test (1/s).
     """
 
     name: str
@@ -63,10 +62,9 @@ class Cell:
 
 @dataclass(frozen=True)
 class PortCheck(Check):
-    """The result of a comparison of a port with our Python program in one run.
+    """The comparison of a port with our Python program in one run.
 
-    `seconds` is the time to the port's answer, if valid; `difference` has the first step that
-    differs and the value of each variable.
+    `difference` has the first step that differs and the value of each variable.
     """
 
     seconds: float | None = None
@@ -92,9 +90,7 @@ def random_cells(
 ) -> list[Cell]:
     """Return runs in random scenes, named as ``random/7/two-term``, in the order of their numbers.
 
-    `seed` and the number determine scene, program and listing. `cells` has leading parts of
-    requested names, empty for all; a draw that it names by number is returned even if `draws` is
-    smaller.
+    A number in `cells` (leading parts of names, empty for all) may exceed `draws`.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []
@@ -112,8 +108,8 @@ def random_cells(
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[PortCheck]:
     """Yield checks that a port, started by `command`, gives the same bits in the given runs.
 
-    An invalid answer is a failed check and ends the comparison. `patience` is the longest wait for
-    an answer (s). Raise InputError if `command` is empty.
+    An invalid answer fails and ends the comparison. `patience` is in s. Raise InputError if
+    `command` is empty.
     """
     name, again = Name("port", "start"), replay_command(command)
     try:
@@ -151,10 +147,7 @@ def asked(process: PortProcess, command: str, cell: Cell) -> PortCheck:
 def compared(
     cell: Cell, twin: Trajectory, line: bytes, again: str = "", seconds: float | None = None
 ) -> PortCheck:
-    """Return the check that a port's answer `line` agrees with the trajectory `twin`.
-
-    `seconds` is the time that the port took. Raise PortError if `line` is no valid answer.
-    """
+    """Return the check that an answer agrees with `twin`; raise PortError if it is invalid."""
     answer = read_answer(line, cell.scene.steps)
     found = differences(twin, answer)
     wanted = _rows(twin)
@@ -202,7 +195,6 @@ _Rows = np.ndarray[tuple[int, int], np.dtype[np.float64]]
 
 
 def _first_step(wanted: _Rows, given: _Rows) -> int | None:
-    """Return the index of the first row that differs in both arrays, or None."""
     pairs = enumerate(zip(wanted, given, strict=False))
     return next((step for step, (due, row) in pairs if ulps(due, row)), None)
 
@@ -212,10 +204,7 @@ def _apart(due: Any, row: Any) -> list[float]:
 
 
 def _difference(wanted: _Rows, given: _Rows) -> dict[str, Any] | None:
-    """Return the values of all variables in the first step that differs, as data for JSON.
-
-    Numbers are hexadecimal texts, because JSON has no infinity and no NaN.
-    """
+    """Return the first step that differs for JSON, in hexadecimal texts because of inf and nan."""
     step = _first_step(wanted, given)
     if step is None:
         return None

@@ -35,10 +35,7 @@ class PortError(Exception):
 
 
 def split_command(command: str, option: str = "--port") -> list[str]:
-    """Return the program and arguments of a command line, split as by a shell.
-
-    Raise InputError, which names `option`, if the command is empty or can't be split.
-    """
+    """Return program and arguments as a shell splits them; raise InputError if there are none."""
     try:
         words = shlex.split(command)
     except ValueError as error:
@@ -52,20 +49,14 @@ def split_command(command: str, option: str = "--port") -> list[str]:
 def refuse_other(
     command: str, option: str, instead: str, line: bytes, read: Callable[[bytes], object]
 ) -> None:
-    """Raise InputError if `command` belongs to the option `instead`.
-
-    It does if `read` accepts its answer to `line`, a request of that option.
-    """
+    """Raise InputError if `command` answers `line`, a request of the option `instead`."""
     with contextlib.suppress(PortError), PortProcess(command, _PROBE, option) as process:
         read(process.ask(line))
         raise InputError(f"{option} {command}: answers requests of {instead}; give it to {instead}")
 
 
 def _processes_with(mark: str) -> list[int]:
-    """Return the ids of live processes with `mark` (``NAME=value``) in their environment.
-
-    Without /proc none is found.
-    """
+    """Return the ids of live processes with `mark` in their environment; none without /proc."""
     found = []
     for folder in Path("/proc").glob("[1-9]*"):
         # A process may have ended meanwhile, or belong to another user. A process that has ended
@@ -137,8 +128,7 @@ class PortProcess:
     def ask(self, line: bytes) -> bytes:
         """Send the request `line` and return the answer, each one line without a line feed.
 
-        Raise PortError if there is no answer in time, or if the port ends or writes too much or a
-        second line.
+        Raise PortError for no answer in time, too much, or a second line.
         """
         end = time.monotonic() + self._patience
         rest = line + b"\n"
@@ -172,7 +162,6 @@ class PortProcess:
         return answer
 
     def _hear(self) -> bool:
-        """Read from stderr, keep the last part for messages, and return whether there was any."""
         try:
             piece = os.read(self._errors.fileno(), _PIECE)
         except BlockingIOError:

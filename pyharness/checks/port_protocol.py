@@ -26,9 +26,8 @@ ENDINGS = ("complete", "stopped", "overflow")
 class Answer:
     """The result of one run of a program by a port.
 
-    `rows` has `VARIABLES` after each step, shape (n, 7); `ended` is one of `ENDINGS`; `stop` is
-    where the Lipschitz test stopped the run; `ier` has the linear solver's error code in each step,
-    None for a program that prints none.
+    `rows` has `VARIABLES` after each step, shape (n, 7); `ended` is one of `ENDINGS`; `ier` has the
+    error code of each step, None for a program that prints none.
     """
 
     rows: Array
@@ -40,10 +39,9 @@ class Answer:
 def request(
     scene: Scene, listing: Listing, lipschitz: float | None = None, may_stop: bool = True
 ) -> bytes:
-    """Return the line of JSON that requests a run of a program from a port.
+    """Return the line of JSON that requests a run of a program; its decimals are exact.
 
-    Its decimals reproduce floats exactly. `lipschitz` is the constant of the stop test (1/s), by
-    default that of the author's decks, which ends the run only if it `may_stop`.
+    `lipschitz`, by default that of the author's decks, is the constant of the stop test (1/s).
     """
     asked = {
         "schema": SCHEMAS["port request"],
@@ -135,10 +133,7 @@ def read_whole(where: str, value: object) -> int:
 
 
 def read_number(where: str, value: object) -> float:
-    """Return the value of a JSON number, or of a hexadecimal, decimal, inf or nan as text.
-
-    Raise PortError, with `where` in front, for any other value.
-    """
+    """Return a JSON number, or one in hexadecimal or decimal text; raise PortError otherwise."""
     if type(value) is float:
         return value
     try:

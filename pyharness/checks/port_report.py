@@ -17,10 +17,7 @@ _TIMES = (
 
 
 def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str) -> Report:
-    """Return the report of a port's checks, at least one: failures with their steps, and times.
-
-    `asked` checks were requested; `seed` is empty if no scenes were drawn.
-    """
+    """Return the report of a port's checks, at least one: failures with their steps, and times."""
     title = [f"{command}: against the twins, bit for bit"]
     if seed:
         title.append(f"seed of the random scenes: {seed}")
@@ -36,10 +33,7 @@ def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str
 
 
 def step_section(check: PortCheck) -> Section:
-    """Return a line and a table of all variables in the first step that differs.
-
-    Decimals have enough digits to determine each float.
-    """
+    """Return a line and a table of all variables in the first step that differs, exactly."""
     assert check.difference is not None
     rows = [
         [

@@ -1,10 +1,9 @@
 """Checks of methods in scenes drawn from a seed, against an independent true solution.
 
-The true omega comes from `integer_series`, the true attitude from `reference`. An entry point is
-`solve` or a prepared solver with one method, as in ``solve-taylor``. A tolerance applies to the
-error of omega at the requested times relative to the largest omega until the last, or to the angle
-of the attitude error (rad). If the motion amplifies perturbations K times, rounding alone causes
-errors of 2e-15 K.
+The true omega comes from `integer_series`, the attitude from `reference`. An entry point is `solve`
+or a prepared solver with one method. A tolerance applies to the error of omega relative to the
+largest until the last time, or to the angle of the attitude error (rad). If the motion amplifies
+perturbations K times, rounding alone causes errors of 2e-15 K.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -66,7 +65,7 @@ Entrances = Mapping[str, Callable[[], MethodRun]]
 def truth_of(drawn: Draw) -> Truth:
     """Return the true omega of a draw at 0.4 of its end time and at its end time.
 
-    Raise InputError if it grows without bound or is too fast, or if rounding leaves no digit of it.
+    Raise InputError if it is unbounded, too fast, or lost to rounding.
     """
     times = [_EARLIER * drawn.time, drawn.time]
     path = integer_series(drawn.scene, times)
@@ -80,9 +79,9 @@ def truth_of(drawn: Draw) -> Truth:
 def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse the scene of its run `tried` with the message `why`.
 
-    `auto` may not, closed forms only near the limits of binary64, `quick` always. Any other may if
-    the scene is of `_MAY_REFUSE` (it may diverge or be too fast) or amplifies errors more than
-    `_CALM`; a method of SciPy also if the tolerance is too fine for it.
+    `auto` may not, closed forms only near the limits of binary64, `quick` always. Others may for
+    `_MAY_REFUSE` (diverging or too fast) and above the amplification `_CALM`; SciPy also for too
+    fine a tolerance.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -114,10 +113,7 @@ The tolerance is multiplied by the error amplification only if this exceeds `LIV
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield deferred checks of omega from every entry point in random scenes.
-
-    A scene without a true solution gets one check, which passes if it is of `_MAY_REFUSE`.
-    """
+    """Yield deferred checks of omega from every entry point; some scenes have no true solution."""
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
@@ -138,10 +134,7 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
 
 
 def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of attitudes by `auto`, Taylor series and a prepared solver.
-
-    A scene whose true attitude can't be computed, or has no digit left by rounding, is left out.
-    """
+    """Yield deferred checks of attitudes where the true one is known and not lost to rounding."""
     tolerance_at = METHODS["taylor"].finest
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
         if not chosen.may_ask(f"random/{number}"):
@@ -170,10 +163,7 @@ def _requested(chosen: Selection, number: int, entrances: Entrances) -> Entrance
 
 
 def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
-    """Return a deferred run for each entry point, by its name, in the random scene `drawn`.
-
-    Methods of SciPy and the reference are slow: they are tried in few draws, and never if `thin`.
-    """
+    """Return a deferred run for each entry point, by its name; slow ones in few draws."""
     forms = ["closed-form"] if closed_form(drawn.scene) else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
     if number // 2 % _EVERY_SLOW == 0 and not thin:

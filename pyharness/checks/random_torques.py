@@ -1,7 +1,7 @@
 """Checks of methods in random scenes whose torque depends on omega or attitude.
 
-The torque is the sum of recorded functions, or of ready terms. The true solution is the reference,
-whose series of the recorded torque (`pyharness.truth.tape_series`) shares no code with the methods.
+It is the sum of recorded functions, or of ready terms. The reference's series of it
+(`pyharness.truth.tape_series`) shares no code with the methods.
 """
 
 from collections.abc import Callable, Iterator
@@ -42,10 +42,7 @@ _SLOW = ("reference", *SCIPY_METHODS)
 
 
 def random_torques(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of omega and attitude from every entry point in random scenes.
-
-    A scene whose true solution is unbounded, too long to compute or lost to rounding is left out.
-    """
+    """Yield deferred checks of omega and attitude where the truth is known, from entry points."""
     for number in range(0, chosen.draws, _EVERY):
         if not chosen.may_ask(f"random/{number}"):
             continue
@@ -72,10 +69,7 @@ def random_torques(chosen: Selection) -> Iterator[Attempt]:
 def _entrances(
     scene: Scene, time: float, source: Random, is_slow: bool
 ) -> dict[str, Callable[[], MethodRun]]:
-    """Return a deferred run for each entry point, by its name, as in ``torque-solve-taylor``.
-
-    `source` draws the tolerances, from 1e-3 to the finest of a method.
-    """
+    """Return a deferred run for each entry point, with tolerances from 1e-3 to the finest."""
     times, digits = (_EARLIER * time, time), source.random()
     slow = _SLOW if is_slow else ()
 
@@ -104,7 +98,6 @@ def _by_many(tolerance: float, scene: Scene, time: float) -> MethodRun:
 
 
 def _may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether the refusal is SciPy's, of too much work or a tolerance it can't meet."""
     if tried.method in SCIPY_METHODS and "can't meet it" in why:
         return True
     return tried.method in SCIPY_METHODS and "allow more work" in why

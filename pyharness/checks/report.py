@@ -29,8 +29,7 @@ def checks_report(
 ) -> Report:
     """Return the report of the checks that a command made, for the screen and for files.
 
-    `text` is for the screen, `page` (by default `summary_page`) for Markdown; the JSON record also
-    has the fields `extra`.
+    The JSON record also has the fields `extra`.
     """
     return Report(
         verb,
@@ -53,10 +52,7 @@ def summary_page(
     depth: int = 1,
     more: Sequence[Section] = (),
 ) -> list[Section]:
-    """Return a page for the summary of a job: verdict, table of groups, and failures.
-
-    Lines of `title` are shown as code. A group has `depth` parts of the ids in common.
-    """
+    """Return a page for a job: verdict, table of groups by `depth` parts of ids, and failures."""
     failed = [check for check in checks if not check.passed]
     lines: list[str] = []
     for check in failed[:_MOST_ON_PAGE]:
@@ -103,10 +99,7 @@ def basis_note(checks: Sequence[Check]) -> list[str]:
 def summary(
     title: Sequence[str], checks: Sequence[Check], depth: int = 1, more: Section = ()
 ) -> list[Section]:
-    """Return the printed sections: title, failures, table of groups, `more` and verdict.
-
-    A group has the first `depth` parts of the ids in common.
-    """
+    """Return the printed sections: title, failures, groups by `depth` parts of ids, and verdict."""
     table: Section = [*basis_note(checks), _groups(checks, depth)]
     return [title, listed_singly(checks), table, more, [verdict(checks)]]
 
@@ -124,10 +117,7 @@ def _groups(checks: Sequence[Check], depth: int) -> Table:
 
 
 def listed_singly(checks: Sequence[Check]) -> list[str]:
-    """Return lines on at most `_MOST_FAILURES` failed checks, with the commands that repeat them.
-
-    Of at most `_FEW` checks, those that passed are shown too.
-    """
+    """Return lines on failed checks with the commands that repeat them; on all, if few."""
     failed = [check for check in checks if not check.passed]
     lines = []
     for check in failed[:_MOST_FAILURES]:
@@ -158,8 +148,8 @@ _SAMPLES = (
 def samples(checks: Sequence[Check], rounding: float) -> Section:
     """Return a table of the worst ratio of error to tolerance, by entry point and tolerance.
 
-    Only `Sample` checks count, in three ranges of the error amplification. The relative error
-    `rounding` times the amplification is first subtracted from the error.
+    The error is less `rounding` times the amplification, in three ranges of which samples are
+    counted.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:
@@ -180,10 +170,7 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
 
 
 def references(checks: Sequence[Check]) -> Section:
-    """Return lines that state the errors of the references to which values of checks refer.
-
-    One has the largest proved bound, another the largest estimate; a wrong estimate has its own.
-    """
+    """Return lines on the errors of the references: largest proved, largest estimate, and wrong."""
     bounds = [each.reference_bound() for each in checks if each.reference_bound is not None]
     known = [each for each in bounds if each is not None]
     lines = []

@@ -56,10 +56,9 @@ State = tuple[Array, Array | None]
 
 
 def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
-    """Return the trials of a scene by name, until the scene's last step.
+    """Return the trials of a scene by name, repeated by the command's `options`.
 
-    `options` of `stress` has the scene file, for the commands that repeat a check. Raise InputError
-    if the torque is opaque, or needs an attitude that the scene does not have.
+    Raise InputError if the torque is opaque, or needs an attitude that is missing.
     """
     if isinstance(scene.torque, StateTorque):
         system(scene)  # raises InputError for an opaque torque
@@ -111,7 +110,6 @@ def _made(
     name: Name,
     only: Sequence[str],
 ) -> Iterator[Attempt]:
-    """Yield the deferred checks of a trial."""
     return attempts(scene, name)
 
 
@@ -120,7 +118,6 @@ def _last(scene: Scene) -> float:
 
 
 def _tried(scene: Scene) -> Iterator[tuple[str, float]]:
-    """Yield each method that is tried on a scene, with its tolerances."""
     for method in (*_METHODS, *(["closed-form"] if closed_form(scene) else [])):
         if not _takes(method, scene):
             continue

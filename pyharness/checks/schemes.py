@@ -1,8 +1,7 @@
 """Checks of the corrected programs against their schemes, by recomputing every step.
 
-Fortran and the Python twin could share a fault too small to change the order. Each step is
-therefore recomputed from the program's own state before it; the results may differ only by the
-rounding of one step.
+Fortran and twin could share a fault too small to change the order. Each step is recomputed from the
+program's state before it; only the rounding of one step may differ.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,10 +33,7 @@ _ONE_STEP = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """A stage, or a collocation point, of every step of a run, with its states and rates.
-
-    Arrays have a row for every step; columns are omega (rad/s) and translational velocity (m/s).
-    """
+    """A stage, or collocation point, of every step: rows of omega (rad/s) and velocity (m/s)."""
 
     # shape (n, 6); the arguments of the right-hand sides (rad/s, m/s), and the right-hand sides
     # (rad/s2, m/s2)
@@ -47,10 +43,7 @@ class Stage:
 
 
 def schemes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of each program's steps.
-
-    The value is the largest ratio of a difference to its rounding bound, with the limit 1.
-    """
+    """Yield deferred checks of steps: the largest difference over its rounding bound."""
     for case in cases(chosen, (7,)):
         for program in PROGRAMS:
             yield Attempt(
@@ -93,10 +86,6 @@ def stages(scene: Scene, run: Trajectory) -> tuple[Stage, Stage, Stage, Stage]:
 
 
 def _scheme(name: str, scene: Scene, run: Trajectory) -> tuple[Array, Array]:
-    """Return the states after every step by a program's scheme, and rounding bounds, (n, 6) each.
-
-    Each step starts from the state before it in `run`.
-    """
     if name not in PARTS:
         kutta = stages(scene, run)
         return _put_together(scene, kutta[0], kutta, (1 / 6, 1 / 3, 1 / 3, 1 / 6), 1.0)
@@ -134,10 +123,9 @@ def _beginning(scene: Scene, run: Trajectory) -> Stage:
 
 
 def _stage(scene: Scene, part: float, state: Array) -> Stage:
-    """Return the rates for given states (n, 6) in every step, with bounds on their rounding errors.
+    """Return rates at the fraction `part` of every step, with bounds on their rounding errors.
 
-    They are the right-hand sides of equations 16-18 and of dV/dt = F/m - omega x V, with the torque
-    at the fraction `part` of the step.
+    They are of equations 16-18 and dV/dt = F/m - omega x V.
     """
     omega, velocity = state[:, :3], state[:, 3:]
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)

@@ -37,10 +37,7 @@ class Selection:
         return may_hold(id, self.only)
 
     def drawn(self, number: int, subject: str = "") -> Name:
-        """Return the name of the check of `subject` in random draw `number`.
-
-        It includes the seed, so that the command which repeats the check draws the same scene.
-        """
+        """Return the name of the check of `subject` in random draw `number`, with its seed."""
         draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
         options = f"{draws} --seed {shlex.quote(self.seed)}"
         return Name("random", subject, str(number), options=options)

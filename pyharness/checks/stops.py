@@ -1,9 +1,8 @@
 """Checks of the Runge-Kutta program's stop test against eq. 19, recomputed along its own run.
 
 A run stops if a quotient, the change of K (right-hand side) over that of U (state) within a step,
-exceeds the stop constant. Fortran and the twin could both test a wrong quotient. The quotients are
-therefore computed from the scheme, and the program is run with constants just below and above each
-that exceeds all earlier ones.
+exceeds the stop constant. As Fortran and twin could both test a wrong quotient, all are computed
+from the scheme, and the program is run with constants just below and above each record.
 """
 
 from collections.abc import Callable, Iterator
@@ -47,8 +46,7 @@ class Quotients:
 def stops(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of the stops with every combination of the defects of the test.
 
-    Step and variable must agree; the value is the largest difference of quotients over its rounding
-    bound, with the limit 1.
+    The value is the largest difference of quotients over its rounding bound.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):
@@ -60,7 +58,6 @@ def stops(chosen: Selection) -> Iterator[Attempt]:
 
 
 def _run(scene: Scene) -> tuple[Trajectory, Stages | None]:
-    """Return a corrected run without stop test, and its stages if it has a row for every step."""
     run = PROGRAM_REGISTRY[_PROGRAM].run(scene, Listing.corrected(_PROGRAM), may_stop=False)
     return run, stages(scene, run) if is_whole(scene, run) else None
 
@@ -114,10 +111,7 @@ def _quotients(scene: Scene, run: Trajectory, kutta: Stages, listing: Listing) -
 
 
 def _constants(quotients: Quotients) -> list[float]:
-    """Return stop constants (1/s) on both sides of each quotient that exceeds all earlier ones.
-
-    Each differs by more than rounding from all quotients of its step.
-    """
+    """Return stop constants (1/s) beside each record, apart by more than rounding."""
     constants = []
     below = 0.0
     for values, rounding in zip(quotients.values, quotients.rounding, strict=True):
@@ -129,7 +123,6 @@ def _constants(quotients: Quotients) -> list[float]:
 
 
 def _due(quotients: Quotients, constant: float) -> Stop | None:
-    """Return the stop at the first quotient above `constant` (1/s), if any."""
     above = np.argwhere(quotients.values > constant)
     if not len(above):
         return None

@@ -28,8 +28,7 @@ The arguments are those of `Name`.
 class Trial:
     """A group of checks of `stress` under one kind of extreme conditions.
 
-    `title` describes the conditions, `bound` explains how the limits are derived, and `attempts`
-    takes leading parts of requested ids.
+    `bound` explains the limits; `attempts` takes leading parts of requested ids.
     """
 
     name: str
@@ -45,10 +44,7 @@ def trial(name: str) -> Trial:
 
 
 def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) -> Iterator[Check]:
-    """Yield the checks of `stress` whose ids begin with an element of `only`, all if it is empty.
-
-    `trials` are by default those of `TRIALS`.
-    """
+    """Yield the checks of `stress` whose ids begin with an element of `only`."""
     suites = {
         name: lambda name=name: (trials[name] if trials else trial(name)).attempts(only)
         for name in trials or TRIALS
@@ -57,10 +53,7 @@ def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) 
 
 
 def worst(checks: Iterable[Check]) -> dict[str, Check]:
-    """Return the check with the largest ratio of value to limit, by ``trial/method``.
-
-    A failed check is worse than any that passed; those without a limit or a scene are ignored.
-    """
+    """Return the worst check by ``trial/method``; those without limit or scene are ignored."""
     found: dict[str, Check] = {}
     for check in checks:
         if check.name.scene is None or check.limit is None:

@@ -1,7 +1,6 @@
 """Tolerances at which the checks run each method, and limits on the work of a method.
 
-A work limit is a number of right-hand sides. It decides which tolerances are affordable, and sets
-no bound on errors.
+A work limit, in right-hand sides, decides which tolerances are affordable, and bounds no error.
 """
 
 import math
@@ -46,8 +45,8 @@ def of_case(name: str, thin: bool) -> list[float]:
 def finest(name: str, scene: Scene, time: float) -> float:
     """Return the finest tolerance at which a method is checked until `time` (s) in a scene.
 
-    It is the smallest that `solve` accepts or, if `solve_ivp` does not meet it, the finest of
-    `_LADDER` that is met, or 1.
+    It is the smallest that `solve` accepts, or the finest of `_LADDER` that `solve_ivp` meets, or
+    1.
     """
     met = finest_of(name, scene, time)
     claimed = REGISTRY[name].finest
@@ -65,9 +64,8 @@ def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
 def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
     """Return the tolerances at which a method is checked until `time` (s) in a scene.
 
-    They are the finest within its work limit, and 1e-6 if that is affordable too; the work depends
-    on `flow`. None means the scene's step size, which fixed-step methods always use and Gauss
-    collocation also.
+    They are the finest within the work limit, and 1e-6 if affordable. None is the scene's step
+    size, for fixed steps and Gauss collocation.
     """
     if name in FIXED_STEP:
         return [None]
@@ -98,10 +96,7 @@ def _within_budget(name: str, least: float, radians: float, amplification: float
 
 
 def _cost(name: str, tolerance: float, radians: float, amplification: float) -> float:
-    """Return an estimate of the right-hand sides that a method evaluates; 0 without a work limit.
-
-    `radians` is the time multiplied by the largest rate of change of the motion.
-    """
+    """Return an estimate of a method's right-hand sides; 0 without a work limit."""
     if name in GAUSS:
         stages = int(name[-1])
         # Steps of z radians cause an error of amplification times radians times z**order.

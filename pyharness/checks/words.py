@@ -32,10 +32,10 @@ _VECTORS = Basis(
 def words(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks that our arithmetic of machine words is correct bit for bit.
 
-    CDC instructions with expected results are test vectors. In cells, our arithmetic of 53 bits
-    must agree with floats, and the program compiled for each word with the twin in that word. Both
-    cover every cell if `chosen.only` requests some checks; else the first covers listings with at
-    most one change, the second the original and the corrected ones.
+    CDC instructions with expected results are test vectors. In cells, our 53 bits must agree with
+    floats, and the program compiled for each word with the twin in that word: in every cell if
+    `chosen.only` requests some, else in listings with at most one change, and in the original and
+    corrected ones.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -72,11 +72,9 @@ def _same(name: Name, one: Trajectory, other: Trajectory) -> Check:
 
 
 def _has_all_or_none(listing: Listing) -> bool:
-    """Return whether a listing is the original or the corrected program, without readings."""
     return listing.label != "custom" and not listing.readings
 
 
 def _is_few(listing: Listing) -> bool:
-    """Return whether a listing is such, or has at most one defect or reading."""
     few = len(listing.defects) + len(listing.readings) <= 1
     return few or _has_all_or_none(listing)

@@ -51,8 +51,8 @@ class Drift:
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
     """Return level and times (s) of the long motion, and the limit of the change in a row.
 
-    It is the level of the largest setting whose limits allow enough rows, else the last. The limit
-    is None if the errors are too large for one.
+    It is the first level whose limits allow enough rows, else the last. The limit is None if the
+    errors are too large for one.
     """
     control = free.finest.control
     levels = range(_FIRST[control], LEVELS)
@@ -87,7 +87,6 @@ def drift_of(scene: Scene, times: Array, motion: Motion) -> Drift:
 
 
 def _in_space(attitude: Array, vectors: Array) -> Array:
-    """Return vectors about the body axes as vectors about the axes of space, shape (n, 3)."""
     q = attitude.T
     turned = product(product(q, (np.zeros(len(vectors)), *vectors.T)), (q[0], *-q[1:]))
     return np.array(turned[1:]).T
@@ -99,10 +98,7 @@ def _angle(first: Array, second: Array) -> Array:
 
 
 def growth_power(times: Array, drift: Array) -> float | None:
-    """Return p if the largest drift up to a time grows with its power p; None if it is rounding.
-
-    It is the power from a quarter of the last time to the last.
-    """
+    """Return p if the largest drift up to a time grows with its power p; None if it is rounding."""
     quarter = times <= times[-1] / 4.0
     early, late = float(np.abs(drift[quarter]).max()), float(np.abs(drift).max())
     if not math.isfinite(late) or early <= 0.0:

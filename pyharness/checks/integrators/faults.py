@@ -32,10 +32,10 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of an integrator: its name, a sentence that says what is wrong, and its motion.
+    """A fault of an integrator: its name, what is wrong in a sentence, and its motion.
 
-    `motion` takes scene, times (s) and step size (s), and returns None if the fault has no effect.
-    With `of_step`, the states approach the true ones as the step falls.
+    `motion` takes scene, times (s) and step size (s), and returns None without effect. With
+    `of_step`, the states approach the true ones as the step falls.
     """
 
     name: str
@@ -61,7 +61,6 @@ def _cross(a: Any, b: Any) -> list[Any]:
 
 
 def _law(scene: Scene, t: Any) -> list[Any]:
-    """Return the torque of the scene's law at the symbolic time t."""
     law = scene.law
     found = []
     for axis in range(3):
@@ -92,8 +91,6 @@ def _with_gyroscopic(x: float, y: float, z: float) -> Callable[[Scene, Array, fl
 
 
 def _with_law(change: Callable[[Scene], Any]) -> Callable[[Scene, Array, float], State | None]:
-    """Return the motion under another torque; None without a torque."""
-
     def motion(scene: Scene, times: Array, step: float) -> State | None:
         if scene.torque.is_zero:
             return None
@@ -103,8 +100,6 @@ def _with_law(change: Callable[[Scene], Any]) -> Callable[[Scene, Array, float],
 
 
 def _without(**part: Any) -> Callable[[Scene, Array, float], State | None]:
-    """Return the motion without a part of the torque law; None if the law has no such part."""
-
     def motion(scene: Scene, times: Array, step: float) -> State | None:
         law = replace(scene.law, **part)
         return None if law == scene.law else true_motion(replace(scene, torque=law), times)
@@ -176,7 +171,7 @@ def as_output(name: str, attitude: Array, scene: Scene) -> Array:
 def _space_rates(scene: Scene, times: Array, step: float) -> State:
     """Return the motion with q' = (0, omega) q/2 in place of q' = q (0, omega)/2.
 
-    The conjugate p of q satisfies p' = p (0, -omega)/2, and -omega the equations with the opposite
+    The conjugate p of q satisfies p' = p (0, -omega)/2; -omega, the equations with the opposite
     gyroscopic term and torque.
     """
     moments = scene.moments

@@ -1,8 +1,7 @@
 """Checks of an integrator of rigid bodies in any language, against the true solution.
 
-Its errors are measured with smaller and smaller steps (or tolerances) in random scenes. If it
-converges to another motion, the fault is named. docs/how-to/integrators.md describes requests,
-answers and checks.
+Its errors are measured with smaller and smaller steps or tolerances in random scenes; if it
+converges to another motion, the fault is named (docs/how-to/integrators.md).
 """
 
 import math
@@ -83,9 +82,8 @@ def judge_integrator(
     """Return the results of all checks of an integrator, started by `command`.
 
     ``again(name)`` returns the command that repeats the checks in a scene, ``told`` gets the number
-    of finished problems and the name of the next. `due` is the least order, `patience` the longest
-    wait (s). An invalid answer is a failed check and ends the checks. Raise InputError if the
-    command is empty.
+    of finished problems and the next name. `due` is the least order, `patience` the longest wait
+    (s). An invalid answer ends the checks. Raise InputError if the command is empty.
     """
     found = Verdict(command)
     where = "start"
@@ -124,8 +122,7 @@ def judge_integrator(
 def _unexplained(found: Verdict) -> tuple[str, ...]:
     """Return the problems with failed checks that no fault explains.
 
-    A fault also explains failures where its motion, or a long one, may overflow; a low order, that
-    a higher one is missing.
+    A fault also explains an overflow; a low order, that a higher one is missing.
     """
     faults = [each for each in found.findings if each.name not in FIRST_ORDER]
     named = {each.name for each in faults}
@@ -217,7 +214,6 @@ def _order_check(each: Convergence, problem: Problem, due: float, floor: float) 
 
 
 def _repeated(ask: Ask, judged: Judged) -> Check:
-    """Return the check that the same request has the same answer, up to a quaternion's sign."""
     problem, level = judged.problem, LEVELS // 2
     motion, before = ask(problem.request(level), len(problem.times)), judged.answers[level]
     if motion.refusal or (motion.attitude is None) != (before.attitude is None):
@@ -236,7 +232,7 @@ def _same(one: Array, other: Array) -> Any:
 def _returned(ask: Ask, judged: Judged) -> list[Check]:
     """Return how far the body is from its initial state after it went forth and back.
 
-    Without torque, a motion with the opposite omega is that with the opposite time.
+    Without torque, the opposite omega is the opposite time.
     """
     problem, level = judged.problem, LEVELS // 2
     forth = judged.answers[level]

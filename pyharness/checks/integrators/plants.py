@@ -27,11 +27,7 @@ _STEP_AXIS = np.array([0.6, 0.0, 0.8])  # of the rotation that a first-order fau
 
 @dataclass(frozen=True)
 class IntegratorPlant:
-    """A fault that is planted in an integrator; its name is that by which it must be recognised.
-
-    `advance` computes the attitude anew from the quaternion, the omega at both ends of a step, and
-    the step size (s).
-    """
+    """A fault that is planted in an integrator; its name is that by which it must be recognised."""
 
     name: str
     request: Callable[[dict[str, Any]], None] | None = None
@@ -62,7 +58,6 @@ def _frozen(asked: dict[str, Any]) -> None:
 
 
 def _held(asked: dict[str, Any]) -> None:
-    """Delay the waves of the torque by half a step."""
     law, delay = asked["torque"], 0.5 * asked["step_size"]
     sines: list[Any] = []
     cosines: list[Any] = []
@@ -122,7 +117,6 @@ def _in_space(scene: Scene, motion: Motion) -> Motion:
 
 
 def _turn(omega: Array, h: float) -> Any:
-    """Return the quaternion of the rotation by `omega` (rad/s) during `h` (s)."""
     spin = float(np.linalg.norm(omega))
     factor = math.sin(0.5 * spin * h) / spin if spin else 0.0
     return math.cos(0.5 * spin * h), *(factor * omega).tolist()
@@ -227,8 +221,7 @@ def self_test(
 ) -> Iterator[Recognised]:
     """Yield the faults that are recognised, first without a planted fault, then with each of them.
 
-    `due` is the order that the integrator should have. Without valid answers, only a failed control
-    is yielded.
+    Without valid answers, only a failed control is yielded.
     """
     try:
         with PortProcess(command, patience, "--integrator") as process:

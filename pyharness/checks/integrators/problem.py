@@ -106,10 +106,7 @@ class Problem:
         return request(self.scene, times, self.step_size(level), tolerance)
 
     def errors(self, motion: Motion) -> tuple[float, float | None]:
-        """Return the errors of omega, relative to the largest, and of the attitude (rad), if any.
-
-        An error is infinite if a number is not finite.
-        """
+        """Return the errors of omega (relative) and attitude (rad, if any), maybe infinite."""
         assert self.truth.attitude is not None
         return errors_between(State(self.truth.omega, self.truth.attitude), motion)
 
@@ -133,8 +130,7 @@ def finite_or_infinite(x: float) -> float:
 class Convergence:
     """The errors of omega or attitude (`part`) in one problem, from the largest setting down.
 
-    `settings` are step sizes (s) or tolerances; the error falls with their power `order`, None if
-    the errors are rounding from the start.
+    They fall with the power `order` of step size (s) or tolerance; None if they are rounding.
     """
 
     part: str
@@ -144,10 +140,7 @@ class Convergence:
 
     @property
     def is_first(self) -> bool:
-        """Return whether the order is 1, up to the accuracy of the measurement.
-
-        Several steps must show it, because rounding may do so in one pair by chance.
-        """
+        """Return whether the order is 1 over several steps, as far as measured."""
         if self.order is None:
             return False
         far = _power(self.errors[-_SEVERAL] / max(self.errors[-1], _LEAST),
@@ -173,11 +166,10 @@ class Convergence:
 def convergence(
     part: str, settings: Sequence[float], errors: Sequence[float], floor: float, overall: bool
 ) -> Convergence:
-    """Return the measured order of convergence of some errors.
+    """Return the measured order of convergence of some errors above `floor`.
 
-    Errors below `floor` may be rounding and are not used. With `overall` it is the order from the
-    first to the last error, or over the last four if that is smaller, as for tolerances, with which
-    errors fall irregularly; else that of the last pair.
+    With `overall` it is the order from first to last, or over the last four if smaller, as for
+    tolerances, with which errors fall irregularly; else that of the last pair.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None
@@ -218,8 +210,7 @@ class Judged:
     def lost(self) -> int:
         """Return the number of rows that are not finite and should be.
 
-        An integrator may overflow with a large step if the next smaller is finite and predicts an
-        error of 1.
+        A large step may overflow if the next predicts an error of 1.
         """
         rows = self.finest.lost
         for level in range(LEVELS - 2, -1, -1):

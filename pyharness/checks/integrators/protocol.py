@@ -27,9 +27,8 @@ class Motion:
     """The answer of an integrator to a request: the states at the requested times.
 
     `omega` is about the body axes (rad/s), shape (n, 3); `attitude` from body to space, scalar
-    first, normed, (n, 4), if it is computed; `norm` the largest difference of a quaternion's norm
-    from 1. The field `control` of the request, one of `CONTROLS`, sets the accuracy; `rounding` is
-    the arithmetic's relative error, `refusal` the reason of a refusal, if any.
+    first, normed, (n, 4); `norm` the largest difference of a norm from 1. The field `control` of
+    the request sets the accuracy; `rounding` is relative.
     """
 
     omega: Array
@@ -49,8 +48,7 @@ class Motion:
 def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: float) -> bytes:
     """Return the line of JSON that requests the states of a scene at `times` (s).
 
-    An integrator with a fixed step uses `step_size` (s), of which all times are multiples, any
-    other `tolerance`, relative to the largest omega.
+    They are multiples of `step_size` (s); `tolerance` is relative to the largest omega.
     """
     record = scene_record(scene)
     asked = {

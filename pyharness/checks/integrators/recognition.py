@@ -44,10 +44,7 @@ class Finding:
 
 
 def recognised(results: Sequence[Judged]) -> list[Finding]:
-    """Return the known faults that explain the errors, those of most problems first.
-
-    Where no motion of a fault does, the orders of convergence are interpreted.
-    """
+    """Return the known faults that explain the errors, else what the orders show."""
     names: dict[str, tuple[str, list[str]]] = {}
 
     def add(name: str, says: str, problem: str) -> None:
@@ -67,7 +64,6 @@ def recognised(results: Sequence[Judged]) -> list[Finding]:
 
 
 def _explained(judged: Judged) -> list[tuple[str, str]]:
-    """Return names and sentences of the faults that explain the errors in one problem."""
     true = judged.convergences
     if judged.lost or all(each.is_higher for each in true):
         return []
@@ -100,7 +96,6 @@ def _explained(judged: Judged) -> list[tuple[str, str]]:
 def _best(
     judged: Judged, known: Sequence[tuple[Fault, State]], parts: Sequence[int]
 ) -> Fault | None:
-    """Return the fault, if any, whose motion the integrator approaches in `parts`."""
     most = _UNEXPLAINED * max(judged.convergences[k].errors[-1] for k in parts)
     scored = []
     for number, (fault, state) in enumerate(known):
@@ -117,10 +112,7 @@ def _best(
 def _approaches(
     judged: Judged, fault: Fault, states: Callable[[int], State], parts: Sequence[int]
 ) -> bool:
-    """Return whether the answers approach the states of a fault as the steps become smaller.
-
-    A difference that falls so fast is also near the discretisation error.
-    """
+    """Return whether the answers approach the states of a fault as the steps become smaller."""
     pairs = enumerate(judged.answers)
     errors = [errors_between(states(level), motion) for level, motion in pairs]
     floor = max(judged.problem.floor(judged.finest.rounding), _OF_MOTIONS)
@@ -140,7 +132,6 @@ def _approaches(
 
 
 def _by_orders(results: Sequence[Judged]) -> list[tuple[str, str]]:
-    """Return pairs of a fault in `FIRST_ORDER` and the name of a problem whose orders show it."""
     found = []
     calm_is_higher = any(
         each.convergences[0].is_higher for each in results if each.problem.kind != "wave"
@@ -162,7 +153,6 @@ def _by_orders(results: Sequence[Judged]) -> list[tuple[str, str]]:
 
 
 def _conserves_momentum(results: Sequence[Judged]) -> bool:
-    """Return whether |L| is constant, up to rounding, in all problems without torque."""
     free = [each for each in results if each.problem.scene.torque.is_zero]
     for judged in free:
         problem, motion = judged.problem, judged.finest

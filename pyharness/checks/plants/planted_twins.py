@@ -49,7 +49,6 @@ class PlantedTwin(Program):
     def _computed(
         self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
-        """Run the faulty twin, or the compiled program unchanged if it is not `both`."""
         if self.both or implementation == "python":
             lipschitz, may_stop, _ = options
             found: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)
@@ -58,10 +57,7 @@ class PlantedTwin(Program):
 
 
 def twin(program: str, name: str, both: bool = True) -> Fault:
-    """Return the fault named `name` in the Python version of a program.
-
-    Its context yields the `PlantedTwin` that is in the registry meanwhile.
-    """
+    """Return the fault named `name` in a program's twin, a context that yields the program."""
     fault = TWIN_FAULTS[name]
 
     @contextmanager

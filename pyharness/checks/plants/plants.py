@@ -44,10 +44,9 @@ from pyharness.original.programs import Program
 
 @dataclass(frozen=True)
 class Plant:
-    """A fault that is planted to test the checks: its name, its description, and how to plant it.
+    """A fault that is planted to test the checks, and the kinds of checks that can detect it.
 
-    `size` is that of the self-test; a fault of size 0 changes nothing. `kinds` of checks, besides
-    the golden record, can detect it and are run.
+    A fault of size 0 changes nothing; `size` is that of the self-test.
     """
 
     name: str
@@ -75,10 +74,7 @@ _Answer = tuple[Array, int, int, Array]
 
 
 def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
-    """Return a fault of prepared solvers: results become ``change(packed, result, size)``.
-
-    `packed` is the input of the compiled kernel.
-    """
+    """Return a fault of prepared solvers: results become ``change(packed, result, size)``."""
 
     def planted(size: float) -> AbstractContextManager[Any]:
         entry = extension.extension().solve_packed
@@ -150,7 +146,6 @@ def _label_both(
 
 
 def _earlier(time: Array, size: float) -> Array:
-    """Return times shifted by a part of the first step."""
     return time - size * time[:1] if len(time) else time
 
 
@@ -158,10 +153,7 @@ def _shifted(
     size: float, solve: Callable[..., Trajectory], scene: Scene, times: Sequence[float],
     *rest: float,
 ) -> Trajectory:  # fmt: skip
-    """Call `solve` for times that are `size` steps too late, and label the results with `times`.
-
-    Energy and momentum are conserved, so that only the true solution shows the fault.
-    """
+    """Call `solve` for times that are too late; only the true solution shows the fault."""
     late = size * scene.step_size if times[-1] >= 0.0 else -size * scene.step_size
     found = solve(scene, [t + late for t in times], *rest)
     time = np.array(times[: len(found.time)], dtype=float)
@@ -169,10 +161,7 @@ def _shifted(
 
 
 def _wrong_card(size: float) -> AbstractContextManager[Any]:
-    """Return a context that exchanges the flags of two defects in the compiled programs.
-
-    If only one of the two is to be corrected, the card of the other is.
-    """
+    """Return a context that exchanges the flags of two defects in the compiled programs."""
     known = [entry["flag"] for entry in flagged() if entry["kind"] != "reading"]
     flags = Listing.flags.fget  # type: ignore[attr-defined]
 

@@ -30,8 +30,6 @@ def _middle(rows: Rows) -> int:
 
 
 def _in_row(change: Callable[[list[float]], None], last: bool = False) -> AnswerFault:
-    """Return a fault that changes the middle row of an answer, or its last row."""
-
     def plant(answer: dict[str, Any]) -> dict[str, Any] | None:
         rows: Rows = answer["rows"]
         if not rows:
@@ -43,8 +41,6 @@ def _in_row(change: Callable[[list[float]], None], last: bool = False) -> Answer
 
 
 def _in_rows(change: Callable[[Rows], Rows], least: int = 2) -> AnswerFault:
-    """Return a fault that changes the list of all rows, if it has at least `least`."""
-
     def plant(answer: dict[str, Any]) -> dict[str, Any] | None:
         if len(answer["rows"]) < least:
             return None

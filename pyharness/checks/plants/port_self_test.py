@@ -20,11 +20,7 @@ _MOST_CELLS = 24  # cells in which the faults are planted
 
 @dataclass(frozen=True)
 class Noticed:
-    """The runs in which a planted fault changed the port's answer, and those that failed.
-
-    For the control, which has no plant, all runs count as changed. `example` is the id and note of
-    a failed check.
-    """
+    """The runs in which a planted fault changed the port's answer (control: all), and failures."""
 
     plant: PortPlant | None
     changed: int
@@ -33,10 +29,7 @@ class Noticed:
 
     @property
     def passed(self) -> bool:
-        """Return whether each changed answer was noticed; for the control, whether none failed.
-
-        A fault that changed no answer passes; the report counts these.
-        """
+        """Return whether each changed answer was noticed; for the control, whether none failed."""
         return self.changed == self.failed if self.plant else self.failed == 0
 
     @property
@@ -48,8 +41,7 @@ class Noticed:
 def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Noticed]:
     """Yield what the check of a port notices, first without any fault, then with each fault.
 
-    At most `_MOST_CELLS` runs are used, always the same. Without valid answers, only a failed
-    control is yielded.
+    Without valid answers, only a failed control is yielded.
     """
     chosen = _chosen(cells)
     try:

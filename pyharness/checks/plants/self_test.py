@@ -21,7 +21,7 @@ _DRAWS = 12
 class Caught:
     """The checks that failed with a planted fault or, as a control, without any fault.
 
-    `failed` counts them by kind; `example` is of the golden record only if nothing else failed.
+    `example` is of the golden record only if nothing else failed.
     """
 
     plant: Plant | None
@@ -40,10 +40,7 @@ class Caught:
 
 
 def self_test(seed: str, record: Path) -> Iterator[Caught]:
-    """Yield the failed checks, first without any fault, and then with each planted fault.
-
-    Without a fault, a few checks of every kind are made; with one, only the plant's kinds.
-    """
+    """Yield the failed checks, first without any fault, and then with each planted fault."""
     chosen = Selection(seed=seed, draws=_DRAWS, record=record, thin=True)
     yield _caught(None, chosen)
     for plant in PLANTS:

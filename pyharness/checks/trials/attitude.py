@@ -104,8 +104,7 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
 def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> float:
     """Return the largest error of the attitude that a method may have at `time` (s), in rad.
 
-    A closed form may have rounding errors alone, others the tolerance and amplified rounding. If
-    the motion amplifies more than a thousandfold, it amplifies the tolerance too.
+    Only above a thousandfold does the amplification apply to the tolerance.
     """
     if method in FORMS:
         return ATTITUDE
@@ -157,10 +156,6 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterator[Check]:
-    """Yield the checks of a method's attitude at the last time of `known()`: angle and norm.
-
-    For a closed form, the drift of the angular momentum in space is checked too.
-    """
     scene, truth = scene_of(name), known()
     tried = by_rows(name.subject, tolerance, scene, [truth.end])
     # Quaternions are compared with their signs, since the sign is continuous in time.
@@ -178,10 +173,7 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
 
 
 def _omega_limit(scene: Scene) -> float:
-    """Return the relative error of the angular momentum by 16 rounding errors of omega.
-
-    That of each component is 2**-53 times the largest component.
-    """
+    """Return the relative error of the angular momentum by 16 rounding errors of omega."""
     momentum = np.array(scene.moments) * scene.omega
     size = float(np.linalg.norm(momentum)) or 1.0
     largest = max(scene.moments or (1.0,)) * max(map(abs, scene.omega))
@@ -199,9 +191,9 @@ def _momentum_drift(scene: Scene, found: Answer) -> float:
 def _montgomery(name: Name) -> Check:
     """Check the body's rotation about its angular momentum in a period by Montgomery's formula.
 
-    Its angle is 2 E T/L less a solid angle, with energy E, period T and angular momentum L. In the
-    body, L describes a closed curve about the axis along which its component keeps its sign, which
-    encloses the solid angle. As the angle is not conserved, no other check detects a wrong rate.
+    Its angle is 2 E T/L less the solid angle that the angular momentum L encloses in the body,
+    about the axis along which its component keeps its sign, with energy E and period T. As the
+    angle is not conserved, no other check detects a wrong rate.
     """
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)
@@ -225,7 +217,7 @@ def _montgomery(name: Name) -> Check:
 def _solid_angle(scene: Scene, period: float) -> float:
     """Return the solid angle that the angular momentum encloses in the body in one period (s).
 
-    The trapezoidal rule converges exponentially for an analytic periodic function.
+    The trapezoidal rule converges exponentially.
     """
     moments = np.array(scene.moments)
     before, count, rows = math.inf, 32, np.empty((0, 3))
@@ -248,10 +240,6 @@ def _solid_angle(scene: Scene, period: float) -> float:
 
 
 def _turned(turn: Turn, name: Name) -> Check:
-    """Check that the attitude of the rotated problem, rotated back, is the original attitude.
-
-    Each may have the error that the method is allowed.
-    """
     scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
     plain, other = (
         solve(each, [time], method, tolerance, attitude=True).attitude
@@ -265,10 +253,6 @@ def _turned(turn: Turn, name: Name) -> Check:
 
 
 def _back(name: Name) -> Check:
-    """Check that integrating forward and then back to time 0 gives the initial attitude.
-
-    The limit is the sum of the errors that both integrations may cause.
-    """
     scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
     there = solve(scene, [time], method, tolerance, attitude=True)
     assert there.attitude is not None
@@ -287,11 +271,7 @@ def _back(name: Name) -> Check:
 
 
 def _angles(off: float, name: Name) -> Check:
-    """Check Euler angles near a pole by converting them to quaternions with SciPy's rotations.
-
-    `off` is the distance of the second angle from the pole (rad); the name has the sequence of
-    axes.
-    """
+    """Check Euler angles `off` (rad) from a pole against SciPy's rotations."""
     from scipy.spatial.transform import Rotation
 
     sequence = name.circumstance

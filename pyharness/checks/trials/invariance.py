@@ -1,7 +1,7 @@
 """Trial of invariance: results must transform with a problem that is rotated or rescaled.
 
-Methods that perform the same operations in another order of axes, with other signs or exponents,
-must give the same bits; all others agree within an error bound.
+Methods whose operations only change axes, signs or exponents must give the same bits; all others
+agree within an error bound.
 """
 
 import random
@@ -53,8 +53,7 @@ SCENES = {
 class Symmetry:
     """A rotation or rescaling of a problem, and its inverse for omega.
 
-    A motion of a time t takes t/`faster`. The methods and programs in `bitwise` must give the same
-    bits.
+    A time t becomes t/`faster`; those in `bitwise` must give the same bits.
     """
 
     turn: Callable[[Scene], Scene]
@@ -142,10 +141,6 @@ def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
 
 
 def _turned(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Check:
-    """Check that the result of the transformed problem, transformed back, is the original result.
-
-    Outside `bitwise`, each may have its allowed error; fixed steps are only reported.
-    """
     scene, method = scene_of(name), name.subject
     try:
         plain = end(scene, time, method, tolerance)

@@ -1,8 +1,8 @@
 """Trial of length: energy, momentum and phase over a million revolutions, against Brouwer's law.
 
-The phase is the position along the closed curve of omega. By the law, rounding errors of energy and
-momentum grow like the power 1/2 of the number of steps, those of the phase like 3/2; if the errors
-of a step are biased, the powers are 1 and 2.
+The phase is the position along the closed curve of omega. Rounding errors of energy and momentum
+grow like the power 1/2 of the number of steps, of the phase like 3/2; if the errors of a step are
+biased, like 1 and 2.
 """
 
 import math
@@ -71,10 +71,9 @@ Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
 class Integrator:
     """A method whose growth of errors is measured, with bounds on the errors of its steps.
 
-    ``run(scene, times)`` returns omega, shape (n, 3), and the number of steps until each time;
-    ``noise(orbit, scene, step)`` bounds the errors that a step (s) may add. `revolutions` is the
-    longest run from the first initial condition, `others` from the rest; `preference`, whether the
-    errors of a step are known to be biased.
+    `run` returns omega, shape (n, 3), and the number of steps until each time; `noise` bounds the
+    errors that a step (s) may add. `revolutions` is the longest run from the first initial
+    condition, `others` from the rest; `preference`, whether errors are biased.
     """
 
     run: Runner
@@ -106,7 +105,6 @@ def _gauss(stages: int) -> Runner:
 
 
 def _rate(scene: Scene) -> float:
-    """Return an estimate of the fastest rate of a scene (1/s): largest coefficient times omega."""
     return speed(scene, max(map(abs, scene.omega)))
 
 
@@ -166,7 +164,7 @@ def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
 class Drift:
     """The errors of one quantity of a motion by one method, as a function of the number of steps.
 
-    `error` is the root mean square over the initial conditions, whose number is `starts`.
+    `error` is the root mean square over `starts` initial conditions.
     """
 
     motion: str
@@ -193,9 +191,7 @@ def measured(
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
     """Yield the name, errors, numbers of steps and error bounds of energy, momentum and phase.
 
-    Errors have a row for each initial condition and a column for each horizon, a number of
-    revolutions; they are NaN after the end of a run. Steps and bounds have an element for each
-    horizon.
+    Errors have the shape (initial conditions, horizons), NaN after the end of a run.
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * integrator.revolutions]
@@ -222,17 +218,13 @@ def orbit_of(motion: str) -> Orbit:
 
 
 def starts(scene: Scene, body: Orbit) -> list[Scene]:
-    """Return copies of the scene with different initial omegas along one and the same motion.
-
-    Errors depend on the initial phase, and are averaged over these.
-    """
+    """Return scenes along one motion, because errors depend on the initial phase."""
     times = [0.37 * k / body.frequency for k in range(STARTS)]
     rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times]).tolist()
     return [replace(scene, omega=(row[0], row[1], row[2])) for row in rows]
 
 
 def _prepared(name: Name) -> Check:
-    """Check that a prepared solver gives the same bits as the trial's run for 1e4 revolutions."""
     method, scene = name.subject, MOTIONS[name.circumstance]
     time = 1e4 * 2.0 * math.pi / orbit_of(name.circumstance).largest
     rows, _ = INTEGRATORS[method].run(scene, [time])
@@ -261,7 +253,6 @@ def _scipy(name: Name) -> Iterator[Check]:
 
 
 def _program(listing: Listing, name: Name) -> Iterator[Check]:
-    """Report the errors of a program after 10 and 1e4 revolutions, without a limit."""
     scene = scene_of(name)
     found = unstopped(listing).rows(scene)
     for count in (1_000, 1_000_000):

@@ -65,10 +65,7 @@ def _condition_note(found: Solved) -> str:
 
 
 def _threshold(name: Name) -> Check:
-    """Compare the step size up to which LEQT1F finds the matrix singular with the derived one.
-
-    The derived one follows from the exact last pivot.
-    """
+    """Compare the step up to which LEQT1F finds the matrix singular with the exact last pivot's."""
     program = name.subject
     wanted = singular_below(program)
     found = declared_singular_below(program)
@@ -80,10 +77,7 @@ def _threshold(name: Name) -> Check:
 
 
 def _counted(listing: Listing, name: Name) -> Check:
-    """Check the number of steps of a run in which the program prints IER = 129 (singular matrix).
-
-    The defect `dt-accumulates` moves the points in later steps, so that singularity ends.
-    """
+    """Check the number of steps with IER = 129; with `dt-accumulates` singularity ends."""
     scene = scene_of(name)
     ier = compiled.run(scene, listing, velocity=False).ier
     assert ier is not None

@@ -1,7 +1,4 @@
-"""Trial of linear stability: each program's steps against the program's amplification matrix.
-
-The matrix is derived from the scheme, and the steps are made by running the program.
-"""
+"""Trial of linear stability: each program's steps against its derived amplification matrix."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -47,7 +44,6 @@ _DIRECTIONS = {"real": -1.0 + 0.0j, "imaginary": 1.0j}
 
 
 def _attempts() -> Iterator[Attempt]:
-    """Yield deferred checks of every program, original, corrected and for Runge-Kutta in halves."""
     halves = [subset("runge-kutta", keep=[name]) for name in ("stage-base", "base-not-restored")]
     for listing in (*LISTINGS, *halves):
         label = "-".join(sorted(listing.defects)) if listing in halves else listing.label
@@ -114,7 +110,7 @@ def _polynomial(listing: Listing, name: Name) -> Check:
 
 
 def _spin(listing: Listing, name: Name) -> Check:
-    """Report by how much a wobble about axis 3 grows in a step: the spectral radius less 1."""
+    """Report the growth of a wobble about axis 3 in a step: the spectral radius less 1."""
     scene = scene_of(name)
     z = eigenvalues(replace(scene, omega=(0.0, 0.0, scene.omega[2])))
     spin = z[np.argmax(np.abs(z))]

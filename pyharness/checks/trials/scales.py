@@ -35,10 +35,7 @@ _OVERFLOW = Basis(
 
 
 def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
-    """Yield deferred checks that scaling a motion by a power of two changes no digit.
-
-    Omega is multiplied by 2 to each of `powers`, and the time divided.
-    """
+    """Yield deferred checks that scaling a motion by a power of two changes no digit."""
     time = scene.step_size * scene.steps
     plain = cache(lambda: _tried(method, scene, time))
 
@@ -58,7 +55,6 @@ def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) ->
 
 
 def _beyond(name: Name) -> Check:
-    """Check that a method reports a failure if omega leaves the range of binary64."""
     run = _tried(name.subject, scene_of(name), 1e300)
     silent = run.has_result
     note = "a silent wrong number" if silent else run.ended
@@ -78,10 +74,7 @@ def _flow() -> Conditioning:
 
 
 def _truth(scene: Scene, time: float) -> Truth:
-    """Return the true omega of a scaled motion at `time` (s).
-
-    The error amplification is that of the unscaled motion, computed once.
-    """
+    """Return the true omega of a scaled motion; its amplification is the unscaled one's."""
     size = max(map(abs, scene.omega)) / max(map(abs, ORDINARY.omega))
     return truth_of(scene, time, replace(_flow(), largest=_flow().largest * size))
 

@@ -22,10 +22,7 @@ _UNDISTURBED = Basis(
 
 
 def _undisturbed() -> Iterator[Attempt]:
-    """Yield deferred checks that an exact rotation about the middle axis stays constant.
-
-    Every method must return it exactly, except that `quick` may have one rounding error.
-    """
+    """Yield checks that the exact rotation stays; only `quick` may have one rounding error."""
     scene = in_steps(
         Scene("middle axis, undisturbed", (0.0, 1.0, 0.0), moments=MIDDLE_AXIS), _STAYS
     )

@@ -55,11 +55,7 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attempt]:
-    """Yield deferred checks of a method's errors, their crossing, and its divergence in a case.
-
-    The error for every step size is compared with its predicted bound, or only reported for
-    original programs. `listing` is None for a method.
-    """
+    """Yield deferred checks of a method's errors, their crossing, and its divergence in a case."""
     before = listing is not None and listing.label == "original"
     method, place = place.subject, replace(place, scene=case_scene(case))
     scenes = {n: replace(case_scene(case), step_size=TIME / n, steps=n) for n in COUNTS}
@@ -89,10 +85,7 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
 
 
 def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
-    """Compare the smallest step size at which truncation dominates with the predicted one.
-
-    It does where the error equals the predicted truncation error within a factor of 2.
-    """
+    """Compare the smallest step at which truncation (within 2) dominates with the predicted one."""
     forecaster = _forecaster(case, method)
     smallest = SMALLEST
     if method in PARTS:
@@ -133,7 +126,6 @@ def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple
 
 
 def _end(scene: Scene, name: str) -> Array:
-    """Return omega at the end of a run by a method with a fixed step; NaN after an overflow."""
     if name in FIXED_STEP:
         rows = fixed_step(name)(scene, [TIME], 1.0).omega
         return rows[-1] if len(rows) else np.full(3, math.nan)

@@ -1,7 +1,6 @@
 """Trial of threads: the same calls from many threads at once give bit-for-bit identical results.
 
-`choose_instructions` is for the whole process and must be called before threads start, and is
-therefore not called here.
+`choose_instructions` must be called before threads start, and is therefore not called here.
 """
 
 import random
@@ -57,10 +56,6 @@ class Job:
 
 
 def _run(only: Sequence[str]) -> Iterator[Check]:
-    """Yield, for each method, the check that its calls give the same bits in many threads as alone.
-
-    The value is the number of calls whose bits differ.
-    """
     asked = [job for job in jobs() if may_hold(f"threads/{job.subject}", only)]
     differing = different(asked)
     for subject in dict.fromkeys(job.subject for job in asked):
@@ -95,10 +90,7 @@ def bits(job: Job) -> bytes:
 
 
 def jobs() -> list[Job]:
-    """Return calls of every method, prepared solver, program (both languages) in all scenes.
-
-    Calls that raise InputError, and the linear solver LEQT1F, are among them.
-    """
+    """Return calls, and refusals, of every method, prepared solver, program and LEQT1F."""
     found = []
     for scene in SCENES:
         for name in METHODS:
@@ -133,7 +125,6 @@ def _prepared(scene: Scene, name: str) -> bytes:
 
 @cache
 def _shared(scene: Scene, name: str) -> Solver:
-    """Return the prepared solver that all threads share."""
     return prepare(scene, name, 1e-7)
 
 
@@ -144,7 +135,6 @@ def _program(scene: Scene, listing: Listing, implementation: str) -> bytes:
 
 
 def _refusal(scene: Scene) -> bytes:
-    """Request the tolerance 1e-30, which is finer than any method accepts, to raise InputError."""
     return method_candidate("taylor", 1e-30).rows(scene, _TIMES).omega.tobytes()
 
 

@@ -57,9 +57,8 @@ class Circumstance:
 def axial(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a symmetric body whose torque acts along its axis.
 
-    The phase of a wave has a random rounding error in every evaluation. `conditioning` adds up n
-    such errors, at least one per period, in full; random ones partly cancel, so that only 4 sqrt(n)
-    are counted here (Hoeffding 1963).
+    The phase of a wave has a random rounding error in every evaluation, at least one per period.
+    `conditioning` adds up n of them in full; 4 sqrt(n) suffice for random ones (Hoeffding 1963).
     """
     flow = conditioning(scene, time)
     waves = scene.law.sines + scene.law.cosines
@@ -71,10 +70,7 @@ def axial(scene: Scene, time: float) -> Truth:
 
 
 def averaged(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) under very fast sine waves, which are left out.
-
-    A bound on the change by them is added to the error.
-    """
+    """Return the true omega at `time` (s) without very fast waves, whose effect is bounded."""
     moments = np.array(scene.moments)
     waves = scene.law.sines + scene.law.cosines
     moved = sum(float((2.0 * np.abs(a) / moments).max()) / f for a, f in waves)
@@ -85,7 +81,7 @@ def averaged(scene: Scene, time: float) -> Truth:
 def summed(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a sphere, with a bound on its few rounding errors.
 
-    The closed form has the phase of a wave in double-double; only the final sum rounds.
+    The phase of a wave is in double-double; only the final sum rounds.
     """
     known = reference(scene, [time])
     largest = float(np.abs([known.omega[-1], scene.omega]).max())
@@ -95,10 +91,7 @@ def summed(scene: Scene, time: float) -> Truth:
 
 
 def _wave(frequency: float) -> Circumstance:
-    """Return a scene with waves about all axes until their phase is 500 rad.
-
-    They change omega by about 1 rad/s per period; `frequency` is in rad/s.
-    """
+    """Return a scene with waves (rad/s) about all axes until their phase is 500 rad."""
     size = 10.0 * frequency
     law = TorqueLaw(
         sines=(((4.0 * size, 0.0, 2.0 * size), frequency),),
@@ -130,10 +123,7 @@ def _tiny(size: float) -> Circumstance:
 
 
 def _resonant(moments: Triple) -> Circumstance:
-    """Return a scene whose transverse torque rotates at the precession rate of a top, 5 rad/s.
-
-    The top is the body of Case 2 (Table 1).
-    """
+    """Return a scene whose torque rotates with the precession of Case 2's top, 5 rad/s."""
     law = TorqueLaw(sines=(((0.0, -40.0, 0.0), 5.0),), cosines=(((40.0, 0.0, 0.0), 5.0),))
     scene = Scene("resonance", (0.0, 1.0, 10.0), moments=moments, torque=law, steps=2000)
     return Circumstance(scene, 20.0, programs=True)
@@ -184,7 +174,6 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check]:
-    """Yield the check of one method's error: tolerance and rounding, both amplified."""
     assert tolerance is not None
     method = name.subject
     kind = prepared_candidate if method in _PREPARED else method_candidate

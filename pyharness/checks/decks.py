@@ -1,7 +1,8 @@
 """Checks of the Fortran port against the decks, which are compiled from the author's own cards.
 
-The results of a deck depend on no work of ours. TAPE5 is compared bit for bit, the printed page as
-text. An overflow ends a run of the port; the deck continues, but must not produce finite omega.
+Their results depend on neither the port nor the twins. TAPE5 is compared bit for bit, the printed
+page as text. An overflow ends a run of the port; the deck continues, but must not produce finite
+omega.
 """
 
 from collections.abc import Iterator

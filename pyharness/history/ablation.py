@@ -1,8 +1,4 @@
-"""The effects of the defects of the programs on the errors of a run.
-
-Each defect is corrected alone and kept alone, and every subset is run. Errors are against the
-reference solution.
-"""
+"""The effects of the defects of the programs on the errors of a run against the reference."""
 
 import math
 from collections.abc import Iterator
@@ -27,8 +23,7 @@ from pyharness.truth.reference import Reference, reference
 class Effect:
     """The outcome of one listing on one scene: its largest errors, and how the run ended.
 
-    `omega` (rad/s) and `velocity` (translational, m/s) are over the completed `steps`; `stop` is
-    where the Lipschitz test ended the run, if it did.
+    Errors of `omega` (rad/s) and `velocity` (m/s) are over the completed `steps`.
     """
 
     listing: Listing
@@ -41,11 +36,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class CaseEffects:
-    """The effect of one apparatus entry in one program and case, shown by four listings.
-
-    They are the original, the original with this entry alone corrected, the corrected with it alone
-    kept, and the corrected.
-    """
+    """The effect of one apparatus entry in one program and case, shown by four listings."""
 
     program: str
     case: int
@@ -56,10 +47,7 @@ class CaseEffects:
 
 
 def entries(kind: str | None = None) -> list[dict[str, Any]]:
-    """Return the apparatus entries of one kind (None: of all), as in `data/apparatus.toml`.
-
-    Raise InputError if no entry has that kind.
-    """
+    """Return the apparatus entries of one kind, or all; raise InputError without any."""
     everything: list[dict[str, Any]] = facts("apparatus")["entry"]
     kinds = sorted({entry["kind"] for entry in everything})
     if kind is not None and kind not in kinds:
@@ -76,11 +64,7 @@ def entry(name: str) -> dict[str, Any]:
 
 
 def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0) -> Effect:
-    """Run a listing on a scene, and return its largest errors and how the run ended.
-
-    `truth` is at the end of each step, with translational velocity; `effort` multiplies the work
-    limit.
-    """
+    """Run a listing on a scene, and return its errors against `truth` and how the run ended."""
     run = run_program(scene, listing, effort=effort)
     found = accuracy(scene, run, truth)
     velocity = math.nan if found.velocity is None else found.velocity
@@ -97,8 +81,8 @@ def case_truth(case: int) -> Reference:
 def effects_of(name: str) -> Iterator[CaseEffects]:
     """Yield the effect of the apparatus entry `name` in each of its programs, case by case.
 
-    For a reading or a conjecture, `original` and `corrected_alone` have the original with and
-    without it, `kept_alone` and `corrected` the corrected program.
+    For a reading or a conjecture, `original` and `corrected_alone` are the original with and
+    without it, the others the corrected program.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -126,8 +110,8 @@ def lattice(
 ) -> list[Effect]:
     """Return the outcomes of a program with every subset of its defects, largest error first.
 
-    An overflow is infinite. Each of `readings`, and of the original's conjectures if the torque
-    varies, is in or out as well. A reading has no effect if a defect of its statement is corrected.
+    Readings and applicable conjectures vary too. A reading has no effect if a defect of its
+    statement is corrected.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)

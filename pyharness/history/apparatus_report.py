@@ -78,17 +78,13 @@ def entry_report(
 
 
 def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
-    """Return lines with two of the `texts` side by side; `heads` are their keys and headings."""
     columns = [[head, "-" * _HALF, *textwrap.wrap(texts[head], _HALF)] for head in heads]
     pairs = zip_longest(*columns, fillvalue="")
     return [Line(f"{a.ljust(_HALF)}   {b}".rstrip()) for a, b in pairs]
 
 
 def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
-    """Return a legend, and for each program a table of the errors of its four listings by case.
-
-    `is_reading`: the entry is a reading or conjecture, and the listings are with and without it.
-    """
+    """Return a legend, and for each program a table of the errors of its four listings by case."""
     columns = ("original", "this alone corrected", "this alone kept", "all corrected")
     if is_reading:
         columns = ("original, with it", "original", "corrected, with it", "corrected")
@@ -111,10 +107,7 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
 
 
 def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
-    """Return the report of every subset of each program's defects, with the errors it causes.
-
-    A subset is written as letters, one for each defect, reading or conjecture in this run.
-    """
+    """Return the report of every subset, written as letters, of each program's defects."""
     text: list[Section] = []
     rows = []
     for program, effects in found.items():

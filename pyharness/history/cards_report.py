@@ -39,7 +39,7 @@ def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
 def card_record(card: Card) -> dict[str, Any]:
     """Return a card as a JSON record, with its lines in Fortran and Python.
 
-    `scan` is null if the scan agrees with the card, and empty if it lacks the card.
+    `scan` is null if it agrees, and empty if it lacks the card.
     """
     found = deck(card.program)
     scan = (card.scan or "") if card.deviates else None
@@ -62,8 +62,7 @@ def scan_report(
 ) -> Report:
     """Return the report on whether our text of the programs explains every line of a scan.
 
-    `faults` are lines in which scan and tables disagree, `undeclared` disagreements of cards and
-    apparatus; `lines` is the expected number, `digest` the SHA-256 of the scan.
+    `undeclared` are disagreements of cards and apparatus.
     """
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)

@@ -1,6 +1,6 @@
 """Figures 6 to 12 of the thesis: the curves of omega and the reference, as pictures and a report.
 
-A figure exists in two sets: with the curves of the original or of the corrected programs.
+A set has the curves of the original, another those of the corrected programs.
 """
 
 import textwrap
@@ -49,8 +49,7 @@ _END: dict[str, Any] = {
 class FigurePlan:
     """A figure of the thesis that is drawn again: its case and the programs whose curves it shows.
 
-    `part` is `A`, `B` or empty. `caption` is ours; `source` is the place that supports the choice
-    of programs.
+    `source` supports the choice of programs; `caption` is ours.
     """
 
     number: int
@@ -80,10 +79,7 @@ class FigurePlan:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The trajectory of one program, which a figure shows as a curve of omega over time.
-
-    `listing` names the program and the defects with which it ran.
-    """
+    """The trajectory of one listing, which a figure shows as a curve of omega over time."""
 
     listing: Listing
     trajectory: Trajectory
@@ -140,7 +136,6 @@ def findings() -> Iterator[FigureFinding]:
 def _limit(
     plan: FigurePlan, scene: Scene, truths: dict[int, Reference]
 ) -> tuple[str, Array] | None:
-    """Return the label and the omega (rad/s) of a program's limit, if the figure shows one."""
     asked = {entry["number"]: entry.get("limit_of") for entry in facts("figures")["figure"]}
     program = asked[plan.number]
     if program is None or plan.set != "original":
@@ -200,7 +195,6 @@ def curve_numbers(finding: FigureFinding) -> Table:
 
 
 def _from_zero(values: Array, start: Array | float = 0.0) -> Array:
-    """Return the values of a curve, preceded by `start`, the curve's value at time 0."""
     return np.concatenate([np.array(start, ndmin=values.ndim), values])
 
 
@@ -240,8 +234,8 @@ def figure_picture(finding: FigureFinding) -> Picture:
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
     """Draw omega1 of a figure of the original programs and of a corrected figure in one picture.
 
-    The limit in `first` shows about how a run that ended early would have continued. Of `second`
-    only the last curve is drawn; the others would cover the same line.
+    The limit in `first` shows how a run that ended early would have continued; of `second` all
+    curves cover the same line, and the last is drawn.
     """
     from matplotlib.figure import Figure
 
@@ -295,8 +289,7 @@ def _draw(
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
     """Return the bottom and top (rad/s) of the plot of one omega component.
 
-    They contain the reference and the curves, except that a curve may leave the plot if its
-    distance from the reference's range exceeds the largest |omega|.
+    A curve farther from the reference's range than the largest |omega| may leave it.
     """
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())

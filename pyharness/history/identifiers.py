@@ -1,7 +1,7 @@
 """Software Heritage identifiers (SWHIDs) of files, folders and cards, computed offline.
 
-A SWHID (ISO/IEC 18670) names a file or a folder by a SHA-1 hash of its content, that of git's blob
-or tree. Anyone who has the content can compute it again, and the archive finds a copy by it.
+A SWHID (ISO/IEC 18670) is a SHA-1 hash of the content, that of git's blob or tree. Anyone who has
+the content can compute it again, and the archive finds a copy by it.
 """
 
 from collections.abc import Collection, Mapping
@@ -24,10 +24,7 @@ def content_identifier(content: bytes) -> str:
 
 
 def directory_identifier(files: Mapping[str, bytes], executable: Collection[str] = ()) -> str:
-    """Return the SWHID of a folder, which begins with ``swh:1:dir:``, by the paths of its files.
-
-    The folder can contain neither links nor empty folders.
-    """
+    """Return the SWHID of a folder, ``swh:1:dir:...``, without links and empty folders."""
     return f"swh:1:dir:{_tree(files, executable).hex()}"
 
 
@@ -40,7 +37,7 @@ def identifier_of_lines(identifier: str, first: int, last: int | None = None) ->
 def source_files() -> dict[str, bytes]:
     """Return the files of the edition's data and of the Fortran port, by path in the repository.
 
-    An installed package has some of them in other places, and gives the same result.
+    An installed package has some of them in other places.
     """
     folder = facts_folder()
     found = {
@@ -85,7 +82,6 @@ def _hash(kind: str, content: bytes) -> bytes:
 
 
 def _tree(files: Mapping[str, bytes], executable: Collection[str]) -> bytes:
-    """Return the hash of a folder as a git tree, as `directory_identifier` takes it."""
     folders: dict[str, dict[str, bytes]] = {}
     entries = []
     for path, content in files.items():

@@ -1,9 +1,9 @@
 """The limits of the original programs as the step size goes to zero.
 
-With ever smaller steps an original program may converge to the solution of Euler's equations, to
-another function of time, or to no function (docs/article/article.md). Each limit is computed
-independently of the programs, which are compared with it while the step is halved. `effort`
-multiplies the work limit of some ten seconds.
+An original program may converge to the solution of Euler's equations, to another function of time,
+or to no function (docs/article/article.md). Each limit is computed independently of the programs,
+which are compared with it while the step is halved. `effort` multiplies the work limit of some ten
+seconds.
 """
 
 import math
@@ -46,10 +46,7 @@ Rate = Callable[[float, Sequence[float]], list[float]]
 
 @dataclass(frozen=True)
 class Halving:
-    """The largest distances (rad/s) of one run from the limit and from the reference solution.
-
-    They are infinite after an overflow.
-    """
+    """The distances (rad/s) of a run from limit and reference, infinite after an overflow."""
 
     step_size: float
     from_limit: float
@@ -60,8 +57,8 @@ class Halving:
 class Limit:
     """The limit of an original program as the step size goes to zero, and the order of convergence.
 
-    `halvings` are by step size, the largest first. `order` is from the last two; None if one is
-    rounding or overflows, without a limit, or if the limit is unbounded at `blow_up` (s).
+    `order` is from the last two halvings; None if one is rounding or overflows, without a limit, or
+    if the limit is unbounded at `blow_up` (s).
     """
 
     program: str
@@ -84,8 +81,8 @@ class Limit:
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
     """Measure how an original program, without its stop test, converges to its limit.
 
-    Under a varying torque the collocation programs have no limit, and that of the Runge-Kutta
-    program is integrated. Raise InputError if a run exceeds the work limit.
+    Under a varying torque only the Runge-Kutta program has one, which is integrated. Raise
+    InputError above the work limit.
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
@@ -123,7 +120,6 @@ def limit_solution(
 def _limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float
 ) -> tuple[Array, str, float | None]:
-    """Return the limit of an original program, its description, and its blow-up time (s)."""
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)
     if program == "runge-kutta":
@@ -143,10 +139,10 @@ def _limit_solution(
 def _extrapolated(scene: Scene) -> Rate:
     """Return the right-hand side of the two-term program's limit equation.
 
-    The original program adds the step size h to its interval length DT in every step, so that in
-    step n the collocation points are t/3 and 2t/3 after the beginning of the step, with t = n h.
-    Let w be omega, F the right-hand side of Euler's equations at w, F' its Jacobian, and Q its
-    quadratic part. The slope along the first estimate, s after the beginning, is
+    The original program adds the step size h to DT in every step, so that in step n the collocation
+    points are t/3 and 2t/3 after the beginning of the step, with t = n h. Let F be the right-hand
+    side of Euler's equations at omega = w, F' its Jacobian, and Q its quadratic part. The slope
+    along the first estimate is
 
     g(s) = F(w + s F) = F + s F' F + s^2 Q(F).
 
@@ -168,9 +164,9 @@ def _extrapolated(scene: Scene) -> Rate:
 def _slow_slopes(scene: Scene) -> Rate:
     """Return the right-hand side of the Runge-Kutta program's limit equations, for varying torque.
 
-    Let p be what U(1) holds, at which the first slopes of a step are taken, and F the right-hand
-    side of Euler's equations. Each step of size h adds h/2 F(p) to p, and h F(p) to the printed
-    omega; so the slopes are at an omega of half speed. The state is p, then the printed omega.
+    Let p be what U(1) holds, at which the first slopes of a step are taken. Each step of size h
+    adds h/2 F(p) to p, and h F(p) to the printed omega, where F is the right-hand side of Euler's
+    equations. The state is p, then the printed omega.
     """
     right_hand_side = scene.right_hand_side()
 
@@ -186,7 +182,7 @@ def _solved(
 ) -> tuple[Array, float | None]:
     """Return the solution at `times` (s), NaN after a blow-up, and the blow-up time (s) or None.
 
-    `start` is at time 0. A blow-up is the growth of a component to a million times `scale` (rad/s).
+    It is when a component reaches a million times `scale` (rad/s).
     """
     from scipy.integrate import solve_ivp
 
@@ -222,10 +218,7 @@ def _solved(
 
 
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Return, by program, the defects that change no omega of a scene beyond rounding.
-
-    The correction of such a defect alone also leaves the steps and the ending of the run.
-    """
+    """Return, by program, the defects whose correction alone changes nothing beyond rounding."""
     found = {}
     for program in PROGRAMS:
         before = run_program(scene, Listing.original(program))

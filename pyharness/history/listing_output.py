@@ -1,6 +1,6 @@
 """A page printed by any machine, compared with the pages that our programs print.
 
-Our pages are printed in several arithmetics, so that the digits show in which one a program ran.
+The digits show in which of our arithmetics a program ran.
 """
 
 from collections.abc import Sequence
@@ -32,10 +32,7 @@ _LARGEST = 1 << 24  # largest size of a page's file, in bytes
 
 
 def read_page(path: str) -> list[list[str]]:
-    """Return the lines of a printed page that contain only numbers, split into these numbers.
-
-    Raise InputError if no line has at least six numbers.
-    """
+    """Return a page's lines of numbers alone; raise InputError if none has at least six."""
     where = f"--listing-output '{path}'"
     content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
     found = printed_numbers(content.decode("ascii", "replace"))
@@ -55,8 +52,8 @@ def fits(
     """Compare a page from another machine with those of our pages that have the same form.
 
     The form is the moments and torques in the heading and the number of columns. Our runs have the
-    steps of the text of the thesis, or of the cards if the page has more rows. The comparison with
-    the fewest differences is first. Raise InputError if none of our pages has the form.
+    steps of the text of the thesis, or of the cards for a longer page. The nearest is first. Raise
+    InputError if none of our pages has the form.
     """
     found: list[Fit] = []
     listings = {program: listings_of(program) for program in programs}
@@ -100,15 +97,11 @@ def our_page(listing: Listing, case: int, steps: int, word: str) -> str:
 
 
 def _lines(listing: Listing, case: int, steps: int, word: str = BINARY64) -> list[list[str]]:
-    """Return the lines of our page that contain only numbers, each as a list of its numbers."""
     return printed_numbers(our_page(listing, case, steps, word))
 
 
 def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
-    """Return the report on which program, listing and arithmetic print the page in file `path`.
-
-    If all have differences, those from the first are shown.
-    """
+    """Return the report on which program, listing and arithmetic print the page in file `path`."""
     best = found[0]
     rows = [
         [each.program, each.case, each.listing, each.word, each.fields, len(each.differences)]

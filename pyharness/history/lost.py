@@ -1,11 +1,10 @@
 """The lost experiments of section IV.2 of the thesis: mistakes that may explain their failure.
 
-The thesis does not print its programs for subdomain, Galerkin and least squares. By IV.2 they gave
+The thesis does not print its programs for subdomain, Galerkin and least squares, which by IV.2 gave
 no meaningful results in Cases 1 and 2, where the solution is known. Each entry of `data/lost.toml`
-is a conjecture: a mistake that such a program could have had. The method is programmed as IV.2
-describes it: a trial function of two terms, the products written out as polynomials, one solution
-for a constant right-hand side, and one correction. It fails in a case if its error exceeds a tenth
-of the largest omega.
+is a conjecture: a mistake that such a program could have had. The method is that of IV.2: a trial
+function of two terms, the products written out as polynomials, one solution for a constant
+right-hand side, and one correction. It fails if its error exceeds a tenth of the largest omega.
 """
 
 from collections.abc import Sequence
@@ -36,8 +35,7 @@ TERMS = 2
 class Attempt:
     """The result of one method, programmed with one mistake, on Cases 1 and 2.
 
-    `shares` has the largest error over the largest omega by case, infinite after an overflow;
-    `failed`, the cases in which it exceeds the limit.
+    `shares` has the error over the largest omega by case, `failed` the cases above the limit.
     """
 
     mistake: str
@@ -66,10 +64,7 @@ class Ranked:
 
 
 def ranked(word: str = BINARY64) -> list[Ranked]:
-    """Run each method with each mistake, in arithmetic `word`, and rank the mistakes.
-
-    First is the one with the most failures in both cases, then in at least one.
-    """
+    """Run each method with each mistake, and rank the mistakes by failures in both cases."""
     limit = facts("lost")["limit"]
     found = []
     for entry in facts("lost")["mistake"]:
@@ -85,7 +80,6 @@ def ranked(word: str = BINARY64) -> list[Ranked]:
 
 
 def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> float:
-    """Return a method's largest error against the reference, relative to the largest omega."""
     given = scene if word == BINARY64 else scene_in(scene, WORDS[word])
     omega = integrate(given, weighting, mistake)
     truth = reference(scene, scene.times()).omega
@@ -97,8 +91,8 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
 def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
     """Integrate a scene of constant torque by a method that is programmed with one mistake.
 
-    Return omega (rad/s), shape (steps, 3); NaN from an overflow on. The scene's numbers, floats or
-    of `WORDS`, determine the arithmetic.
+    Return omega (rad/s), shape (steps, 3); NaN from an overflow on. The scene's numbers determine
+    the arithmetic.
     """
     h = scene.step_size
     coefficients = scene.euler_coefficients
@@ -130,10 +124,7 @@ def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
 
 
 def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
-    """Return A omega2 omega3, B omega1 omega3 and C omega1 omega2 as polynomials of the time (s).
-
-    Each product is a column of coefficients of 1, t, t**2, ..., as each omega in `estimate`.
-    """
+    """Return A omega2 omega3, B omega1 omega3 and C omega1 omega2, columns of polynomials in t."""
     columns = [
         polynomial.polymul(estimate[:, j], estimate[:, k]) * a
         for a, j, k in zip(coefficients, (1, 0, 0), (2, 2, 1), strict=True)
@@ -143,19 +134,15 @@ def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
 
 
 def _matrix(weighting: str, length: float) -> Array:
-    """Return the weighted integrals over (0, length) of the derivatives of t and t**2.
-
-    The shape is (2, 2), a row for each weight function; `length` is in s.
-    """
+    """Return the weighted integrals over (0, length) (s) of 1 and 2 t, a row for each weight."""
     columns = [_weighted(weighting, length, (i + 1) * _power(i)) for i in range(TERMS)]
     return np.array(columns).T
 
 
 def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
-    """Return c1 and c2 of all components, for which the weighted residuals vanish; shape (2, 3).
+    """Return c1 and c2 of omega(0) + c1 t + c2 t**2 for all components, shape (2, 3).
 
-    omega is approximated by omega(0) + c1 t + c2 t**2. `right` has a row for each component;
-    `second` is true for the correction.
+    `right` has a row for each component; `second` is true for the correction.
     """
     if mistake == "transposed":
         matrix = matrix.T
@@ -179,10 +166,7 @@ def _power(exponent: int) -> Array:
 
 
 def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
-    """Return the integrals over (0, length) of a polynomial times each of the two weights.
-
-    `residual` has its coefficients, from the constant on; `length` is in s.
-    """
+    """Return the integrals over (0, length) of a polynomial times each of the two weights."""
     # Plain numbers, because NumPy's polynomials of machine words take several times as long.
     coefficients = residual.tolist()
     found = []
@@ -203,7 +187,6 @@ def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
 
 
 def _value(coefficients: list[Any], at: Any) -> Any:
-    """Return the value of a polynomial, from its coefficients of 1, t, t**2, ..., by Horner."""
     *others, value = coefficients
     for x in reversed(others):
         value = x + value * at
@@ -211,7 +194,7 @@ def _value(coefficients: list[Any], at: Any) -> Any:
 
 
 def _factors(matrix: Array) -> Array:
-    """Return the matrix of L and U factors with which Crout's method overwrites a 2 x 2 matrix."""
+    """Return the L and U factors with which Crout's method overwrites a 2 x 2 matrix."""
     (a, b), (c, d) = matrix.tolist()
     return np.array([[a, b], [c / a, d - c / a * b]])
 

@@ -1,8 +1,6 @@
 """Disagreements of the decks and the thesis, and what they suggest about the origin of faults.
 
-The table `data/disagreements.toml` names each disagreement once, with the quoted cards and the
-formulas concerned, and keeps what the sources say apart from what we infer. The steps are those of
-`data/cards/collation.toml`.
+The table `data/disagreements.toml` keeps what the sources say apart from what we infer.
 """
 
 from collections import Counter
@@ -23,10 +21,10 @@ CERTAINTIES = tuple(CERTAINTY)
 class Disagreement(NamedTuple):
     """A disagreement of the decks with each other or with the thesis, and its supposed origin.
 
-    `equations` are formulas of the thesis, `where` and `says` its place and a few words from there,
-    empty if it is silent. `cards` quotes texts by program and number. `known` is what the sources
-    say, `suggests` and `origin` what we infer, with a `certainty` of `CERTAINTIES`; `unnoticed`
-    says why the test cases do not show the fault.
+    `steps` are those of `data/cards/collation.toml`, `equations` formulas of the thesis, `where`
+    and `says` its place and words, `cards` texts by program and number. `known` is what the sources
+    say, `suggests` and `origin` what we infer; `unnoticed`, why the test cases do not show the
+    fault.
     """
 
     id: str
@@ -63,8 +61,8 @@ def unexplained_defects() -> dict[str, str]:
 def shared_statements(scanned_names: bool = False) -> dict[tuple[str, str], int]:
     """Return the number of statements that two decks share, for each pair of programs.
 
-    A repeated statement counts as often as in the deck that has it less often. Numbers, blanks and
-    comments are ignored. With `scanned_names`, names that we made uniform are those of the scan.
+    Numbers, blanks and comments are ignored. With `scanned_names`, names that we made uniform are
+    those of the scan.
     """
     found = {program: Counter(_statements(program, scanned_names)) for program in PROGRAMS}
     return {(a, b): (found[a] & found[b]).total() for a, b in combinations(PROGRAMS, 2)}
@@ -78,9 +76,8 @@ def statement_count(program: str) -> int:
 def mistakes() -> list[str]:
     """Return one sentence for each mistake in the table of disagreements.
 
-    Quoted cards must have the quoted text, and all references must exist. Entries that name cards
-    must name a quoted one. Each defect, and each step in which decks or thesis differ, must be in a
-    disagreement or among the exceptions.
+    Quotations and references must be right, and each defect and differing step explained or
+    excepted.
     """
     found = disagreements()
     return [*_of_each(found), *_of_defects(found), *_of_steps(found)]

@@ -25,10 +25,7 @@ SHOWN = 5
 
 @dataclass(frozen=True)
 class Difference:
-    """A printed number that differs between a page from another machine and ours.
-
-    `row` and the `place` in it are counted from 1.
-    """
+    """A printed number, counted by row and place from 1, that differs between two pages."""
 
     row: int
     place: int
@@ -41,7 +38,7 @@ class Fit:
     """The comparison of a page from another machine with a page that our programs print.
 
     `listing` is ``original``, ``corrected`` or ``original with`` a reading; `word` is the
-    arithmetic, `fields` the number of compared numbers, including those that the other page lacks.
+    arithmetic; `fields` are compared numbers.
     """
 
     program: str
@@ -98,10 +95,7 @@ def compared_steps(rows: int, steps: int, card_steps: int) -> int:
 def compare_rows(
     theirs: Sequence[Sequence[str]], ours: Sequence[Sequence[str]]
 ) -> tuple[int, tuple[Difference, ...]]:
-    """Return how many numbers of two pages are compared, and those that differ.
-
-    A dash is shown for a number that one page lacks.
-    """
+    """Return how many numbers are compared, and those that differ; a missing one is a dash."""
     none: Sequence[str] = ()
     places = [
         (row, place, x, y)

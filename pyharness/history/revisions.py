@@ -1,7 +1,4 @@
-"""The history of the edition's text: the dates and contents of its changes.
-
-The data are in `data/revisions.toml`.
-"""
+"""The history of the edition's text: the changes in `data/revisions.toml`."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -17,10 +14,10 @@ CHANGES = {
 
 
 class Revision(NamedTuple):
-    """A change of the edition's text, which consists of the cards and the apparatus.
+    """A change of the edition's text, the cards and the apparatus.
 
-    `digest` is that of the text after the change, empty if the cards were not yet data; the entries
-    are identifiers of the apparatus. `cards` has, by program, changed numbers as ``750-770, 800``.
+    `digest` is that of the text after it, empty if the cards were not yet data. `cards` has, by
+    program, numbers as ``750-770, 800``.
     """
 
     date: str

@@ -1,8 +1,8 @@
 """An estimate of the transcription errors that remain, by capture and recapture.
 
-The first reading of the scan is our text of the cards, the second a random sample of cards that
-were read again (`data/cards/second-reading.toml`). The misreadings that both correct, and those
-that only one corrects, give an estimate of those that neither does.
+The first reading of the scan is our text of the cards, the second a random sample that was read
+again (`data/cards/second-reading.toml`). Misreadings that both or only one corrects give an
+estimate of those that neither does.
 """
 
 import random
@@ -26,10 +26,7 @@ _COLUMNS = (
 
 
 class ReadCard(NamedTuple):
-    """A card of the sample as the scan, the first and the second reading have it, without blanks.
-
-    The first keeps the names that our text makes uniform.
-    """
+    """A card of the sample without blanks; the first reading has names that we made uniform."""
 
     card: Card
     scan: str
@@ -40,8 +37,7 @@ class ReadCard(NamedTuple):
 class Recapture(NamedTuple):
     """The estimated number of misreadings in the sample, from two readings.
 
-    `unit` is ``places`` (characters) or ``cards``. `first`, `second` and `both` are corrected by
-    these readings; `estimate` is Chapman's, `lower` and `upper` its 95 % interval.
+    `unit` is ``places`` (characters) or ``cards``; `lower` and `upper` are a 95 % interval.
     """
 
     unit: str
@@ -59,19 +55,15 @@ class Recapture(NamedTuple):
 
 
 def chapman(first: int, second: int, both: int) -> float:
-    """Return Chapman's estimate of the size of a population from two samples.
-
-    It is that of Lincoln and Petersen, ``first * second / both``, corrected for small samples.
-    """
+    """Return Chapman's estimate: Lincoln and Petersen's, corrected for small samples."""
     return (first + 1) * (second + 1) / (both + 1) - 1
 
 
 def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
     """Return the limits of the 95 % confidence interval of the size of a population.
 
-    With independent samples, the number in both is hypergeometric. A size is in the interval if
-    neither tail from `both` on is below 0.025. `both` must be positive, else there is no upper
-    limit.
+    With independent samples, the number in both is hypergeometric. Neither of its tails from `both`
+    on is below 0.025. `both` must be positive, else there is no upper limit.
     """
     if both < 1:
         raise ValueError("both must be positive")
@@ -86,7 +78,6 @@ def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
 
 
 def _probability(size: int, first: int, second: int, begin: int, end: int) -> float:
-    """Return the probability that from `begin` to `end` members are in both samples."""
     ways = sum(
         comb(first, both) * comb(size - first, second - both)
         for both in range(begin, min(end, second) + 1)
@@ -117,7 +108,7 @@ def read_cards() -> Iterator[ReadCard]:
 def misread_places(scan: str, reading: str) -> dict[int, str]:
     """Return the text of a reading at each place of a scan's line that differs, by index.
 
-    It is empty for a deleted character; inserted ones belong to the character before, or to -1.
+    Inserted characters belong to the one before, or to -1.
     """
     found: dict[int, str] = {}
     matcher = SequenceMatcher(None, scan, reading, autojunk=False)
@@ -133,7 +124,7 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
 
 
 def recaptures() -> list[Recapture]:
-    """Return the estimates from the two readings, with places and with whole cards as units.
+    """Return the estimates with places and with whole cards as units.
 
     A machine misreads a letter in the same way several times; whole cards avoid this dependence.
     """

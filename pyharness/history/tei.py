@@ -1,10 +1,9 @@
 """The edition as a TEI P5 document: every card, the scan's variants, and the apparatus.
 
-Each deck is in the order of its cards. A `pb` element marks the beginning of a page of the scan;
-its `n` is the position of the page in the scan. An `app` element marks a difference: `lem` is our
-reading, `rdg` the scan's. An `fw` element is a heading added by an editor, a `surplus` text that
-belongs to no card at its place. To restore the scan, take the pages in the order of `n`, each `rdg`
-instead of its `lem`, and the lines of cards, `fw` and `surplus`.
+Cards are in order. A `pb` element marks the beginning of a page, with its position `n` in the scan;
+an `app` element a difference: `lem` is our reading, `rdg` the scan's. An `fw` element is a heading
+added by an editor, a `surplus` text that belongs to no card. To restore the scan, take the pages in
+the order of `n`, each `rdg` instead of its `lem`, and the lines of cards, `fw` and `surplus`.
 """
 
 from collections.abc import Iterator
@@ -40,10 +39,7 @@ _TOLD = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why
 
 
 class _Page(NamedTuple):
-    """A page of the scan with its position, from 1, and its lines.
-
-    `moved` is the note in the apparatus that explains why the page is elsewhere, if it is.
-    """
+    """A page of the scan; `moved` is the note on why it is elsewhere, if it is."""
 
     number: int
     lines: list[Any]
@@ -74,7 +70,6 @@ def tei_document() -> bytes:
 
 
 def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]:
-    """Append the cards of a program to `body`; yield each empty element with its card."""
     div = named(body, "div", program, type="deck")
     with_text(div, "head", f"The {program} program")
     cards = deck(program).cards
@@ -168,7 +163,6 @@ def _apparatus(div: xml.Element) -> None:
 
 
 def _targets(entry: dict[str, Any]) -> Iterator[str]:
-    """Yield the XML identifiers of the cards that an entry names, or of the whole deck if none."""
     for program in entry["programs"]:
         cards = deck(program).cards
         named = numbers(entry["cards"].get(program, ""))
@@ -207,7 +201,6 @@ def _bibliography(div: xml.Element) -> None:
 
 
 def _id(card: Card) -> str:
-    """Return a card's XML identifier, as in ``two-term.1660``; it may not contain a colon."""
     return f"{card.program}.{card.number}"
 
 

@@ -1,8 +1,4 @@
-"""The header of the TEI document, and the elements that all its parts use.
-
-It describes the edition, its witness (the scan) and the revisions, and lists the kinds, degrees of
-certainty and grounds of the apparatus.
-"""
+"""The header of the TEI document, and the elements that all its parts use."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -76,8 +72,7 @@ def add_header(root: xml.Element) -> None:
 def sources(entry: dict[str, Any]) -> str:
     """Return the pointers to the parts of the scan from which an apparatus entry is known.
 
-    Entries on cards are from the appendix; those that rest on the text or on results, or name no
-    card, are from the text.
+    The text is a part if the entry rests on it or on results, or names no card.
     """
     parts = ["appendix"] if entry["cards"] else []
     if not parts or {"T", "R"} & set(entry["grounds"]):
@@ -168,7 +163,6 @@ def _taxonomy(
 
 
 def _revisions(described: xml.Element) -> None:
-    """Append the revisions of the text to the element `revisionDesc`, newest first."""
     for revision in revisions():
         change = with_text(
             described, "change", f"{revision.what} ", when=revision.date, who=f"#{EDITORS}",
@@ -179,10 +173,7 @@ def _revisions(described: xml.Element) -> None:
 
 
 def _targets(revision: Revision) -> Iterator[str]:
-    """Yield pointers to the entries and cards, or whole decks, that a revision added or changed.
-
-    Removed entries are no longer in the document.
-    """
+    """Yield pointers to what a revision added or changed, if it is still in the document."""
     present = {entry["id"] for entry in facts("apparatus")["entry"]}
     yield from (f"#{id}" for id in (*revision.added, *revision.changed) if id in present)
     for program, cards in revision.cards.items():
@@ -194,5 +185,4 @@ def _targets(revision: Revision) -> Iterator[str]:
 
 
 def _when(released: str) -> dict[str, str]:
-    """Return the attribute of a date element: the date, if the version has one."""
     return {"when": released} if released[:1].isdigit() else {}

@@ -1,7 +1,4 @@
-"""The dates of the thesis, each with its source.
-
-The data are in `data/timeline.toml`. No entry has a date that its source does not support.
-"""
+"""The dates of the thesis in `data/timeline.toml`; each is supported by its source."""
 
 from typing import NamedTuple
 
@@ -22,8 +19,8 @@ _MONTHS = (
 class Event(NamedTuple):
     """An event in the history of the thesis, with its date and source.
 
-    `first` and `last` are months, as in ``1979-01``, empty if no source dates it; `certainty` is a
-    key of `CERTAINTIES`, and `why` says how an uncertain date was found.
+    `first` and `last` are months, as in ``1979-01``, empty if no source dates it; `why` says how an
+    uncertain date was found.
     """
 
     id: str

@@ -31,8 +31,8 @@ class WordRun:
 
     `rule` is ``nearest-even``, ``chop`` (towards zero), or ``FX`` and ``RX``, the unrounded and the
     rounded operations of the CDC 6600. `stop` says why and where the run ended early, as in ``V2 at
-    25``. Of the `fields` numbers on the longer page, `different` differ. `error` is the largest of
-    omega (rad/s), and `singular` the number of rows with IER = 129 of LEQT1F.
+    25``. Of the `fields` numbers on the longer page, `different` differ. `error` is in rad/s;
+    `singular` counts rows with IER = 129.
     """
 
     case: int
@@ -75,10 +75,7 @@ def cells(
     lengths: Sequence[int] = LENGTHS,
     progress: Progress = no_progress,
 ) -> Iterator[WordCell]:
-    """Run the programs, original and corrected, on the cases in every arithmetic.
-
-    Its bits are those of `lengths`, with each rule of `RULES`; binary64 and 113 bits are added.
-    """
+    """Run the programs on the cases in every arithmetic, in binary64 and with 113 bits."""
     words = [Word(p, rule) for rule in RULES for p in lengths]
     chosen = [
         (case, listing)
@@ -98,7 +95,7 @@ def cells(
 
 
 class _Judge:
-    """The comparison of a program's runs on a scene with its run in binary64 and the reference."""
+    """The comparison of a program's runs with its run in binary64 and the reference."""
 
     def __init__(self, scene: Scene, listing: Listing) -> None:
         self.scene, self.listing = scene, listing

@@ -91,7 +91,6 @@ def _machine(cells: Sequence[WordCell]) -> Table:
 
 
 def _changes(cells: Sequence[WordCell]) -> list[str]:
-    """Return a sentence on each arithmetic of the CDC 6600: how runs differ from binary64."""
     told = []
     for name, p, rule in _MACHINE:
         found = [(cell.double, run) for cell in cells if (run := cell.of(p, rule))]
@@ -140,10 +139,7 @@ def _errors(cells: Sequence[WordCell]) -> Table:
 
 
 def _picture(cells: Sequence[WordCell]) -> Picture:
-    """Draw the largest error of omega (rad/s) against p for each program.
-
-    A dashed line is the truncation error, that with 113 bits.
-    """
+    """Draw the largest error of omega (rad/s) against p; a dashed line has 113 bits."""
     from matplotlib.figure import Figure
 
     programs = list(dict.fromkeys(cell.double.program for cell in cells))

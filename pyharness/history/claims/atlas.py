@@ -1,8 +1,7 @@
 """The atlas of claims: which claims of the thesis hold from which initial omega (start).
 
 The starts cover the sphere of directions at several magnitudes. A claim has 1 point if it is
-reproduced, 1/2 in part, and 0 otherwise, without weights; its codes are HOLDS, IN_PART and FAILS of
-`over_starts`.
+reproduced, 1/2 in part, without weights; its codes are those of `over_starts`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,8 +39,8 @@ Codes = NDArray[np.int8]
 class Atlas:
     """The verdict codes of each claim over a grid of starts, readings and numbers of steps.
 
-    The axes of the arrays are reading, number of steps, magnitude of omega(0) (rad/s), height
-    (omega3 over the magnitude) and longitude (rad); the other fields have their values.
+    The axes are reading, steps, magnitude of omega(0) (rad/s), height (omega3 over the magnitude)
+    and longitude (rad).
     """
 
     codes: Mapping[str, Codes]
@@ -61,10 +60,7 @@ class Atlas:
         return list(product(self.readings, self.steps))
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return the sum of points for each start, shape (magnitudes, heights, longitudes).
-
-        `reading` and `steps` are indices.
-        """
+        """Return the sum of points for each start; `reading` and `steps` are indices."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
@@ -81,10 +77,7 @@ class Atlas:
 
 
 def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
-    """Return the atlas that a sweep has computed; codes are negative where it is incomplete.
-
-    Raise InputError if it is, or if it has other axes.
-    """
+    """Return the atlas of a sweep; raise InputError if it is incomplete or has other axes."""
     if tuple(axes) != (*CHOSEN, *WHERE) or not codes:
         allowed = ", ".join((*CHOSEN, *WHERE))
         raise InputError(
@@ -117,10 +110,7 @@ def shares(codes: Codes) -> tuple[float, float, float]:
 
 
 def bits(codes: Codes) -> float:
-    """Return the entropy of the verdict on a claim over the starts, in bits.
-
-    It is 0 if the verdict is the same from every start, and 1 if each of two is from half of them.
-    """
+    """Return the entropy of the verdict on a claim over the starts, in bits."""
     parts = np.array([(codes == code).mean() for code in _CODES])
     parts = parts[parts > 0.0]
     return float(-(parts * np.log2(parts)).sum()) + 0.0
@@ -137,10 +127,7 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return the codes of the claims from the starts that the thesis shows and one of our own.
-
-    They are for the original programs.
-    """
+    """Return the codes of the claims, for the original programs, from the starts shown."""
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))
     found = {name: judged(claim(name), bench, len(given)) for name in names}

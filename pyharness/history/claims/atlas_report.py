@@ -154,10 +154,7 @@ def _by_choice(atlas: Atlas) -> Table:
 
 
 def _turned(atlas: Atlas) -> Table:
-    """Return a table of the percentage of starts from which another choice changes a verdict.
-
-    Only the reading or the number of steps is changed at a time.
-    """
+    """Return the percentage of starts from which one other choice changes a verdict."""
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]
     rows = []
@@ -170,10 +167,7 @@ def _turned(atlas: Atlas) -> Table:
 
 
 def atlas_picture(atlas: Atlas) -> Picture:
-    """Draw maps of the points over the sphere of directions, one for each magnitude of omega(0).
-
-    Beside them are the mean points of each claim at every magnitude.
-    """
+    """Draw maps of the points over the sphere of directions, and the mean points of each claim."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 7.2), dpi=100, layout="constrained")
@@ -266,7 +260,6 @@ def _draw_claims(figure: "Figure", atlas: Atlas, names: Sequence[str], means: An
 
 
 def _edges(values: Array) -> Array:
-    """Return the edges of a picture's cells, geometric means of the centres `values`."""
     if len(values) < 2:
         return np.array([values[0] / 2.0, values[0] * 2.0])
     middles = np.sqrt(values[1:] * values[:-1])

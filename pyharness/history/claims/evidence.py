@@ -2,9 +2,8 @@
 
 A combination fixes omega(0), the readings, the conjectures and the number of steps. Its omega(0) is
 either one value for all cases in which the thesis gives none, or for each case the value that we
-adopt. The score is the number of claims about the original programs that are reproduced; in part
-counts one half, and claims that are not testable do not count. There are no weights and no tuned
-parameters.
+adopt. The score is the number of testable claims about the original programs that are reproduced;
+in part counts one half. There are no weights and no tuned parameters.
 """
 
 from collections.abc import Iterator
@@ -105,10 +104,7 @@ def undecided(found: list[Combination]) -> dict[str, list[str]]:
 
 
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
-    """Return `chosen`, but with adopted values for the assumptions that do not affect a claim.
-
-    The test of the claim then runs once for combinations that differ only in those.
-    """
+    """Return `chosen` with adopted values for what does not affect a claim, to test it once."""
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)
     named = [each for each in hangs_on if each.startswith("conjecture ")]

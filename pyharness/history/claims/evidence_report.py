@@ -34,11 +34,7 @@ _SHORT = {
 
 
 def evidence_report(found: Sequence[Combination]) -> Report:
-    """Return the report on how well the claims agree with each combination.
-
-    It has the highest and lowest scores, the claims whose verdict differs, and the values of each
-    choice with the highest score.
-    """
+    """Return the report on how well the claims agree with each combination."""
     ordered = sorted(found, key=lambda each: -each.score)
     axes = list(ordered[0].choices())
     columns = [

@@ -24,9 +24,8 @@ from pyharness.truth.reference import Reference, reference
 class Assumptions:
     """One value for each choice that the thesis leaves open.
 
-    `start` is omega(0) (rad/s) of the cases in which the thesis gives none; None takes those of
-    `cases.toml`. `readings` are used although this edition does not adopt them; `conjectures` None
-    takes those of the original listing. `word` is the arithmetic.
+    `start` is omega(0) (rad/s) where the thesis gives none; None takes that of `cases.toml`.
+    `readings` are those that this edition does not adopt. `word` is the arithmetic.
     """
 
     start: Triple | None = None
@@ -40,9 +39,8 @@ class Assumptions:
 class Laboratory:
     """The three programs, original or corrected, which run the cases under given assumptions.
 
-    The original programs have all their defects except those `fixed`. `parts` divides the step size
-    of a run and multiplies its steps; results are at the steps of the case. Without `may_stop` the
-    stop test of the Runge-Kutta program is skipped. Errors are against the reference solution.
+    `parts` divides the step size of a run; results are at the steps of the case. Without `may_stop`
+    the stop test of the Runge-Kutta program is skipped. Errors are against the reference solution.
     """
 
     is_original: bool
@@ -97,18 +95,15 @@ class Laboratory:
     def models(self, case: int, terms: int) -> Array:
         """Return omega (rad/s) of the collocation model with n = `terms` terms, shape (steps, 3).
 
-        Its points are at k/(n+1) of the interval length DT, k = 1 ... n. DT is the step size; in
-        the original programs it grows by the step size in every step, so that the points move out
-        of the step, and the torque must be constant.
+        Its points are at k/(n+1) of the interval length DT, k = 1 ... n. In the original programs
+        DT grows by the step size in every step, so that the points move out of the step, and the
+        torque must be constant.
         """
         accumulates = self.is_original and "dt-accumulates" not in self.fixed
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
 
     def required_constant(self, case: int) -> float:
-        """Return the least Lipschitz constant (1/s) with which every step passes the stop test.
-
-        It is infinite if no constant is large enough.
-        """
+        """Return the least Lipschitz constant (1/s), maybe infinite, that passes every step."""
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
         for _ in range(6 * scene.steps):
@@ -201,10 +196,10 @@ def by_literals(
 ) -> Array:
     """Return omega as an original collocation program with changed step literals computes it.
 
-    The step size is a literal in several places of the cards; `changed` has those, from `LITERALS`,
-    that are divided by `parts`. An equivalent model, which differs in rounding errors, integrates
-    all scenes at once under constant torque. The result (rad/s) is at the steps of the unchanged
-    program, shape (scenes, steps, 3), NaN from an overflow on.
+    `changed` are the places on the cards, of `LITERALS`, whose step size is divided by `parts`. An
+    equivalent model, which differs in rounding errors, integrates all scenes at once under constant
+    torque. The result (rad/s) is at the steps of the unchanged program, shape (scenes, steps, 3),
+    NaN from an overflow on.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
@@ -222,10 +217,10 @@ def integrate_models(
 ) -> Array:  # fmt: skip
     """Integrate the collocation model of bodies with constant torque from n initial omegas at once.
 
-    `omega` (rad/s) has shape (n, 3), `coefficients` A, B and C in its last axis; `torque` is
-    divided by the moments (rad/s2). The points divide the interval (0, dt) evenly, where dt (s)
-    grows by `growth` (s) with every step of length `end` (s). Return omega (rad/s), shape (n,
-    steps, 3), which equals that of the programs but for rounding, and is NaN from an overflow on.
+    `omega` (rad/s) has shape (n, 3), `coefficients` A, B and C in its last axis; `torque` is over
+    the moments (rad/s2). The points divide (0, dt) evenly, where dt (s) grows by `growth` (s) in
+    every step of length `end` (s). Return omega (rad/s), shape (n, steps, 3), but for rounding that
+    of the programs; NaN from an overflow on.
     """
     a, b, c = coefficients.T
 

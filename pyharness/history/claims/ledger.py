@@ -44,8 +44,8 @@ class Judgement:
 class Assignment:
     """An initial omega (rad/s) for a case in which the thesis gives none, and its claims' verdicts.
 
-    It `holds` if all claims about the case are reproduced by the original programs, at least in
-    part; those that fail with every start do not count.
+    It `holds` if the original programs reproduce all, at least in part, but those that fail with
+    every start.
     """
 
     case: int
@@ -131,8 +131,8 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 def assignments() -> list[Assignment]:
     """Return one assignment for each start and each case in which the thesis gives no omega(0).
 
-    The claims about a case do not depend on the start of another, so that all hold at once if every
-    case has a start with which its own do.
+    The claims about a case do not depend on the start of another, so that all hold at once if each
+    case has such a start.
     """
     found = []
     for case in facts("claims")["assumed"]["cases"]:

@@ -1,8 +1,8 @@
 """Tests of the thesis's claims about programs and methods over several cases.
 
 Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` says how it
-decides, with arguments, errors and verdicts as in `verdicts`. The thesis lists no programs for the
-weightings other than collocation; a test of these is "not testable" for the original programs.
+decides. The thesis lists no programs for the weightings other than collocation; a test of these is
+"not testable" for the original programs.
 """
 
 import math
@@ -41,10 +41,9 @@ _OTHERS = WEIGHTINGS[1:]
 
 
 def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
-    """Judge the claim that collocation is superior to Runge-Kutta.
+    """Judge the claim that collocation is superior to Runge-Kutta at the steps that all ran.
 
-    Only the steps that all three programs ran are compared, and both collocation errors must be
-    below that of Runge-Kutta. The cases in `shown` do not affect the verdict.
+    The cases in `shown` do not affect the verdict.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):
@@ -64,8 +63,7 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
 
     The test applies eq. 19 only if its quotients, changes of a derivative between two stages over
     changes of its variable, are Lipschitz quotients of the differential equations. These are at
-    most the norm of the Jacobian, here the largest along the reference and the run. The largest
-    ratio of quotient to norm decides: at most 1.05, or 2 in part.
+    most the norm of the Jacobian, here the largest along the reference and the run.
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -88,10 +86,7 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
 
 
 def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Judge the claim that more than four terms hardly reduce the error of a collocation model.
-
-    No error of four terms may be more than 2 times (in part: 10) that of more `terms`.
-    """
+    """Judge the claim that more than four terms hardly reduce the error of a collocation model."""
     numbers = {}
     for case in cases:
         truth = lab.truth(case).omega
@@ -113,8 +108,7 @@ def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
 def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
     """Judge the claim that the stop test ends the runs that are unbounded, and no others.
 
-    A run is unbounded if it overflows without the test, or exceeds `bounded` times the largest
-    reference omega. Without such runs and false alarms, the claim is not testable.
+    Without the test they overflow, or exceed `bounded` times the largest reference omega.
     """
     alarms = unbounded = caught = 0
     for case in cases:
@@ -144,8 +138,7 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge the claim that collocation improves if the step size is divided by ten.
 
-    The rule is `rules.small_step`. The original cards have the step size as several literals; the
-    result also counts the cases of constant torque that improve when only some are changed.
+    The cards have it as several literals; cases that improve when some are changed count too.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
@@ -155,10 +148,7 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
 
 
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
-    """Count the cases whose error falls to half when some of `LITERALS` are divided by ten.
-
-    A case also counts if the run overflows only with the original literals.
-    """
+    """Count the cases whose error falls to half when some of `LITERALS` are divided by ten."""
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
     for program, terms in zip(COLLOCATION, (2, 4), strict=True):
@@ -184,9 +174,7 @@ def suffices(
 ) -> Judged:
     """Judge the claim that a three- or four-term model suffices for most problems.
 
-    The errors of the four-term program and of the model with `terms[0]` terms must be at most
-    `share` of the largest omega in `enough` cases (in part: three). The model is left out for the
-    original programs if the torque varies.
+    It is left out for the original programs if the torque varies.
     """
     numbers, good = {}, 0
     for case in cases:
@@ -206,9 +194,8 @@ def execution_time(
 ) -> Judged:
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
-    Floating-point operations of a step, weighted by `unit_times`, are counted on the cards and in
-    our LEQT1F: as written, and a repeated term only once. The four ratios must be from `low` to
-    `high`, or some of them in part.
+    Operations of a step, weighted by `unit_times`, are counted on the cards and in our LEQT1F: as
+    written, and a repeated term only once.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -231,7 +218,7 @@ def execution_time(
 def seconds(lab: Laboratory) -> Judged:
     """Count the floating-point operations of 100 steps of each program.
 
-    Run times today say nothing about the original machine, so that the claim is not testable.
+    Run times today say nothing about the original machine: not testable.
     """
     counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
     numbers = {
@@ -244,9 +231,8 @@ def seconds(lab: Laboratory) -> Judged:
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Judge the claim that the three programs have about the same number of cards.
 
-    The ratio of each collocation deck to the Runge-Kutta deck is taken without and with our LEQT1F.
-    The claim is undecided if the two thresholds in `factors` give different verdicts, or some ratio
-    is at most the lower one.
+    The claim is undecided if the thresholds in `factors`, or counts without and with our LEQT1F,
+    give different verdicts.
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -265,10 +251,7 @@ def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
 
 
 def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Judge the claim that the weightings other than collocation failed, in `cases`.
-
-    An error must exceed the largest omega or, in part, ten times that of collocation.
-    """
+    """Judge the claim that the weightings other than collocation failed, in `cases`."""
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers, useless, worst = {}, False, 0.0
@@ -290,9 +273,9 @@ def computer_error(
 ) -> Judged:
     """Judge the claim that rounding error makes the weightings other than collocation fail.
 
-    Two sets of differences of omega must reach `limit` (rad/s): the errors in Case 1, which every
-    method solves exactly but for rounding, with smaller and smaller steps; and runs as in section
-    IV.2 in binary64 against those in `words`.
+    Two sets of differences (rad/s) are tested: errors in Case 1, which every method solves exactly
+    but for rounding, with smaller and smaller steps; and runs as in section IV.2 in binary64
+    against those in `words`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -315,11 +298,7 @@ def computer_error(
 
 
 def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Judge the claim that of the four weightings only collocation succeeds.
-
-    Each other weighting must have an error over 10 times that of collocation with the same terms;
-    in part, some must.
-    """
+    """Judge the claim that of the four weightings only collocation succeeds."""
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers = {}
@@ -336,11 +315,7 @@ def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]
 def all_succeed(
     lab: Laboratory, cases: Sequence[int], terms: Sequence[int], share: float
 ) -> Judged:
-    """Judge the claim that the weighted residual methods integrate the rigid body problem.
-
-    A weighting succeeds if its errors are at most `share` of the largest omega in all cases and
-    with all `terms`.
-    """
+    """Judge the claim that the weighted residual methods integrate the rigid body problem."""
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers = {
@@ -358,9 +333,8 @@ def all_succeed(
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Compare the corrected programs with collocation that corrects a first estimate once per step.
 
-    A correction solves for the coefficients with the right-hand sides along the previous estimate.
-    The thesis recommends to try a predict-correct technique, which is neither true nor false: "not
-    testable". The numbers are distances (rad/s), and errors with zero to three corrections.
+    A correction uses the right-hand sides along the previous estimate. That the thesis recommends
+    to try this is neither true nor false: "not testable".
     """
     best = Laboratory(False, lab.assumptions)
     numbers = {}

@@ -1,9 +1,8 @@
 """Verdicts on claims from many initial omegas at once, by the functions in `rules` on arrays.
 
 A sweep supplies the starts (values of omega(0)), the listing with its readings, and the number of
-steps. Each start is used in all cases in which the thesis gives none. A sweep calls one function
-for each claim in `JUDGED`: the attribute of this module with the claim's name, which `__getattr__`
-returns.
+steps. Each start is used in all cases in which the thesis gives none. A sweep calls one attribute
+of this module for each claim in `JUDGED`, which `__getattr__` returns.
 """
 
 from collections.abc import Callable
@@ -37,9 +36,8 @@ _EFFORT = 1e9  # in effect no work limit, because a sweep reports its expected t
 class Starts:
     """The runs from n starts, a `rules.Bench`, for the cases in which the thesis gives no omega(0).
 
-    The laboratory `one` has programs, cases and assumptions. The reference is integrated by Taylor
-    series from step to step, to a relative tolerance of 1e-12. Arrays have the shape (n, steps, 3),
-    or (steps, 3) if the thesis gives omega(0).
+    The reference is integrated by Taylor series to a relative tolerance of 1e-12. Arrays have the
+    shape (n, steps, 3), or (steps, 3) if the thesis gives omega(0).
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
@@ -130,8 +128,7 @@ def __getattr__(name: str) -> Callable[[Batch], NDArray[np.int8]]:
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
     """Return the code of a claim for each start in a batch of a sweep, shape (n,).
 
-    It is SILENT if the claims do not apply to the sweep (`_laboratory`). The claim itself
-    determines which cases are run, whatever the sweep's.
+    It is SILENT if the claims do not apply. The claim determines which cases are run.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
@@ -160,8 +157,8 @@ def _bench(one: Laboratory, batch: Batch) -> Starts:
 def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
     """Return the laboratory of a sweep, or None if the claims do not apply to it.
 
-    They do not if the program is neither original nor corrected, the scene is no case of the
-    thesis, body or torque vary, or the stop test is not that of the cards.
+    They need an original or corrected program, a case of the thesis with its body and torque, and
+    the stop test of the cards.
     """
     if batch.listing is None or batch.arrays.keys() & _OF_CASES:
         return None

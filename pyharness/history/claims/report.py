@@ -151,7 +151,6 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def _hangs_on(judgement: Judgement) -> list[str]:
-    """Return the names of the assumptions whose change alters a verdict."""
     turning = (
         each.assumption.replace("conjecture ", "").replace("reading ", "")
         for each in judgement.survivals

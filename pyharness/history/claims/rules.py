@@ -1,10 +1,10 @@
 """Rules of the claims that depend on the initial omega (the start), for one start or many.
 
 A bench supplies runs and solutions: a `Laboratory` for one start, or `Starts` for n. Its arrays
-have the shape (..., steps, 3), where ... is () or (n,). A rule returns a `Grade`: numbers of the
-shape ..., and flags that say from which starts the claim is reproduced as a whole, or in part. An
-error is the largest of any component of omega over the steps that the program ran, against the
-reference solution. The range of a component is its largest minus its smallest value.
+have the shape (..., steps, 3), where ... is () or (n,), and a `Grade` the shape .... The `rule` of
+the claim in `data/claims.toml` says how it is graded. An error is the largest of any component of
+omega over the steps that the program ran, against the reference solution. The range of a component
+is its largest minus its smallest value.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,10 +22,7 @@ Flags = NDArray[np.bool_]
 
 
 class Runs(NamedTuple):
-    """The runs of a program on one case, from one start or many.
-
-    `omega` (rad/s) is NaN where a run has no row; `steps` is its number of rows.
-    """
+    """The runs of a program on one case; `omega` (rad/s) is NaN where one has no row."""
 
     omega: Array
     steps: NDArray[Any]
@@ -44,8 +41,8 @@ class Grade(NamedTuple):
 class Bench(Protocol):
     """The interface from which a test of a claim obtains runs and reference solutions of cases.
 
-    `parts` divides the step size; rows are still at the steps of the case. Without `may_stop` the
-    stop test of the Runge-Kutta program is skipped.
+    `parts` divides the step size; rows are at the steps of the case. Without `may_stop` the stop
+    test is skipped.
     """
 
     def scene(self, case: int, parts: int = 1) -> Scene:
@@ -73,7 +70,7 @@ def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
 def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
     """Grade the claim that all three programs coincide with the known solution of a case.
 
-    Every error must be below `limit` (rad/s), half a unit of the last printed digit.
+    `limit` (rad/s) is half a unit of the last printed digit.
     """
     numbers = {f"{name}: largest error (rad/s)": bench.error(name, case) for name in PROGRAMS}
     return Grade(numbers, _most(numbers) < limit)
@@ -82,8 +79,7 @@ def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
 def concur(bench: Bench, case: int, share: float) -> Grade:
     """Grade the claim that the two-term and the four-term program agree in a case.
 
-    In part: complete runs differ by at most `share` of the largest omega; as a whole: also by at
-    most a tenth of the range of each component.
+    In part, by `share` of the largest omega; else also by a tenth of the range of each component.
     """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
@@ -103,11 +99,7 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 
 
 def fails(bench: Bench, case: int, share: float) -> Grade:
-    """Grade the claim that the Runge-Kutta program fails in a case.
-
-    The run must end early, and an error exceed `share` of the component's range; in part, one of
-    these.
-    """
+    """Grade the claim that the Runge-Kutta program fails in a case: ends early, errs, or both."""
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
     ended, far = ~runs.complete, error > share
@@ -116,20 +108,14 @@ def fails(bench: Bench, case: int, share: float) -> Grade:
 
 
 def diverged(bench: Bench, case: int) -> Grade:
-    """Grade the claim that the run of the two-term collocation program diverged in a case.
-
-    It did if it overflowed, or if its error exceeds the largest reference omega.
-    """
+    """Grade the claim that the run of the two-term collocation program diverged in a case."""
     runs, error = bench.runs("two-term", case), bench.error("two-term", case)
     numbers = {"steps": runs.steps, "largest error (rad/s)": error}
     return Grade(numbers, runs.overflow | (error > largest_of(bench.solution(case))))
 
 
 def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -> Grade:
-    """Grade the claim that collocation models with different numbers of terms agree in a case.
-
-    They may differ from the first by at most `share` of the largest reference omega.
-    """
+    """Grade the claim that collocation models with different numbers of terms agree in a case."""
     first, *others = terms
     model, largest = bench.models(case, first), largest_of(bench.solution(case))
     numbers = {}
@@ -143,10 +129,7 @@ def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -
 
 
 def dynamic(bench: Bench, case: int, factor: float) -> Grade:
-    """Grade the claim that the motion of a case is the liveliest of all seven cases.
-
-    The largest angular acceleration of its four-term run must be `factor` times that of all others.
-    """
+    """Grade the claim that the motion of a case has the largest angular acceleration of all."""
     rates = {}
     for each in range(1, 8):
         omega = bench.runs("four-term", each).omega
@@ -162,9 +145,8 @@ def dynamic(bench: Bench, case: int, factor: float) -> Grade:
 def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
     """Grade the claim that collocation improves with a tenth of the step size, with one exception.
 
-    A run improves if its error falls at least to half and is finite with the full step. Of the
-    pairs of program and case other than the two-term program in `exception`, four fifths must
-    improve (in part: half), and the exception must not.
+    An error must fall at least to half, from a finite one, in four fifths (in part: half) of the
+    other pairs of program and case.
     """
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:
@@ -185,7 +167,7 @@ def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
 def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
     """Grade the claim that the Runge-Kutta program does not improve with a tenth of the step size.
 
-    None of the errors may fall to half; in part, at most a third. The runs are without stop test.
+    The runs are without stop test.
     """
     numbers = {}
     for case in cases:
@@ -201,10 +183,7 @@ def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
 def largest_error(
     bench: Bench, program: str, case: int, may_stop: bool = True, parts: int = 1
 ) -> Array:
-    """Return the largest error of any omega component (rad/s) for each start.
-
-    It is infinite after an overflow.
-    """
+    """Return the largest error of omega (rad/s) for each start, infinite after an overflow."""
     runs = bench.runs(program, case, may_stop, parts)
     error = _farthest(runs.omega, bench.solution(case)).max(axis=-1)
     return np.where(runs.overflow, np.inf, error)
@@ -230,10 +209,7 @@ def largest_of(omega: Array) -> Array:
 
 
 def _farthest(first: Array, second: Array) -> Array:
-    """Return the largest difference of each omega component over the steps (rad/s), shape (..., 3).
-
-    A step without a row (NaN) does not count.
-    """
+    """Return the largest difference of each omega component (rad/s), without missing steps."""
     with np.errstate(all="ignore"):
         apart = _by_component(first - second)
         np.abs(apart, out=apart)
@@ -241,10 +217,7 @@ def _farthest(first: Array, second: Array) -> Array:
 
 
 def _by_component(omega: Array) -> Array:
-    """Return omega as a contiguous array of the shape (3, ..., steps).
-
-    NumPy computes maxima over its steps ten times as fast.
-    """
+    """Return omega as a contiguous array (3, ..., steps), ten times as fast for maxima."""
     return np.ascontiguousarray(np.moveaxis(omega, -1, 0))
 
 

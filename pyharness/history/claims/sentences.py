@@ -1,7 +1,4 @@
-"""The sentences of sections V and VI of the thesis, each with the claims that it makes.
-
-A sentence without claims has the reason why it makes none.
-"""
+"""The sentences of sections V and VI of the thesis, each with its claims or why it has none."""
 
 from typing import NamedTuple
 
@@ -11,10 +8,9 @@ from pyharness.model.facts import facts
 class Sentence(NamedTuple):
     """A sentence of the thesis with the claims that it makes; fields that do not apply are empty.
 
-    `text` is our reading, with formulas in LaTeX and a line for each that a formula or table has of
-    its own, `quote` a few words of it. `why` is the function of a sentence without claims.
-    `laboratory` is the run that shows it best, as in ``case=2&program=two-term``; `command`,
-    without ``pyharness``, shows more than `claims --explain`.
+    `text` is our reading, with formulas in LaTeX, and `quote` a few words of it. `laboratory` is
+    the run that shows it best, as in ``case=2&program=two-term``; `command` shows more than `claims
+    --explain`.
     """
 
     where: str

@@ -1,7 +1,6 @@
 """Each claim of the thesis as a story of three sentences, with the computed numbers in them.
 
-In the sentences of `data/claims.toml` a field names a number of our verdict, so that no number of a
-story is written by hand.
+A field of a sentence in `data/claims.toml` names a number of our verdict; none is written by hand.
 """
 
 import re
@@ -21,10 +20,7 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Story(NamedTuple):
-    """A claim told in three sentences: what the thesis reports, why, and what is true of it.
-
-    Formulas are LaTeX between dollar signs.
-    """
+    """A claim told in three sentences, with LaTeX between dollar signs."""
 
     saw: str
     why: str
@@ -50,10 +46,7 @@ def story(judgement: Judgement) -> Story:
 
 
 def prose(x: float, digits: int = 3) -> str:
-    """Return a number as text for a sentence, with commas or a power of ten if necessary.
-
-    web/story/numbers.js writes the same text.
-    """
+    """Return a number as text for a sentence, as web/story/numbers.js writes it."""
     if x == 0 or 1e-3 <= abs(x) < 1e6:
         rounded = float(f"{x:.{digits}g}") + 0.0  # no sign of zero
         return f"{rounded:,.0f}" if rounded == int(rounded) else f"{rounded:.{digits}g}"

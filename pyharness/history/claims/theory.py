@@ -1,8 +1,8 @@
 """Tests of the thesis's claims about history, theory and orders, most of them in sections I to IV.
 
 Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` says how it
-decides, with arguments and verdicts as in `verdicts`. An error is the largest of any omega
-component against the reference solution, and `limit` bounds it as a fraction of the largest omega.
+decides. An error is the largest of any omega component against the reference solution; `limit`
+bounds it as a fraction of the largest omega.
 """
 
 import math
@@ -28,10 +28,7 @@ Weights = Sequence[Callable[[Array], Any]]
 
 
 def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Judge the claim that the solutions of some cases are not known.
-
-    It is false if Jacobi's elliptic functions solve all `cases` within `limit`.
-    """
+    """Judge the claim that the solutions of some cases are not known."""
     numbers = {}
     for case in cases:
         scene, truth = lab.scene(case), lab.truth(case)
@@ -50,8 +47,7 @@ def by_sources(lab: Laboratory, holds: bool) -> Judged:
 def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge the claim that Hamilton's equations of a rigid body are partial differential equations.
 
-    It is false if six ordinary ones, in Euler angles and their momenta, solve the case within
-    `limit`.
+    Six ordinary ones, in Euler angles and their momenta, solve the case.
     """
     from scipy.integrate import solve_ivp
 
@@ -73,7 +69,6 @@ def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
 
 def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
-    """Return the 3 x 3 matrix from the rates of the 3-1-3 angles (rad/s) to omega in body axes."""
     _, theta, psi = angles
     return np.array(
         [
@@ -92,11 +87,7 @@ def _omega(moments: Triple, state: Array) -> Array:
 
 
 def _hamilton(moments: Triple, state: Array) -> Array:
-    """Return dH/dp and -dH/dq, the time derivatives of `state`, as one array.
-
-    `state` has the 3-1-3 angles q (rad) and their momenta p; H = sum I omega**2 / 2, with the
-    `moments` I (kg m2).
-    """
+    """Return dH/dp and -dH/dq: the 3-1-3 angles q (rad), then momenta p; H = sum I omega**2 / 2."""
     theta, psi = float(state[1]), float(state[2])
     omega = _omega(moments, state)
     matrix = _angle_rates_to_omega(state[:3])
@@ -124,8 +115,7 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
     """Judge the claim that a bounded function satisfies a Lipschitz condition.
 
-    It is false if a quotient of the square root, bounded on (0, 1), exceeds `above`, for x from
-    1e-2 to 10**-decades and y = 2 x.
+    The quotients are those of the square root on (0, 1), for x down to 10**-decades and y = 2 x.
     """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
@@ -136,10 +126,7 @@ def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judg
 def local_error(
     lab: Laboratory, cases: list[int], method: str, power: float, within: float
 ) -> Judged:
-    """Judge the claim that the error of one step of a method falls with a power of the step size.
-
-    The measured power must be within `within` of `power` in all cases; in part, in some.
-    """
+    """Judge the claim that the error of one step falls with a power of the step size."""
     numbers = {}
     for case in cases:
         numbers[f"case {case}: power of the step"] = _power(
@@ -152,8 +139,7 @@ def local_error(
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that Runge-Kutta and the Taylor series up to h**4 are the same method.
 
-    One step of both must agree to 1e-14 of the largest omega; in part, up to O(h**p) with a
-    measured p within `within` of 5.
+    In part, one step of both agrees up to O(h**5).
     """
     numbers, same, near = {}, True, True
     for case in cases:
@@ -172,7 +158,6 @@ def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
 
 
 def _stepped(scene: Scene, method: str) -> Array:
-    """Return omega (rad/s) at the end of a scene by a fixed-step method."""
     omega: Array = solve(scene, scene.times(), method).omega[-1]
     return omega
 
@@ -182,10 +167,7 @@ def _power(
     method: Callable[[Scene], Array],
     truth: Callable[[Scene], Array] | None = None,
 ) -> float:
-    """Return p, the power with which a method's error in one step of size h falls as O(h**p).
-
-    It is measured by halving the step. `truth` is by default the reference solution.
-    """
+    """Return p, the power with which a method's error in one step of size h falls as O(h**p)."""
     apart = []
     for step_size in (scene.step_size, scene.step_size / 2.0):
         short = replace(scene, step_size=step_size, steps=1)
@@ -214,8 +196,6 @@ def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
     """Judge the claim that in Crandall's example four weightings are better than the Taylor series.
 
     The example is dx/dt = `rate` x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2.
-    In part: each weighting has less than half the error of the series; as a whole: those in `best`
-    also have the smallest errors.
     """
     t, weight = np.polynomial.legendre.leggauss(12)
     t, weight = (t + 1.0) / 2.0, weight / 2.0
@@ -247,8 +227,8 @@ def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
 def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weights) -> Array:
     """Return the linear equations for c1 and c2 of Crandall's example, a row for each weight.
 
-    A row has the weighted integrals over (0, 1) of the two `factors` in the residual, and of
-    `rate`. The quadrature `t`, `weight` on (0, 1) is applied to each half.
+    It has the weighted integrals over (0, 1) of the two `factors` in the residual, and of `rate`,
+    by quadrature on each half.
     """
     halves = [(t / 2.0, weight / 2.0), ((t + 1.0) / 2.0, weight / 2.0)]
     rows = []
@@ -264,9 +244,8 @@ def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weight
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that the rates Q of eq. 32 of the thesis tell if a steady rotation is stable.
 
-    A small perturbation should change as exp(Q t). It is 1e-8 of the rotation; if Re Q (1/s) is
-    above 0, it must grow at this rate within `within`, else stay within ten times its size for ten
-    periods.
+    A perturbation of 1e-8 should change as exp(Q t): grow at the rate Re Q (1/s) if this is above
+    0, else stay within ten times its size for ten periods.
     """
     numbers, told = {}, True
     for case in cases:
@@ -296,8 +275,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
 def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge the claim that a trial solution of eq. 32 of the thesis solves some cases exactly.
 
-    It is a steady rotation about axis 3, with the initial omega3, plus exponential functions of
-    time.
+    It is a steady rotation about axis 3 plus exponential functions of time.
     """
     numbers = {}
     for case in cases:
@@ -313,10 +291,7 @@ def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
 
 def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge the claim that one-term collocation suffices for a linear top, here a sphere (Case 1).
-
-    A linear top is a body for which Euler's equations are linear.
-    """
+    """Judge the claim that one-term collocation suffices for a linear top (Case 1: a sphere)."""
     found = run(lab.scene(case), Member("collocation", 1))
     truth = lab.truth(case)
     share = distance(found.omega, truth.omega) / largest(truth)
@@ -325,10 +300,7 @@ def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
 
 
 def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
-    """Judge the claim that Euler's equations of a symmetric body have no products of omegas.
-
-    Their coefficients A, B and C must be 0 in all cases; in part, in some.
-    """
+    """Judge the claim that Euler's equations of a symmetric body have no products of omegas."""
     left = {
         f"case {case}: largest coefficient": max(map(abs, lab.scene(case).euler_coefficients))
         for case in cases
@@ -350,10 +322,7 @@ def step_on_cards(lab: Laboratory, step: float) -> Judged:
 
 
 def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
-    """Judge the claim that the collocation points are within the time interval of the step.
-
-    It is true if they are in all steps of both programs; in part, in half of them.
-    """
+    """Judge the claim that the collocation points are within the time interval of the step."""
     (case,) = cases
     numbers, shares = {}, []
     for program, last in (("two-term", 2.0 / 3.0), ("four-term", 0.8)):
@@ -367,10 +336,7 @@ def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
 
 
 def possible_bodies(lab: Laboratory, cases: list[int]) -> Judged:
-    """Judge the claim that every case is a possible rigid body.
-
-    No moment may exceed the sum of the other two.
-    """
+    """Judge the claim that every case is a possible rigid body."""
     excess = {}
     for case in cases:
         first, second, third = sorted(lab.scene(case).moments or (), reverse=True)

@@ -2,12 +2,11 @@
 
 Each function is the `test` of one or more claims in `data/claims.toml`. The claim's `rule`
 describes how it decides, and its `parameters` are the keyword arguments. `lab` is a laboratory,
-which runs the programs under the chosen assumptions, and `case` a number of Table 1. The tests over
-several cases are in `methods`.
+which runs the programs under the chosen assumptions, and `case` a number of Table 1.
 
-Unless a docstring says otherwise, an error is the largest of any component of omega against the
-reference solution, over the steps that the program ran; the amplitude is half the largest range
-(largest minus smallest value) of a reference omega. A claim that fails is "not reproduced".
+An error is the largest of any component of omega against the reference solution, over the steps
+that the program ran; the amplitude is half the largest range (largest minus smallest value) of a
+reference omega. A claim that fails is "not reproduced" unless a docstring says otherwise.
 """
 
 import math
@@ -59,10 +58,7 @@ def constant_solution(lab: Laboratory, case: int) -> Judged:
 
 
 def known_solution(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the solution of a case is (sin 5t, cos 5t, 10) rad/s, as printed.
-
-    It may differ from the reference by 1e-15 (1 + 5 t) rad/s, where t (s) is the end of the run.
-    """
+    """Judge the claim that the solution of a case is (sin 5t, cos 5t, 10) rad/s, as printed."""
     truth = lab.truth(case)
     t = truth.time
     printed = np.column_stack([np.sin(5 * t), np.cos(5 * t), np.full_like(t, 10.0)])
@@ -80,7 +76,7 @@ def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that all three programs coincide with the known solution of a case.
 
-    The numbers also show how many steps the Runge-Kutta program runs from each of `starts`.
+    The numbers also have the steps of Runge-Kutta from each of `starts`.
     """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
@@ -95,10 +91,7 @@ def _shown(start: Triple) -> str:
 
 
 def coincident(lab: Laboratory, case: int, share: float) -> Judged:
-    """Judge the claim that collocation coincides with the known solution on the thesis's graph.
-
-    No error may exceed `share` of the component's range.
-    """
+    """Judge the claim that collocation coincides with the known solution on the thesis's graph."""
     numbers = {}
     for program in COLLOCATION:
         runs, truth = lab.runs(program, case), lab.solution(case)
@@ -125,10 +118,7 @@ def poor(lab: Laboratory, case: int, share: float) -> Judged:
 
 
 def error_constant(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the error of collocation does not grow during the run.
-
-    In the last fifth of the steps it may be at most twice that of the first.
-    """
+    """Judge the claim that the error of collocation does not grow during the run."""
     truth = lab.truth(case).omega
     numbers = {}
     for program in COLLOCATION:
@@ -142,8 +132,7 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
     """Judge the claim that the stop test ended the Runge-Kutta run at step number `step`.
 
-    At another step it is reproduced in part. The numbers list the subsets of defects with which the
-    test ends the run at `step`.
+    The numbers list the subsets of defects with which it does.
     """
     stop = lab.run("runge-kutta", case).stop
     found = math.nan if stop is None else float(stop.step)
@@ -169,10 +158,7 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
 
 
 def growing(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that omega1 of the Runge-Kutta program grows beyond the sine of the solution.
-
-    At the end it must exceed 1 rad/s, the amplitude, and the solution by more than a thousandth.
-    """
+    """Judge the claim that omega1 of the Runge-Kutta program grows beyond the sine."""
     run = lab.run("runge-kutta", case)
     value, solution = float(run.omega[-1, 0]), float(lab.truth(case).omega[run.steps - 1, 0])
     numbers = {"omega1 at the end (rad/s)": value, "solution there (rad/s)": solution}
@@ -209,10 +195,7 @@ def differ(lab: Laboratory, case: int, share: float) -> Judged:
 
 
 def more_reliable(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the four-term program is more accurate than the two-term program.
-
-    Its error must be at most 0.5 times the two-term error; in part, 0.8 times.
-    """
+    """Judge the claim that the four-term program is more accurate than the two-term program."""
     ratio = lab.error("four-term", case) / lab.error("two-term", case)
     return graded({"four-term error over two-term error": ratio}, ratio <= 0.5, ratio <= 0.8)
 
@@ -225,9 +208,8 @@ def diverged(lab: Laboratory, case: int) -> Judged:
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
     """Judge the claim that the two-term error has its cause in a motion too fast for two terms.
 
-    The corrected programs run from all `starts`, because the thesis gives no initial omega for some
-    cases. The two-term error must be more than `worse` times the four-term error from all; in part,
-    more than `same` times from one.
+    The corrected programs run from all `starts`, because the thesis gives no omega(0) for some
+    cases.
     """
     numbers = {}
     for start in starts():

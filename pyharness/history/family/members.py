@@ -1,10 +1,10 @@
 """The family of weighted residual methods in III.1 and IV.2 of the thesis.
 
 One step of length h solves omega' = f(t, omega), equations 16-18, with a polynomial trial function
-omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant, with its value at the
-beginning of the step. Each correction evaluates f along the previous estimate, and chooses c1, ...,
-cn so that the integrals of W (omega' - f) vanish for n weight functions W (eq. 26). The thesis
-makes one correction. `pyharness.theory.tableau` computes its coefficients, the same in every step.
+omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant. Each correction evaluates f
+along the previous estimate, and chooses c1, ..., cn so that the integrals of W (omega' - f) vanish
+for n weight functions W (eq. 26). The thesis makes one. `pyharness.theory.tableau` computes its
+coefficients.
 """
 
 import math
@@ -31,10 +31,9 @@ _WORST_CONDITION = 1e8
 class Member:
     """A weighted residual method of the thesis; the constructor raises InputError for wrong fields.
 
-    `weighting` is one of `WEIGHTINGS`, and `terms` is n. The derivatives of the residual with f
-    held constant, i t**(i-1), are the weights of least squares (eq. 25). `points`, for collocation
-    only, are fractions of the step: k/(n+1) (`thesis`), Gauss-Legendre (`gauss`), or n different
-    numbers from 0 to 1.
+    The derivatives of the residual with f held constant, i t**(i-1), are the weights of least
+    squares (eq. 25). `points`, for collocation only, are fractions of the step: k/(n+1) (`thesis`),
+    Gauss-Legendre (`gauss`), or n different numbers from 0 to 1.
     """
 
     weighting: str = "collocation"
@@ -88,10 +87,7 @@ class Member:
 
 
 def converged_order(member: Member) -> int:
-    """Return the order of a method's global error in the limit of many corrections per step.
-
-    docs/explanation/methods.md derives these orders.
-    """
+    """Return the order with many corrections, derived in docs/explanation/methods.md."""
     n = member.terms
     if member.weighting == "galerkin":
         return n
@@ -110,7 +106,7 @@ def converged_order(member: Member) -> int:
 def predicted_order(member: Member) -> int:
     """Return the order p of a method, whose global error is O(h**p) in general motion.
 
-    The first estimate has order 1, and each correction raises it by one, up to `converged_order`.
+    Each correction raises it by one, from 1 to `converged_order`.
     """
     return min(member.corrections + 1, converged_order(member))
 
@@ -118,9 +114,8 @@ def predicted_order(member: Member) -> int:
 def run(scene: Scene, member: Member) -> Trajectory:
     """Integrate a scene by a weighted residual method (Jacobs 1982, III.1, eq. 20-27, and IV.2).
 
-    There is no translational velocity. The first estimate takes the torque at the beginning of the
-    step, corrections at their nodes. In each step omega has a rounding error of about one unit in
-    the last place.
+    The first estimate takes the torque at the beginning of the step, corrections at their nodes.
+    Each step rounds omega by about one unit in the last place.
     """
     omega = integrate(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
@@ -141,7 +136,7 @@ def run(scene: Scene, member: Member) -> Trajectory:
 def integrate(scene: Scene, members: Sequence[Member]) -> Array:
     """Return omega (rad/s) by several methods at once, shape (members, steps, 3).
 
-    It is not finite after an overflow. The run time is hardly longer than for one method.
+    It is not finite after an overflow.
     """
     # Most corrections first: members that still need a correction are then contiguous in memory.
     order = sorted(range(len(members)), key=lambda i: -members[i].corrections)
@@ -196,10 +191,7 @@ def _stages(matrix: Array, rates: Array) -> Array:
 
 
 def _sums(factors: Array, rates: Array) -> Array:
-    """Return for every method the product of factors (members, i, j) and rates (members, j, 3).
-
-    NumPy sums in order, so that the result does not depend on a BLAS library.
-    """
+    """Return the products of factors (members, i, j) and rates (members, j, 3), without BLAS."""
     total: Array = np.einsum("mij,mjk->mik", factors, rates)
     return total
 
@@ -212,10 +204,7 @@ def _rates(scene: Scene, torque: Array, omega: Array) -> Array:
 
 
 def _torque(scene: Scene, times: Array) -> Array:
-    """Return the torque divided by the moments (rad/s2) at `times` (s), shape (..., 3).
-
-    The torque of a body given by coefficients is in rad/s2 already.
-    """
+    """Return the torque divided by the moments (rad/s2) at `times` (s), shape (..., 3)."""
     law = scene.body_torque
     torque = np.array(law.constant)
     if law.varies:

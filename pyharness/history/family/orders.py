@@ -41,9 +41,8 @@ MOST_STEPS = 2_000
 class OrderFinding:
     """The order of convergence of one method in one scene, derived and measured, and its error.
 
-    `measured` is None if errors are rounding alone, or too large with every step; `settled`, if its
-    last two values differ by at most a tenth. `error` is that of omega with the scene's step
-    (rad/s), infinite after an overflow.
+    `measured` is None for rounding alone or too large errors; `settled`, if its last two values
+    differ by at most a tenth. `error` is of omega with the scene's step (rad/s).
     """
 
     member: Member
@@ -61,8 +60,7 @@ class OrderFinding:
     def misses(self) -> bool:
         """Return whether the measured order settled below the derived order by more than `SLACK`.
 
-        An order above it is no miss: in special scenes the error term that limits the order is
-        small.
+        In special scenes the limiting error term is small, so that an order above it is no miss.
         """
         return self.settled and self.deviation < -SLACK
 
@@ -81,8 +79,7 @@ def order_table(
 ) -> list[OrderFinding]:
     """Measure the orders of convergence and the errors of many methods at once.
 
-    Raise InputError if the reference grows without bound, or the scene has more than `MOST_STEPS`
-    steps.
+    Raise InputError for an unbounded reference or more than `MOST_STEPS` steps.
     """
     if scene.steps > MOST_STEPS:
         raise InputError(f"steps is {scene.steps}; allowed for orders: 1 to {MOST_STEPS}")
@@ -124,10 +121,7 @@ def order_table(
 
 
 def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array) -> Array:
-    """Return the errors of several methods at `horizon` (s), shape (step sizes, members).
-
-    An error is the norm of the difference from the reference `end` over its largest component.
-    """
+    """Return the relative errors of several methods at `horizon` (s), (step sizes, members)."""
     scale = float(np.abs(end).max()) or 1.0
     rungs = []
     for steps in _LADDER:
@@ -140,10 +134,7 @@ def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array)
 
 
 def _slopes(errors: Array) -> list[float]:
-    """Return the order from each pair of errors whose step sizes have the ratio 2.
-
-    These are two places apart; both must be between `_SMALLEST` and `_LARGEST`.
-    """
+    """Return the order from each usable pair of errors, two places apart, with step ratio 2."""
     return [
         math.log2(coarse / fine)
         for coarse, fine in zip(errors[:-2], errors[2:], strict=True)

@@ -1,6 +1,6 @@
 """Errors of a trajectory against the reference, and differences between Fortran and Python.
 
-The compiled Fortran programs and their Python ports, the twins, should agree bit for bit.
+The Fortran programs and their Python ports, the twins, should agree bit for bit.
 """
 
 import math
@@ -17,10 +17,7 @@ from pyharness.truth.reference import Reference
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """The errors of a trajectory against the reference solution.
-
-    Energy and angular momentum have drifts, known without torque.
-    """
+    """The errors of a trajectory against the reference, and its drifts without torque."""
 
     omega: tuple[float, float, float]  # largest error of each component (rad/s)
     velocity: float | None  # largest error of any component of the translational velocity (m/s)
@@ -41,10 +38,9 @@ class Accuracy:
 
 
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
-    """Return the errors of a trajectory against `truth`, which has rows at the same times.
+    """Return the errors of a trajectory against `truth`, up to the end of the shorter.
 
-    If one ends earlier, later rows are not compared; without any, errors are infinite. Without
-    torque, energy and momentum are compared with their initial values.
+    They are infinite without rows. Without torque, energy and momentum have drifts.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
@@ -68,7 +64,6 @@ def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy
 
 
 def _largest(errors: Array) -> float:
-    """Return the largest of some errors; infinity if there are none."""
     return float(errors.max()) if errors.size else math.inf
 
 
@@ -96,8 +91,7 @@ def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float | None:
 def distance(first: Trajectory, second: Trajectory) -> float:
     """Return the largest distance of two trajectories, in units in the last place.
 
-    Recorded times, angular and translational velocities are compared. It is infinite if the numbers
-    of rows differ.
+    It is infinite if the numbers of rows differ.
     """
     if len(first.time) != len(second.time):
         return math.inf
@@ -109,11 +103,7 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 
 
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
-    """Return the names of the results in which two trajectories of a program differ.
-
-    If steps, evaluations, endings or stops differ, only these are named; otherwise all rows and IER
-    are compared bit for bit.
-    """
+    """Return the names of the results that differ: steps, evaluations, ending, stop, else rows."""
     counts = (
         ("steps", first.steps, second.steps),
         ("evaluations", first.evaluations, second.evaluations),
@@ -145,10 +135,9 @@ def _velocity(trajectory: Trajectory) -> Array:
 
 
 def ulps(x: Array, y: Array) -> float:
-    """Return the largest distance between elements of two arrays, in units in the last place.
+    """Return the largest distance between elements of two arrays: floats from one to the other.
 
-    It counts the floats from one to the other. That of two NaNs is 0, of a NaN and a number
-    infinite.
+    That of two NaNs is 0, of a NaN and a number infinite.
     """
     both_nan = np.isnan(x) & np.isnan(y)
     one_nan = np.isnan(x) ^ np.isnan(y)
@@ -159,6 +148,6 @@ def ulps(x: Array, y: Array) -> float:
 
 
 def _ordinal(x: Array) -> NDArray[np.uint64]:
-    """Return the rank of each float among all representable floats; -0 comes just before +0."""
+    """Return the rank of each float among all, -0 just before +0."""
     bits = np.ascontiguousarray(x).view(np.uint64)
     return np.where(bits >> 63, ~bits, bits | np.uint64(1 << 63))

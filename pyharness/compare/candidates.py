@@ -1,8 +1,7 @@
 """Candidates, a common interface of methods, prepared solvers and programs.
 
-Checks and timings run all three in the same way. A prepared solver, made by `prepare`, solves one
-scene by one method, for many initial conditions. A tolerance is relative to the largest component
-of omega; `effort` multiplies the work limit.
+A prepared solver, made by `prepare`, solves one scene by one method, for many initial conditions. A
+tolerance is relative to the largest component of omega; `effort` multiplies the work limit.
 """
 
 import math
@@ -45,11 +44,7 @@ class End:
 
     @property
     def has_result(self) -> bool:
-        """Return whether the candidate reached the requested time.
-
-        The result may still be "sensitive": its amplified rounding error is too large for the
-        tolerance.
-        """
+        """Return whether the candidate reached the time; its error may exceed the tolerance."""
         return self.ended in WITH_ALL_ROWS
 
 
@@ -96,8 +91,8 @@ def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candid
 def prepared_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
     """Return a candidate that runs a solver made by `prepare` for the method `name`.
 
-    If `primed`, the solver is first called with another initial omega, which must have no effect. A
-    fixed step, and Gauss collocation without a tolerance, use the scene's step size.
+    If `primed`, it is first called with another omega, which must have no effect. A fixed step, and
+    Gauss collocation without a tolerance, use the scene's step.
     """
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -192,7 +187,6 @@ def _answered(solver: Solver, omega: Array) -> End:
 
 
 def _printed(result: Any) -> End:
-    """Return the last row of a compiled program's run as an `End`."""
     rows, _, n_rows, status, evaluations, variable, _ = result
     if status == STOPPED:
         return not_finite(f"stopped at step {n_rows} by {STOP_VARIABLES[variable - 1]}")

@@ -1,8 +1,7 @@
 """Comparisons of the original and corrected programs, and of other methods, on one scene.
 
-The distance between Fortran and its Python port, the twin, is in units in the last place. The error
-against the reference solution is in rad/s; it has no meaning below the error bound of the
-reference.
+Fortran and its Python port, the twin, differ by units in the last place. Errors against the
+reference (rad/s) have no meaning below its own.
 """
 
 import itertools
@@ -141,9 +140,8 @@ class Comparison:
     def unexpected(self) -> tuple[str, ...]:
         """Return a sentence for each unexpected result; the tuple is empty if there is none.
 
-        It is unexpected that Fortran and twin differ, or that a corrected program does not have its
-        order. If only methods are compared, it is unexpected that an error exceeds its limit, which
-        follows from the tolerance, or that a method ends before the reference.
+        It is unexpected that Fortran and twin differ, or a corrected program misses its order; of
+        methods alone, that an error exceeds the limit by its tolerance, or that rows are missing.
         """
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         for each in self.programs:
@@ -158,7 +156,6 @@ class Comparison:
         return tuple(found)
 
     def _excess(self, one: MethodFinding) -> str:
-        """Return a sentence if the error of a method exceeds its limit, else an empty text."""
         if one.trajectory is None or one.accuracy is None:
             return ""
         rows, due = len(one.trajectory.time), len(self.reference.time)
@@ -296,9 +293,8 @@ def listings_for(
 ) -> list[Listing]:
     """Return the listings to compare: for each program the original and the corrected listing.
 
-    The selection that `fix` and `keep` make from `base` comes between them, for programs with any
-    of these defects; `base` alone is the only listing. `readings` and `conjectures` are as in
-    `subset`. Raise InputError for a name that none of `programs` has.
+    Between them is the selection that `fix` and `keep` make from `base`, which alone is the only
+    one. Raise InputError for a name that none of `programs` has.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]
@@ -331,11 +327,7 @@ def listings_for(
 def method_finding(
     scene: Scene, name: str, tolerance: float, effort: float, truth: Reference
 ) -> MethodFinding:
-    """Return the results of a method at the scene's steps, or its InputError's message.
-
-    `tolerance` is relative to the largest component of omega, and `effort` multiplies the work
-    limit.
-    """
+    """Return the results of a method at the scene's steps, or its InputError's message."""
     start = time.perf_counter()
     try:
         trajectory = method_candidate(name, tolerance, effort).rows(scene)

@@ -1,7 +1,4 @@
-"""Measured orders of convergence: powers of the step size with which the error decreases.
-
-The error is that of a program or a method against the reference solution.
-"""
+"""Measured orders of convergence: powers of the step size with which the error decreases."""
 
 import itertools
 import math
@@ -82,8 +79,7 @@ class Order:
 class _SingularError(Exception):
     """The signal that a run failed at a step size for which its matrix may be singular.
 
-    The program then uses the right-hand sides in place of LEQT1F's solution. This is another
-    method, whose order is not measured.
+    A program without LEQT1F's solution is another method, whose order is not measured.
     """
 
 
@@ -92,8 +88,8 @@ def measured_order(
 ) -> Order:
     """Measure the order with which omega of a compiled program converges to `truth`.
 
-    In addition to `order_of`, the state is `sensitive` if the error may be amplified rounding, and
-    `misses` if a textbook method of the same order does converge with it.
+    The state is `sensitive` if the error may be amplified rounding, `misses` only if a textbook
+    method of the same order converges.
     """
 
     def omega(finer: Scene) -> Array:
@@ -127,11 +123,10 @@ def order_of(
 ) -> Order:
     """Measure the order of a numerical solution by halving the step size until it is small.
 
-    `solution` takes a scene and returns `quantity` after each step, shape (n, 3), with fewer rows
-    after an overflow; `truth` is at the times of `scene`, which has the largest step. The
-    measurement ends when the order is at least `due` - 0.5 in `pairs` consecutive halvings, smaller
-    in as many, or when the error is only rounding. A run has at most `most_steps` steps; by default
-    2**18, or those of eight halvings if these are more.
+    `solution` returns `quantity` after each step, shape (n, 3), with fewer rows after an overflow.
+    The measurement ends when the order is at least `due` - 0.5 in `pairs` consecutive halvings,
+    smaller in as many, or when the error is only rounding. A run has at most `most_steps` steps; by
+    default 2**18, or those of eight halvings if these are more.
     """
     n = len(truth.time)
     if n < scene.steps:
@@ -188,7 +183,6 @@ def _shows(order: float, due: int) -> bool:
 
 
 def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
-    """Yield the scene with its own step size, with half of it, with a quarter, and so on."""
     most = max(_MOST_STEPS, scene.steps << _HALVINGS) if most_steps is None else most_steps
     for halvings in itertools.count():
         parts = 2**halvings
@@ -203,7 +197,6 @@ def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
 
 
 def _fastest(scene: Scene, omega: Array) -> float:
-    """Return the fastest rate (rad/s) that a step has to resolve."""
     sizes = np.abs(np.vstack([scene.omega, omega]))
     others = np.roll(sizes, -1, axis=1) + np.roll(sizes, -2, axis=1)
     waves = () if isinstance(scene.torque, StateTorque) else scene.law.sines + scene.law.cosines
@@ -212,10 +205,7 @@ def _fastest(scene: Scene, omega: Array) -> float:
 
 
 def _is_grown_rounding(scene: Scene, found: Order) -> bool:
-    """Return whether the error of a measurement may be amplified rounding error.
-
-    It may if it is not above the bound on this, or if the bound can't be computed.
-    """
+    """Return whether the error may be amplified rounding, also if no bound can be computed."""
     if not found.steps or not math.isfinite(found.error):
         return False
     try:
@@ -226,10 +216,7 @@ def _is_grown_rounding(scene: Scene, found: Order) -> bool:
 
 
 def _may_be_singular(program: str, step_size: float) -> bool:
-    """Return whether LEQT1F may find a program's collocation matrix for a step (s) singular.
-
-    It may if an element overflows, or if the condition number is not below 1e15.
-    """
+    """Return whether LEQT1F may find a program's matrix singular: condition 1e15 or overflow."""
     from pyharness.theory.collocation_matrices import PARTS
 
     if program not in PARTS:

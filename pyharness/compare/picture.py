@@ -39,7 +39,6 @@ class _Curve(NamedTuple):
 
 
 def _curves(comparison: Comparison) -> list[_Curve]:
-    """Return the trajectories that a picture shows: of the programs, or else of the methods."""
     if comparison.programs:
         return [
             _Curve(each.listing.program, each.listing.label, each.trajectory, each.accuracy)
@@ -53,10 +52,9 @@ def _curves(comparison: Comparison) -> list[_Curve]:
 
 
 def comparison_picture(comparison: Comparison) -> Picture:
-    """Return the picture of a comparison, and the table of numbers that it shows.
+    """Return the picture of a comparison, with a column for each program or method.
 
-    Each program, or method, has a column of panels: three components of omega (rad/s) over time,
-    with the reference, their error and, if requested, that of the attitude (rad).
+    Panels show the components of omega (rad/s), their error, and that of any attitude (rad).
     """
     from matplotlib.figure import Figure
 
@@ -132,7 +130,6 @@ def _line(axes: "Axes", time: np.ndarray, values: np.ndarray, label: str) -> Non
 
 
 def _frame(axes: "Axes", truth: np.ndarray) -> None:
-    """Limit the vertical range of a panel to values near the reference solution."""
     if not len(truth):
         return
     low, high = float(truth.min()), float(truth.max())

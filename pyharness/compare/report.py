@@ -90,10 +90,7 @@ def comparison_report(comparison: Comparison) -> Report:
 
 
 def verdict(comparison: Comparison) -> list[str]:
-    """Return sentences that say whether the results of a comparison are as expected.
-
-    Others name a sensitive scene, and corrected programs whose order could not be determined.
-    """
+    """Return sentences that say whether the results are as expected, sensitive or not judged."""
     told = [f"UNEXPECTED: {each}" for each in comparison.unexpected] or [_as_expected(comparison)]
     if comparison.is_sensitive:
         told.append(sensitive(comparison.growth, comparison.digits))
@@ -161,7 +158,6 @@ def _methods(comparison: Comparison) -> Table:
 
 
 def _attitudes(comparison: Comparison) -> list[list[Table]]:
-    """Return the table of attitude errors in a list, if attitudes were requested."""
     if comparison.reference.attitude is None:
         return []
     columns = (
@@ -180,7 +176,6 @@ def _attitudes(comparison: Comparison) -> list[list[Table]]:
 
 
 def _data(comparison: Comparison) -> Table:
-    """Return the results of a comparison as one table for CSV, a row for each."""
     names = (
         "method listing active steps ended stop_variable stop_quotient error_w1 error_w2 error_w3 "
         "error_v energy_drift momentum_drift ulps order order_state evaluations seconds"

@@ -25,12 +25,11 @@ def seconds(
     clocks: Sequence[Clock] | None = None,
     slow: float = SLOW,
 ) -> list[float]:
-    """Return the time of one call of each function in `runs` (s), measured in several rounds.
+    """Return the time of one call of each function in `runs` (s), over several rounds.
 
-    In each round, a function is called for about `length` seconds. A first call is not counted, but
-    if it takes longer than `slow` (s), at most three rounds are timed, and one if five times
-    longer. The result is the `statistic` of the rounds. `clocks`, by default the wall clock, are in
-    s; `say` gets a message for each round.
+    In each round a function is called for about `length` seconds. A first call does not count, but
+    if it is longer than `slow` (s), there are at most three rounds, and one above five times that.
+    `statistic` combines the rounds.
     """
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))
@@ -67,8 +66,7 @@ def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> floa
 def ended_after(limit: float) -> Iterator[None]:
     """Raise RuntimeError in a ``with`` block of Python code that takes longer than `limit` (s).
 
-    A compiled function is not interrupted. Only the main thread, which receives signals, may use
-    it.
+    Only the main thread, which receives signals, may use it.
     """
 
     def end(*_: object) -> None:

@@ -1,7 +1,7 @@
 """Random scenes for a given kind of torque; no method was tuned on these scenes.
 
-Torques and frequencies are drawn in proportion to the initial angular velocity, so that a kind
-affects slow and fast bodies in the same way.
+Torques and frequencies are in proportion to the initial angular velocity, so that slow and fast
+bodies are affected in the same way.
 """
 
 import math
@@ -32,7 +32,7 @@ BODIES: dict[str, Callable[[Random], list[float]]] = {
 def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tuple[Scene, float]:
     """Return a random scene, and the time (s) in which its body makes roughly 1 to 300 revolutions.
 
-    `law` is a member of `LAWS`, `speed` of waves a key of `SPEEDS`, and `body` a key of `BODIES`.
+    The texts are keys of `LAWS`, `SPEEDS` and `BODIES`.
     """
     mass = _log(source, 1.0, 50.0)
     moments = [mass * each for each in BODIES[body](source)]

@@ -20,10 +20,7 @@ def _times(values: Triple, factor: float) -> Triple:
 
 
 def cancelling(kind: str, number: int) -> Scene:
-    """Return a random body, at rest or nearly, whose torques cancel to 1e-2 to 1e-11 of their size.
-
-    `kind` is a member of `MERGED` or `LEFT`.
-    """
+    """Return a random body near rest whose torques cancel to 1e-2 to 1e-11 of their size."""
     source = Random(f"cancelling/{kind}/{number}")
     frequency, left = source.uniform(0.5, 4.0), 10.0 ** -source.uniform(2.0, 11.0)
     amplitude = _triple(source, source.uniform(0.3, 1.0) / left)

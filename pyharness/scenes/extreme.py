@@ -23,18 +23,12 @@ class Circumstance(NamedTuple):
 
 
 def speed(scene: Scene, largest: float) -> float:
-    """Return a bound of the relative rate of change (1/s) of omega in a body without torque.
-
-    It is the largest of |A|, |B| and |C| times the largest component of omega (rad/s).
-    """
+    """Return a bound of the relative rate of change (1/s) of omega without torque."""
     return max(map(abs, scene.euler_coefficients)) * largest
 
 
 def in_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene in 10 to 20 000 steps that end at `time` (s).
-
-    A step times the bound of `speed` is about 0.002 within these limits.
-    """
+    """Return the scene in 10 to 20 000 steps, about 0.002 over `speed`, that end at `time` (s)."""
     rate = speed(scene, max(map(abs, scene.omega)))
     count = max(10, min(20_000, math.ceil(rate * abs(time) / 0.002)))
     return replace(scene, step_size=abs(time) / count, steps=count)
@@ -53,11 +47,7 @@ _FLIPS = 5
 
 
 def quarter(disturbance: float) -> float:
-    """Return the time (s) until the component of omega about axis 2 first vanishes.
-
-    It is a quarter of the period, with the moments `MIDDLE_AXIS` and the initial omega
-    (`disturbance`, 1, 0) rad/s.
-    """
+    """Return a quarter of the period (s) from omega = (`disturbance`, 1, 0) rad/s."""
     # The quarter period, which is the complete elliptic integral K(k) over the frequency, by the
     # arithmetic-geometric mean.
     mean, other = math.sqrt(_A * _A + _A * _B * disturbance**2), math.sqrt(_A * _B) * disturbance
@@ -70,8 +60,7 @@ def _separatrix() -> Iterator[Circumstance]:
     """Yield scenes that begin with a perturbed rotation about the axis of the middle moment.
 
     Perturbations are from 1e-1 to 1e-15 rad/s. At a flip, omega about that axis changes its sign;
-    end times are before the first, and in the middle of the first and fifth. Other scenes are on
-    the separatrix, with one flip.
+    end times are before the first, and in the first and fifth. Other scenes are on the separatrix.
     """
     for d in (10.0**-k for k in range(1, 16)):
         beside, on = (d, 1.0, 0.0), (d, 1.0, d)
@@ -95,7 +84,6 @@ _SHORT, LONG = 20.0, 1e6  # s
 
 
 def _near_symmetry() -> Iterator[Circumstance]:
-    """Yield scenes of bodies with two or three equal or nearly equal moments, without torque."""
     for difference in _DIFFERENCES:
         near = 1.0 - difference
         size = f"{difference:.0e}" if difference else "equal"
@@ -137,11 +125,7 @@ _BODIES: dict[str, Triple] = {
 
 
 def _shapes() -> Iterator[Circumstance]:
-    """Yield scenes of bodies with extreme ratios of the moments, and Case 6 of the thesis.
-
-    They are needles, coins, flat plates, and bodies that can't exist, with their axes in several
-    orders.
-    """
+    """Yield scenes of needles, coins, plates, impossible bodies in several orders, and Case 6."""
     for name, moments in _BODIES.items():
         for axes in _ORDERS:
             first, second, third = (moments[axis] for axis in axes)
@@ -164,7 +148,6 @@ TWOS = (-996, -500, -100, 100, 498, 996)
 
 
 def _scales() -> Iterator[Circumstance]:
-    """Yield scenes of one motion with omega multiplied by 1e-300 to 1e300, and time divided."""
     scene = in_steps(ORDINARY, ORDINARY_TIME)
     named = [(f"1e{power}", float(f"1e{power}")) for power in _TENS]
     named += [(f"2^{power}", math.ldexp(1.0, power)) for power in TWOS]
@@ -176,7 +159,6 @@ POINTED: Quaternion = unit_quaternion("attitude", (0.5, -0.1, 0.7, 0.5))[0]
 
 
 def _attitude() -> Iterator[Circumstance]:
-    """Yield scenes with an initial attitude, without torque, of the other kinds and steady."""
     for name, scene, time in _separatrix():
         yield Circumstance(f"separatrix-{name}", replace(scene, attitude=POINTED), time)
     bodies: list[tuple[str, str, Triple, Triple]] = []

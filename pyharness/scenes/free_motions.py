@@ -23,10 +23,7 @@ KINDS = (
 
 
 def draw(source: Random, kind: str, longest: float = 6.0) -> Motion:
-    """Return a random motion of one kind, a member of `KINDS`, with axes in any order.
-
-    The time is at most 10**`longest` s.
-    """
+    """Return a random motion of a kind in `KINDS`, for at most 10**`longest` s."""
     moments = [10 ** source.uniform(-0.5, 0.5) for _ in range(3)]
     omega = [source.choice((-1, 1)) * 10 ** source.uniform(-1, 1) for _ in range(3)]
     low, middle, high = sorted(range(3), key=lambda axis: moments[axis])
@@ -60,8 +57,8 @@ def draw(source: Random, kind: str, longest: float = 6.0) -> Motion:
 def draw_top(source: Random, kind: str) -> tuple[Triple, Triple, float]:
     """Return random coefficients A, B, C of Euler's equations, omega (rad/s) and a time (s).
 
-    Order and signs are random, and the body rotates by at most about 1e4 radians. `kind` is
-    ``plain``, ``middle axis``, ``near symmetry``, ``near separatrix`` or ``wild``.
+    The body rotates by at most about 1e4 radians. `kind` is ``plain``, ``middle axis``, ``near
+    symmetry``, ``near separatrix`` or ``wild``.
     """
     width = 3.0 if kind == "wild" else 0.5
     sign = source.choice((1.0, -1.0))

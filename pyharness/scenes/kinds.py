@@ -18,7 +18,6 @@ def _body(source: Random) -> list[float]:
 
 
 def _plain(source: Random) -> Scene:
-    """Return a random possible body at a few radians per second, under a random torque."""
     moments = _body(source)
     source.shuffle(moments)
     return _scene(source, _vector(source, 5.0), _triple(moments))
@@ -54,7 +53,6 @@ def _violent(source: Random) -> Scene:
 
 
 def _from_rest(source: Random) -> Scene:
-    """Return a random scene with a body initially at rest, under a torque about one or all axes."""
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-3.0, 1.0)
     axes = source.choice(((0,), (1,), (2,), (0, 1, 2), (0, 1, 2)))
@@ -67,10 +65,7 @@ def _from_rest(source: Random) -> Scene:
 
 
 def _slow_waves(source: Random) -> Scene:
-    """Return a random scene under a torque of waves of 1e-12 to 0.1 rad/s.
-
-    Their phase may change by only 1e-14 rad. In half of the scenes the body is initially at rest.
-    """
+    """Return a random scene under waves of 1e-12 to 0.1 rad/s, whose phase may hardly change."""
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-2.0, 2.0)
     law = _law(source, size, source.choice((4, 8, 12)), (1e-12, 0.1))
@@ -79,10 +74,7 @@ def _slow_waves(source: Random) -> Scene:
 
 
 def _many_speeds(source: Random) -> Scene:
-    """Return a random scene with two to six torque waves of frequencies from 1e-6 to 630 rad/s.
-
-    In a fifth of the scenes the cosines have the amplitudes and frequencies of the sines.
-    """
+    """Return a random scene with two to six waves, 1e-6 to 630 rad/s, some in pairs."""
     scene = _plain(source)
     some: list[list[Wave]] = [[], []]
     for _ in range(source.randint(2, 6)):
@@ -99,7 +91,6 @@ def _many_speeds(source: Random) -> Scene:
 
 
 def _far_scale(source: Random) -> Scene:
-    """Return a random scene in other units of time and mass: omega 1e-135 to 1e135 rad/s, or 0."""
     exponent = source.choice((-1, 1)) * source.randint(20, 450)
     scene = source.choice((_plain, _from_rest, _slow_waves, _many_speeds))(source)
     if abs(exponent) > 300:
@@ -111,10 +102,7 @@ def _far_scale(source: Random) -> Scene:
 
 
 def _sensitive(source: Random) -> Scene:
-    """Return a random scene near a rotation about the axis of the middle moment of inertia.
-
-    An initial error of omega may grow by a factor of up to 1e6.
-    """
+    """Return a random scene near a middle axis, where errors may grow by up to 1e6."""
     low, middle, high = body = _body(source)
     spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
     rate = abs(spin) * ((high - middle) * (middle - low) / (high * low)) ** 0.5
@@ -132,13 +120,12 @@ def _sensitive(source: Random) -> Scene:
 
 
 def _long(source: Random) -> Scene:
-    """Return a random scene whose body rotates by up to a few hundred radians."""
     scene = _plain(source)
     return replace(scene, step_size=10.0 ** source.uniform(0.5, 1.3) / scene.steps)
 
 
 def _no_body(source: Random) -> Scene:
-    """Return a random scene with coefficients A, B, C of any sign, of no possible body."""
+    """Return a random scene with coefficients A, B, C of no possible body."""
     return _scene(source, _vector(source, 2.0), None, _vector(source, 1.5))
 
 
@@ -158,20 +145,17 @@ def _extreme(source: Random) -> Scene:
 
 
 def _unsorted_body(source: Random) -> Triple:
-    """Return random principal moments (kg m2) that a body can have, not sorted."""
     low, middle = source.uniform(5.0, 50.0), source.uniform(5.0, 50.0)
     return source.uniform(abs(low - middle), low + middle), low, middle
 
 
 def _pointing(source: Random) -> Scene:
-    """Return a random scene without torque, with a random initial attitude."""
     moments, omega = _unsorted_body(source), _vector(source, 3.0)
     w, x, y, z = (source.gauss(0, 1) for _ in range(4))
     return Scene("", omega, moments=moments, attitude=(w, x, y, z))
 
 
 def _driven(source: Random) -> Scene:
-    """Return a random scene under the sum of a constant, a linear and a sinusoidal torque."""
     moments = _unsorted_body(source)
     constant, rate, sine = (_vector(source, size) for size in (20.0, 5.0, 20.0))
     law = TorqueLaw(constant, rate, ((sine, source.uniform(0.1, 20.0)),))
@@ -198,10 +182,10 @@ KINDS = {"plain": _plain, **NASTY, "pointing": _pointing, "driven": _driven}
 
 
 def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
-    """Return a random torque law, in which no component of a term exceeds `size`.
+    """Return a random torque law, in which no component of a term exceeds `size` (N m, N m/s).
 
-    It is in N m, or N m/s for the linear term. `kinds` is a bit mask: 1 constant, 2 linear in time,
-    4 sine, 8 cosine. `frequencies` are lowest and highest (rad/s).
+    `kinds` is a bit mask: 1 constant, 2 linear in time, 4 sine, 8 cosine. `frequencies` are lowest
+    and highest (rad/s).
     """
     low, high = map(math.log10, frequencies)
     constant, rate = _vector(source, size), _vector(source, size)
@@ -221,11 +205,7 @@ def _scene(
     coefficients: Triple | None = None,
     torque: bool = True,
 ) -> Scene:
-    """Return a scene with the given omega (rad/s) and body, and with random torque and steps.
-
-    The torque is zero, constant, constant plus linear in time, or a sine plus a cosine. The body
-    has `moments` (kg m2) or `coefficients`.
-    """
+    """Return a scene with random torque and steps; give `moments` (kg m2) or `coefficients`."""
     size = (max(moments) if moments else 10.0) * source.uniform(0.1, 2.0)
 
     def wave(most: float) -> list[Wave]:

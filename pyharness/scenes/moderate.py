@@ -13,9 +13,8 @@ linear torque."""
 def draw_moderate(seed: str, kind: str, number: int) -> Scene:
     """Return scene `number` of a seed, with the torque of a kind, a member of `KINDS`.
 
-    The moments are possible and differ by at least a tenth. The body rotates by some radians in the
-    6 s of its 12 steps, from an attitude other than the axes of space. Torques are some tenths of a
-    moment times 1/s2.
+    The moments are possible and differ by at least a tenth. The body rotates by some radians in 12
+    steps of 6 s in all. Torques are some tenths of a moment times 1/s2.
     """
     source = Random(f"{seed}/moderate/{kind}/{number}")
     size = 10.0 ** source.uniform(-1.0, 1.0)

@@ -11,10 +11,7 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def perturbed(scene: Scene, part: float) -> Iterator[Scene]:
-    """Yield a copy of the scene for each of its numbers other than 0, times 1 + `part`.
-
-    They are moments or coefficients, initial omega, components of torque terms, and frequencies.
-    """
+    """Yield a copy of the scene for each of its numbers other than 0, times 1 + `part`."""
     for name in ("moments", "coefficients", "omega"):
         for triple in _triples(getattr(scene, name), part):
             yield _with(scene, name, triple)

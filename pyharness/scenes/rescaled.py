@@ -1,9 +1,8 @@
 """Rescaled time: conversion of scenes and trajectories to another unit of time.
 
-Products of two components of omega underflow below 1e-154 rad/s and overflow above 1e154 rad/s,
-although omega itself is representable. A method that forms such products therefore receives the
-scene in a unit of time in which omega is near 1. The ratio of the units is a power of two, so that
-no number is rounded.
+Products of two components of omega underflow below 1e-154 rad/s and overflow above 1e154 rad/s. A
+method that forms them therefore receives the scene in a unit of time in which omega is near 1. The
+ratio of the units is a power of two, so that no number is rounded.
 """
 
 import math
@@ -28,10 +27,10 @@ _LARGE = 2.0**300
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
-    """Return the scene with rescaled time: omega is multiplied by `factor`, time divided by it.
+    """Return the scene with rescaled time, whose solution is factor * omega(factor * t).
 
-    The solution becomes factor * omega(factor * t). Raise InputError if the torque depends on the
-    state and can't be rescaled (see `rescaling_factor`), or if the inertia changes with time.
+    Raise InputError if the torque can't be rescaled (see `rescaling_factor`), or if the inertia
+    changes with time.
     """
     is_constant = scene.changing is None
     tape = _tape(scene.torque, factor) if isinstance(scene.torque, StateTorque) else None
@@ -64,10 +63,7 @@ def scaled(scene: Scene, factor: float) -> Scene:
 
 
 def is_ordinary(omega: Triple) -> bool:
-    """Return whether the largest component of omega is between 2**-300 and 2**300 rad/s.
-
-    Products of components then neither overflow nor underflow.
-    """
+    """Return whether products of components of omega neither overflow nor underflow."""
     return 1.0 / _LARGE <= max(map(abs, omega)) <= _LARGE
 
 
@@ -79,9 +75,8 @@ def has_ordinary_rows(found: Trajectory) -> bool:
 def rescaling_factor(scene: Scene, time: float) -> float:
     """Return the power of 2 by which omega is multiplied so that it is near 1 rad/s.
 
-    Omega is the larger of the initial omega and the one that the torque may cause until `time` (s),
-    for a torque of the state an estimate. The result is 1 if no rescaling is needed, if the
-    rescaled scene would overflow or underflow, or if the torque is opaque.
+    The omega that the torque may cause until `time` (s) counts, for a torque of the state by an
+    estimate. The result is 1 if no rescaling is needed or possible, or if the torque is opaque.
     """
     if is_ordinary(scene.omega):
         return 1.0
@@ -104,10 +99,9 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
 
 def omega_by_torque(scene: Scene, time: float) -> float:
-    """Return a bound of the components of omega (rad/s) that the torque alone causes until `time`.
+    """Return a bound of the omega (rad/s) that the torque alone causes from rest until `time` (s).
 
-    The body is at rest at time 0 (s), and gyroscopic torques are neglected. The bound may be
-    infinite.
+    Gyroscopic torques are neglected.
     """
     law, span = scene.law, abs(time)
     moments = scene.moments or (1.0, 1.0, 1.0)
@@ -129,10 +123,7 @@ def omega_by_torque(scene: Scene, time: float) -> float:
 
 
 def _omega_by_state_torque(scene: Scene, time: float) -> float:
-    """Return an estimate of the |omega| (rad/s) that a torque of the state causes until `time`.
-
-    The torque is that of the initial state, at times from 0 to `time` (s).
-    """
+    """Return an estimate of |omega| (rad/s) by a torque of the state until `time` (s)."""
     torque, moments = scene.torque, scene.moments or (1.0, 1.0, 1.0)
     assert isinstance(torque, StateTorque)
     if torque.tape is None:
@@ -151,15 +142,11 @@ def _omega_by_state_torque(scene: Scene, time: float) -> float:
 
 
 def _tape(torque: StateTorque, factor: float) -> Tape | None:
-    """Return the tape of a torque for rescaled time; None if it is opaque or can't be rescaled."""
     return torque.tape and scaled_tape(torque.tape, math.frexp(factor)[1] - 1)
 
 
 def _fits(scene: Scene, time: float, factor: float) -> bool:
-    """Return whether times and torques do not overflow if omega is multiplied by `factor`.
-
-    It is False as well if a rescaled time is subnormal, and thus has fewer digits.
-    """
+    """Return whether rescaled times and torques do not overflow, and times are not subnormal."""
     law = scene.law
     waves = law.sines + law.cosines
     sizes = [abs(x) * factor * factor for a in (law.constant, *(a for a, _ in waves)) for x in a]
@@ -172,10 +159,7 @@ def _fits(scene: Scene, time: float, factor: float) -> bool:
 
 
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
-    """Return the trajectory of a scene rescaled by `factor` in rad/s and s, at the given times.
-
-    If omega overflows in these units, it ends before the first row with an overflow.
-    """
+    """Return the trajectory of a scene rescaled by `factor` in rad/s and s, up to an overflow."""
     with np.errstate(over="ignore"):
         omega = trajectory.omega / factor
     finite = np.isfinite(omega).all(axis=1)

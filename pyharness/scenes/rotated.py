@@ -18,9 +18,9 @@ from pyharness.model.trajectory import Array
 def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
     """Return the scene with the function `turn` applied to omega and to all vectors of the torque.
 
-    If `body` is true, it is also applied to the moments. A torque about the axes of space and the
-    attitude are unchanged; the caller must transform the latter if necessary. For a torque of the
-    state, `turn` must be a rotation. Raise InputError if the inertia changes with time.
+    If `body` is true, moments are turned too, but never a torque about the axes of space or the
+    attitude. For a torque of the state, `turn` must be a rotation. Raise InputError if the inertia
+    changes with time.
     """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
@@ -41,18 +41,12 @@ def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene
 
 
 def axes_of(turn: Callable[[Triple], Triple]) -> Array:
-    """Return new axes as the columns of a matrix, in components about the old axes.
-
-    `turn` takes components about the old axes and returns those about the new ones.
-    """
+    """Return the new axes of `turn`, as columns of components about the old axes."""
     return np.array([turn((1.0, 0.0, 0.0)), turn((0.0, 1.0, 0.0)), turn((0.0, 0.0, 1.0))])
 
 
 def later(torque: StateTorque, by: float) -> StateTorque:
-    """Return a recorded torque whose time 0 is the time `by` (s) of the given torque.
-
-    Raise InputError if the torque is opaque.
-    """
+    """Return a recorded torque from the time `by` (s) on; raise InputError if it is opaque."""
     if torque.tape is None:
         raise InputError(
             "an opaque torque can't be shifted in time; allowed: a torque that can be recorded"
@@ -81,9 +75,8 @@ def restarted_at(
 ) -> Scene:
     """Return the scene whose time 0 is the time `by` (s) of the given scene.
 
-    `omega` (rad/s) and `attitude`, by default the initial one, are the state at that time. Raise
-    InputError if the torque is opaque, or needs an attitude (or is about the axes of space) that is
-    not given.
+    `omega` (rad/s) and `attitude`, by default the initial one, are the state then. Raise InputError
+    if the torque is opaque, or needs an attitude that is not given.
     """
     first, second, third = (float(w) for w in omega)
     if isinstance(scene.torque, StateTorque):

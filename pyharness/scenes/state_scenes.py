@@ -1,7 +1,7 @@
 """Random scenes with torques that depend on omega or attitude, reproducible from a seed.
 
-A torque is the sum of functions that are recorded, or of ready terms, drawn in proportion to the
-gyroscopic torque, so that slow and fast bodies are affected in the same way.
+They are sums of recorded functions or ready terms, in proportion to the gyroscopic torque, so that
+slow and fast bodies are affected in the same way. Times may be negative.
 """
 
 from collections.abc import Callable
@@ -46,11 +46,7 @@ TIMED = ("table", "pulses")  # ready terms that depend on time alone
 
 
 def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Scene, float]:
-    """Return a random scene whose torque is the sum of one to three terms, and a time (s).
-
-    The scene has an attitude if a term of `names` needs one, or by chance. The time may be
-    negative.
-    """
+    """Return a random scene under one to three terms of `names`, and a time (s)."""
     chosen = source.sample(names, min(len(names), source.choice((1, 1, 2, 2, 3))))
     size = 10.0 ** source.uniform(-2.0, 1.0)  # of the moments, kg m2
     moments = [size * x for x in _moments(source)]
@@ -77,10 +73,7 @@ def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Sce
 
 
 def draw_ready(source: Random, names: tuple[str, ...] = READY) -> tuple[Scene, float]:
-    """Return a random scene whose torque is one or two ready terms of `names`, and a time (s).
-
-    The time may be negative.
-    """
+    """Return a random scene under one or two ready terms of `names`, and a time (s)."""
     chosen = source.sample(names, source.choice((1, 2)))
     size = 10.0 ** source.uniform(-2.0, 1.0)  # of the moments, kg m2
     moments = [size * x for x in _moments(source)]
@@ -123,14 +116,12 @@ def ready(source: Random, name: str, moments: list[float], speed: float) -> Stat
 
 
 def _table(source: Random, size: float, length: float) -> StateTorque:
-    """Return a table of torques up to `size` (N m), whose intervals are about `length` (s)."""
     times = np.cumsum([source.uniform(0.1, 3.0) * length for _ in range(12)]) - 3.0 * length
     values = [[source.uniform(-size, size) for _ in range(3)] for _ in times]
     return table(times, values, source.choice(("held", "linear", "cubic")))
 
 
 def _pulses(source: Random, size: float, length: float) -> StateTorque:
-    """Return pulses of torques up to `size` (N m), which last for about `length` (s)."""
     ends = np.cumsum([source.uniform(0.1, 3.0) * length for _ in range(12)]) - 3.0 * length
     values = [[source.uniform(-size, size) for _ in range(3)] for _ in range(6)]
     return pulses(ends[::2], ends[1::2] - ends[::2], values)

@@ -28,7 +28,6 @@ def _size(generator: Generator, low: float, high: float) -> Array:
 
 
 def _waves(generator: Generator, amplitude: tuple[float, float], f: tuple[float, float]) -> Wave:
-    """Return a wave; the ranges of amplitude and frequency are powers of ten."""
     return triple(_size(generator, *amplitude)), float(10.0 ** generator.uniform(*f))
 
 
@@ -50,13 +49,11 @@ def _law(generator: Generator, high: float = 2.0, low: float = -1.0, least: int 
 
 
 def _moments(generator: Generator) -> Array:
-    """Return three moments of a possible body, in any order."""
     first, second, third = np.sort(generator.uniform(1.0, 10.0, 3))
     return generator.permutation([first, second, min(third, 0.999 * (first + second))])
 
 
 def _plain(generator: Generator) -> tuple[Scene, float]:
-    """Return a scene and its time (s): body, start and torque over two orders of magnitude each."""
     body, torque = _moments(generator), _law(generator)
     scene = Scene("", _size(generator, -1, 1), moments=body, torque=torque)
     return scene, float(generator.choice([1, 1, -1]) * 10.0 ** generator.uniform(-1.0, 0.7))
@@ -71,7 +68,6 @@ def _nearly_symmetric(generator: Generator) -> tuple[Scene, float]:
 
 
 def _near_the_separatrix(generator: Generator) -> tuple[Scene, float]:
-    """Return a scene that rotates near the middle axis or near the separatrix, and its time."""
     i1, i2, i3 = np.sort(_moments(generator))
     start = _size(generator, -8, -1)
     start[1] = generator.choice([-1, 1]) * 10.0 ** generator.uniform(-1, 1)
@@ -103,7 +99,6 @@ def _resonant(generator: Generator) -> tuple[Scene, float]:
 
 
 def _fast(generator: Generator) -> tuple[Scene, float]:
-    """Return a scene with waves of up to 1e4 rad/s, faint or dominant, and its time."""
     scene, t_end = _plain(generator)
     some = [_waves(generator, (-1, 3.5), (1.5, 4)) for _ in range(generator.integers(1, 4))]
     return replace(scene, torque=TorqueLaw(cosines=some[:1], sines=some[1:])), t_end
@@ -116,7 +111,6 @@ def _no_body(generator: Generator) -> tuple[Scene, float]:
 
 
 def _other_units(generator: Generator) -> tuple[Scene, float]:
-    """Return a scene with times and moments that are many powers of ten away from one."""
     scene, t_end = _plain(generator)
     rate, mass = 10.0 ** generator.uniform(-30, 30), 10.0 ** generator.uniform(-20, 20)
     fast = scaled(scene, rate)

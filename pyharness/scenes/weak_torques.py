@@ -16,8 +16,8 @@ _WEAKEST, _STRONGEST = -9.0, -5.0  # powers of 10; torque over the largest gyros
 def draw_weak(seed: str, number: int, rotations: float) -> tuple[Scene, float]:
     """Return scene `number` of a seed, and a time (s) in which the body rotates `rotations` times.
 
-    The time may be negative. The torque is 1e-9 to 1e-5 of the largest moment times the largest
-    initial omega squared. Scenes cycle through all pairs of `MOTIONS` and `TORQUES`.
+    It may be negative. The torque is 1e-9 to 1e-5 of the largest moment times omega squared. Scenes
+    cycle through all pairs of `MOTIONS` and `TORQUES`.
     """
     source = Random(f"{seed}/weak/{number}")
     motion = MOTIONS[number % len(MOTIONS)]

@@ -1,1 +1,1 @@
-"""Error bounds and stability limits of programs and methods, derived before any of them runs."""
+"""Error bounds and stability limits, derived before any program runs."""

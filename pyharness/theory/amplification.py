@@ -1,13 +1,10 @@
 """Linear stability: the amplification matrix of a step of each program of the thesis.
 
-A perturbation x of a steady rotation obeys a linear equation x' = J x with a constant matrix J. The
-translational velocity of a body in steady rotation obeys such an equation too. Along an eigenvector
-of J, a step of size h multiplies x by a matrix whose elements are polynomials in z. Here z is h
-times the eigenvalue. The polynomials are derived in exact fractions from the formulas of each
-program. The same polynomials are valid with the matrix hJ in place of z.
-
-The original Runge-Kutta program propagates two vectors from step to step: the result of the step,
-and U(1), at which the first stage is evaluated. Its amplification matrix therefore has two rows.
+A perturbation of a steady rotation, and the translational velocity in it, obey x' = J x. A step of
+size h multiplies x by a matrix of polynomials in z = h times an eigenvalue of J, derived in exact
+fractions from each program; hJ may replace z. The matrix has m rows for the m vectors that a
+program propagates: two in the original Runge-Kutta program, the result of the step and U(1), at
+which the first stage is evaluated.
 """
 
 from dataclasses import dataclass
@@ -31,11 +28,7 @@ _NOTHING = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class Amplification:
-    """The matrix by which one step of a program multiplies a perturbation.
-
-    Its elements are polynomials in z, the step size times an eigenvalue of the Jacobian. The matrix
-    has m rows and columns, for the m vectors that the program propagates from step to step.
-    """
+    """The matrix by which one step multiplies a perturbation, of polynomials in z."""
 
     # fractions, shape (m, m, 5): for element (i, j) the coefficients of 1, z ... z**4. The last row
     # belongs to the result of the step, the other rows to vectors such as U(1).
@@ -43,32 +36,23 @@ class Amplification:
 
     @property
     def size(self) -> int:
-        """Return m, the number of vectors that the program propagates from step to step."""
+        """Return m, the number of propagated vectors."""
         return len(self.coefficients)
 
     def at(self, z: Complex) -> Complex:
-        """Return the amplification matrix for each element of the array `z`, shape (..., m, m).
-
-        An element of `z` is the step size times an eigenvalue of the Jacobian, and m is `size`.
-        """
+        """Return the matrix for each element of `z`, shape (..., m, m)."""
         powers = np.stack([z**k for k in range(_HIGHEST)], axis=-1)
         return np.asarray(np.einsum("...k,ijk->...ij", powers, self.coefficients.astype(float)))
 
     def radius(self, z: Complex) -> NDArray[np.float64]:
-        """Return the spectral radius of the amplification matrix for each element of `z`.
-
-        An element of `z` is the step size times an eigenvalue of the Jacobian.
-        """
+        """Return the spectral radius for each element of `z`."""
         return np.asarray(np.abs(np.linalg.eigvals(self.at(z))).max(axis=-1))
 
     def moving(self) -> "Amplification":
-        """Return the amplification matrix, if possible without the row and column of the result.
+        """Return the matrix without row and column of the step's result, if possible.
 
-        Each row and column belongs to a vector that a step propagates. One of these vectors is the
-        result of the step. Its row and column are left out if two conditions are satisfied. No
-        other vector depends on the previous result, and the factor of the previous result in the
-        new one does not depend on z. This factor is the eigenvalue that is lost. If a condition is
-        not satisfied, the whole matrix is returned.
+        It is if no other vector depends on the previous result, and its factor in the new result,
+        the eigenvalue that is lost, does not depend on z.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -76,11 +60,7 @@ class Amplification:
         return self
 
     def of(self, matrix: Exact) -> Fractions:
-        """Return the exact matrix by which a step advances a linear system x' = J x of n equations.
-
-        `matrix` is hJ, the step size times J, with n rows and columns. It is inserted for z in the
-        polynomials. The result has m n rows and columns, because each of the m vectors that a step
-        propagates has n components.
+        """Return the exact matrix, of order m n, of a step of n equations x' = J x; `matrix` is hJ.
         """
         power = np.eye(len(matrix), dtype=object)
         total = np.kron(self.coefficients[..., 0], power)
@@ -90,22 +70,17 @@ class Amplification:
         return np.asarray(total)
 
     def text(self) -> str:
-        """Return the elements of the amplification matrix, which are polynomials in z, as text.
-
-        A matrix of one element is a single polynomial. Any other matrix is written row by row.
-        """
+        """Return the polynomials as text, row by row."""
         rows = [", ".join(_polynomial_text(each) for each in row) for row in self.coefficients]
         return rows[0] if self.size == 1 else "[" + "; ".join(rows) + "]"
 
 
 def amplification(listing: Listing, step: int = 1) -> Amplification:
-    """Return the matrix by which step number `step` of a program multiplies a perturbation.
+    """Return the amplification matrix of step number `step` of a program.
 
-    `listing` is the program with its active defects. `step` counts from 1, and has an effect only
-    with the defect `dt-accumulates`, which moves the collocation points from step to step. The
-    elements are polynomials in z, the step size times an eigenvalue of the Jacobian. In collocation
-    the first estimate takes the right-hand side as constant, so that the estimate is a straight
-    line. The one correction evaluates the right-hand side along that line.
+    `step`, from 1, matters only with the defect `dt-accumulates`, which moves the collocation
+    points. In collocation the first estimate is a straight line, along which the one correction
+    evaluates the right-hand side.
     """
     if listing.program == "runge-kutta":
         return _runge_kutta(listing)
@@ -116,14 +91,10 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return the integral of s**2 / h**3 over a step, by the quadrature of a collocation program.
+    """Return the integral of s**2 / h**3 over a step by a collocation program; exact is 1/3.
 
-    The exact integral is 1/3. Here h is the step size, s is the time since the beginning of the
-    step, and `step` is the number of the step, from 1. `listing` is the program with its active
-    defects. The program integrates the right-hand side along its first estimate of omega, a
-    straight line. There the right-hand side is F + s J F + s**2 Q(F). F and J are the right-hand
-    side and its Jacobian at the beginning of the step, and Q is the quadratic part of the
-    right-hand side. Therefore the integral of s**2 is the weight of Q(F) in the result of the step.
+    Along the first estimate, a straight line, the right-hand side is F + s J F + s**2 Q(F), Q its
+    quadratic part. The integral is thus the weight of Q(F) in the result. `step` is from 1.
     """
     points, weights = _quadrature(listing, step)
     found: Fraction = weights @ points**2
@@ -131,11 +102,9 @@ def weight_of_squares(listing: Listing, step: int) -> Fraction:
 
 
 def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
-    """Return the collocation points and their quadrature weights, both in units of the step size.
+    """Return the collocation points and their weights, in units of the step size.
 
-    `listing` is a collocation program with its active defects, and `step` is the number of the
-    step, from 1. With the defect `dt-accumulates` the points of step k are k times the points of
-    the first step.
+    With the defect `dt-accumulates` the points of step k are k times those of the first.
     """
     moved = step if listing.has("dt-accumulates") else 1
     points = [part * moved for part in PARTS[listing.program]]
@@ -143,11 +112,9 @@ def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
 
 
 def _runge_kutta(listing: Listing) -> Amplification:
-    """Return the matrix by which a step of the Runge-Kutta program multiplies a perturbation.
+    """Return the matrix of the Runge-Kutta program (cards 770-1200).
 
-    `listing` is the program with its active defects; its four stages are on cards 770-1200. They
-    depend on two vectors: U(1), at which the first stage is evaluated, and the base of the step,
-    which is the result of the previous step.
+    The stages depend on U(1) and on the base of the step, the result of the previous step.
     """
     first, base = _one(2, 0), _one(2, 1)
     half = Fraction(1, 2)
@@ -173,13 +140,7 @@ def _runge_kutta(listing: Listing) -> Amplification:
 
 
 def _one(size: int, place: int) -> Fractions:
-    """Return the coefficients that represent vector number `place` at the start of a step.
-
-    A step begins with `size` vectors, numbered from 0. Every vector that the step computes from
-    them is a linear combination of them, with polynomials in z as factors. z is the step size
-    times an eigenvalue of the Jacobian. For the vector itself the factor is 1, and for the others
-    0. The result contains the coefficients of the factors, shape (size, number of powers of z).
-    """
+    """Return the identity for vector `place` of `size`, shape (size, powers of z)."""
     result = np.full((size, _HIGHEST), Fraction(0), dtype=object)
     result[place, 0] = Fraction(1)
     return result
@@ -201,12 +162,11 @@ def _polynomial_text(coefficients: Fractions) -> str:
 
 
 def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
-    """Return the distance of the stability boundary from z = 0 along `direction`, and a slope.
+    """Return the distance of the stability boundary from z = 0, and a slope.
 
-    z is the step size times an eigenvalue of the Jacobian. `matrix` is an amplification matrix.
-    `direction` is -1 for the negative real axis or 1j for the imaginary axis. At smaller distances
-    from z = 0 perturbations do not grow. The slope is the increase of the spectral radius per unit
-    of distance just beyond the boundary. Return (0, 1) if perturbations grow at a distance of 1/16.
+    `direction` is -1 for the negative real axis or 1j for the imaginary axis. The slope is that of
+    the spectral radius just beyond the boundary. Return (0, 1) if perturbations grow at a distance
+    of 1/16.
     """
 
     def grows(distance: float) -> bool:

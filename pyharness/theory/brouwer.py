@@ -1,9 +1,8 @@
 """Bounds, by Brouwer's law, of rounding errors over many steps of a torque-free motion.
 
-The law is that of Brouwer 1937, Astronomical Journal 46. If the rounding error of each step is
-random, the errors of energy and momentum grow like the square root of the number of steps. The
-error of the phase, which is the integral of the frequency, grows like the power 3/2 of this number.
-If rounding is biased, the powers are 1 for energy and momentum, and 2 for the phase.
+Brouwer 1937, Astronomical Journal 46: if the rounding errors of the steps are random, the errors of
+energy and momentum grow like the root of the number of steps, and that of the phase like its power
+3/2; if rounding is biased, the powers are 1 and 2.
 """
 
 import math
@@ -42,11 +41,7 @@ POWER = Basis(
 
 @dataclass(frozen=True)
 class Noise:
-    """Bounds of the errors of omega that one step of a method may add.
-
-    The errors are the rounding error and the truncation error. Both are relative to the largest
-    abs(omega).
-    """
+    """Bounds of rounding and truncation error of a step, relative to the largest abs(omega)."""
 
     step: float  # step size, s
     rounding: float  # bound of the rounding error, whose sign is random
@@ -57,7 +52,7 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """Samples of one torque-free motion, and quantities for error bounds of methods."""
+    """Samples of one torque-free motion, and quantities for error bounds."""
 
     # samples along the motion, shapes (n, 3), (n, 3), (n, 3, 3): omega (rad/s), its time derivative
     # (rad/s2), and the Jacobian of this derivative with respect to omega (1/s)
@@ -72,12 +67,7 @@ class Orbit:
     turn: float  # largest factor from an error of omega, over `largest`, to a phase error (rad)
 
     def limits(self, noise: Noise, steps: float) -> dict[str, float]:
-        """Return the bounds on the errors of energy, momentum and phase after `steps` steps.
-
-        `noise` contains the bounds of the errors of one step. The keys of the result are "energy",
-        "momentum" and "phase". The errors of energy and momentum are relative, and the error of the
-        phase is in radians.
-        """
+        """Return the bounds after `steps` steps: "energy", "momentum" (relative), "phase" (rad)."""
         walk = DEVIATIONS * noise.rounding * math.sqrt(steps)
         drift = steps * noise.truncation
         # The result is rounded once more. Each of A, B, C has two rounding errors. At any time they
@@ -98,11 +88,10 @@ class Orbit:
 
 
 def orbit(scene: Scene) -> Orbit:
-    """Return samples of omega over two periods, with quantities from which error bounds follow.
+    """Return samples of omega over two periods, and the factors of error bounds.
 
-    The scene must have no torque, and must have moments. The result also contains the largest
-    factors by which an error of omega is multiplied in the errors of energy, momentum, frequency
-    and phase. The frequency is 2 pi divided by the period of omega.
+    The scene has moments and no torque. The factors multiply an error of omega in energy, momentum,
+    frequency (2 pi over the period of omega) and phase.
     """
     a = np.array(scene.euler_coefficients)
     frequency = _frequency(a, np.array(scene.omega))
@@ -131,16 +120,12 @@ def floats(rows: Sequence[Sequence[Decimal]]) -> Array:
 
 
 def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: float) -> Noise:
-    """Return bounds of the errors of a step of the Taylor method, by a running error analysis.
+    """Return error bounds of a Taylor step, by a running error analysis.
 
-    `body` contains samples of the scene's motion, `step` is the step size (s), and `order` is the
-    degree of the Taylor polynomial. `left_out` is the bound of the truncation error, relative to
-    the largest omega.
-
-    Taylor term k is a sum of k products of lower terms. Each product has at most k + 3 roundings,
-    and propagates the errors of the lower terms. Omega at the start of the step is used without the
-    remainder that compensated summation retains, at most half a unit in the last place. The sum of
-    the Taylor terms rounds each of them three times.
+    `step` is in s, `left_out` the truncation error relative to the largest omega. Term k is a sum
+    of k products of lower terms, each with at most k + 3 roundings and the errors of the lower
+    terms. Omega is used without the remainder of compensated summation, at most half a unit in the
+    last place. The sum rounds each term three times.
     """
     a = np.abs(np.array(scene.euler_coefficients))
     terms, errors = _terms(body, scene, step, order), [np.abs(body.states)]
@@ -157,19 +142,15 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
 
 
 def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
-    """Return bounds of the errors of a step of Gauss collocation with s = `stages` stages.
+    """Return error bounds of a step h (s) of Gauss collocation with s = `stages` stages.
 
-    `body` contains samples of the scene's motion, and `step` is the step size h (s). The sum at
-    each node has s + 3 roundings of the right-hand sides and one of omega. The iteration multiplies
-    these errors by the inverse of 1 - h A J. Here A is the matrix of the Runge-Kutta tableau, and J
-    the Jacobian of the right-hand sides. Gauss collocation conserves quadratic invariants for any
-    step size.
-
-    The truncation error is the integral of the state-transition matrix times the residual of the
-    differential equation, which is zero at the nodes. Because the nodes are the zeros of an
-    orthogonal polynomial, only power s of time in the remaining factor contributes. By Leibniz's
-    rule the coefficient of this power is a sum over j. Term j is a multiple of (h J)**j / j!, from
-    the derivatives of the state-transition matrix, times the Taylor term 2s + 1 - j of omega.
+    The sum at each node has s + 3 roundings of the right-hand sides and one of omega, multiplied by
+    the inverse of 1 - h A J: A is the tableau's matrix, J the Jacobian. Gauss collocation conserves
+    quadratic invariants for any step size. The truncation error is the integral of the
+    state-transition matrix times the residual, which is zero at the nodes, the zeros of an
+    orthogonal polynomial; only power s of time in the other factor contributes. By Leibniz's rule
+    its coefficient is a sum over j of multiples of (h J)**j / j! times the Taylor term 2s + 1 - j
+    of omega.
     """
     from pyharness.theory.tableau import tableau
 
@@ -195,11 +176,7 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
 
 
 def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
-    """Return the Taylor terms 0 to `order` of omega for a step from each state of a motion.
-
-    `body` contains n samples of the motion. Term k is the Taylor coefficient k times the power k of
-    the step size `step` (s). Each term has the shape (n, 3), in rad/s.
-    """
+    """Return the Taylor terms of a step (s) from n states, in rad/s, shape (n, 3) each."""
     a = np.array(scene.euler_coefficients)
     terms = [body.states]
     for k in range(1, order + 1):
@@ -213,13 +190,11 @@ def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
 def errors(
     scene: Scene, body: Orbit, time: float, omega: Array, rounded: bool = True
 ) -> dict[str, float]:
-    """Return the relative errors of energy and momentum and the phase error (rad), with signs.
+    """Return the relative errors of energy and momentum and the phase error (rad), signed.
 
-    `omega` (rad/s) is a computed result at `time` (s) without torque. Energy and momentum are
-    compared with their initial values. The phase error is the time by which `omega` is ahead of the
-    exact solution, times the frequency of the motion, which `body` contains. If `rounded`, the
-    exact solution is computed with A, B, C rounded to binary64, as a method uses them. Otherwise it
-    is computed with the exact coefficients.
+    The phase error is the time by which `omega` is ahead of the exact solution, times the frequency
+    of the motion, which `body` contains. If `rounded`, the exact solution is computed with A, B, C
+    rounded to binary64, as a method uses them.
     """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]
@@ -241,30 +216,23 @@ def errors(
 
 
 def root_mean_square(found: Array) -> Array:
-    """Return the root mean square of errors over the initial conditions, for each number of steps.
-
-    The array `found` of errors has a row for each initial condition and a column for each number of
-    steps. An error is NaN if the integration ended before that number of steps. NaN is ignored.
-    """
+    """Return the root mean square over rows (initial conditions); NaN is ignored."""
     return np.asarray(np.sqrt(np.nanmean(np.asarray(found) ** 2, axis=0)))
 
 
 def exponent(steps: Sequence[float] | Array, found: Array) -> float:
-    """Return the power of the number of steps with which the root mean square of errors grows.
+    """Return the power of the number of steps with which errors grow, by a fit to logarithms.
 
-    The array `found` of errors has a row for each initial condition and a column for each of the
-    numbers of steps in `steps`. A straight line is fitted to the logarithm of the root mean square
-    as a function of the logarithm of the number of steps. The power is the slope of this line.
+    `found` has a row for each initial condition and a column for each number of steps.
     """
     size = np.log(np.maximum(root_mean_square(found), 1e-300))
     return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
 
 
 def _frequency(a: Array, omega: Array) -> float:
-    """Return the frequency of omega in torque-free motion (rad/s), 2 pi divided by its period.
+    """Return 2 pi over the period of omega without torque (rad/s).
 
-    `a` contains the Euler coefficients A, B, C, and `omega` is the initial omega (rad/s). The
-    frequency is computed by the arithmetic-geometric mean.
+    The frequency is computed by the arithmetic-geometric mean.
     """
     (odd,) = (i for i in range(3) if a[i] * a[i - 1] < 0.0 and a[i] * a[i - 2] < 0.0)
     squares = [abs(a[i - 1] * a[i - 2]) * omega[i] * omega[i] for i in range(3)]
@@ -276,10 +244,9 @@ def _frequency(a: Array, omega: Array) -> float:
 
 
 def _steepness(a: Array, omega: Array) -> float:
-    """Return the sum of the absolute derivatives of the frequency by the components of omega.
+    """Return the sum of the absolute derivatives of `_frequency` by omega.
 
-    The frequency is 2 pi divided by the period of omega in torque-free motion. The derivatives are
-    central differences at `omega` (rad/s). `a` contains the Euler coefficients.
+    They are central differences.
     """
     size = 1e-6 * float(np.abs(omega).max())
     return sum(

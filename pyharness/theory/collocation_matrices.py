@@ -1,8 +1,7 @@
 """The collocation matrices (eq. 36), and the accuracy with which LEQT1F solves their systems.
 
-LEQT1F is the linear solver that the collocation programs call. Every float is exactly a fraction.
-Therefore the exact solution of a linear system of floats consists of fractions, and is computed
-here without rounding.
+Every float is a fraction; exact solutions are computed in fractions. `program` is "two-term" or
+"four-term".
 """
 
 import math
@@ -59,11 +58,7 @@ _RANGE = 2.0**-150, 2.0**150
 
 @dataclass(frozen=True)
 class Solved:
-    """The accuracy of the linear solver LEQT1F for one collocation matrix and six right-hand sides.
-
-    A is the matrix, and B has the right-hand sides as columns. The solution X of A X = B by LEQT1F
-    is compared with the exact solution.
-    """
+    """LEQT1F's accuracy for A X = B with one collocation matrix and six right-hand sides."""
 
     ier: int  # IER, the error code of the compiled solver: 0, or 129 for a singular matrix
     differing: int  # count of elements of X, and IER, in which Fortran and the Python twin differ
@@ -90,20 +85,16 @@ class Solved:
 
 
 def points(program: str, step: float) -> list[float]:
-    """Return the collocation points (s) for the step size `step` (s), as a program computes them.
-
-    `program` is "two-term" or "four-term". The points have the rounding errors of its formulas.
-    """
+    """Return the collocation points (s), with the rounding errors of a program's formulas."""
     if program == "two-term":
         return [step / 3.0, 2.0 * step / 3.0]
     return [step * 0.2, step * 0.4, step * 0.6, step * 0.8]
 
 
 def _right_hand_sides(count: int) -> Array:
-    """Return six right-hand sides of a linear system of `count` equations, shape (6, count).
+    """Return six right-hand sides, shape (6, count).
 
-    The elements are constant in the first, proportional to the index in the second, and 1 and -1 in
-    turn in the third. The other three have random elements.
+    They are constant, proportional to the index, 1 and -1 in turn, and three random ones.
     """
     rough = np.random.default_rng(count).normal(size=(3, count))
     places = range(count)
@@ -113,12 +104,7 @@ def _right_hand_sides(count: int) -> Array:
 
 
 def solved(program: str, step: float) -> Solved:
-    """Return the accuracy of the solver LEQT1F for the collocation matrix at one step size (s).
-
-    LEQT1F is the linear solver of the program, which is "two-term" or "four-term". Linear systems
-    with this matrix and six right-hand sides are solved by LEQT1F and exactly, and the two
-    solutions are compared.
-    """
+    """Return LEQT1F's accuracy for the collocation matrix at one step size (s)."""
     from pyharness.model.extension import extension
 
     matrix = collocation.collocation_matrix(points(program, step))
@@ -164,28 +150,22 @@ def solved(program: str, step: float) -> Solved:
 
 
 def _small_step(program: str) -> tuple[Fraction, Fractions]:
-    """Return a small step size (s), and the collocation matrix of a program for this step size.
+    """Return a small step size (s), and its collocation matrix.
 
-    The largest element of each row of the matrix is 1, as it is for any smaller step size.
-    `program` is "two-term" or "four-term".
+    The largest element of each row is 1, as for any smaller step size.
     """
     step = Fraction(1, 1000)
     return step, collocation_matrix([part * step for part in PARTS[program]])
 
 
 def solver_roundings(program: str) -> tuple[float, float]:
-    """Return two bounds on the rounding error that the linear solver adds to the result of a step.
+    """Return two bounds on the rounding error that the solver adds to a step's result.
 
-    The solver computes the coefficients c1, c2, ... of t, t**2, ... in the polynomial of a step.
-    Both bounds are in units of 2**-53 times step size times rate, where a rate is a right-hand side
-    of Euler's equations. The first bound is for a rate that is the same at all collocation points,
-    so that only c1 is not zero. The second bound is for deviations of the rates at the points from
-    this constant rate, and must be multiplied by the relative deviation.
-
-    The bounds are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) (Higham 2002, theorem 9.4).
-    Here n is the number of points, the powers are those of the step size, L and U are the factors
-    of the collocation matrix, and X is the solution. The bounds do not depend on the step size as
-    long as 1 is the largest element of each row.
+    Both are in units of 2**-53 times step size times rate. The first is for a rate equal at all
+    points, so that only c1 is not zero; the second, times the relative deviation, for deviations
+    from it. They are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) (Higham 2002, theorem 9.4),
+    with n points, the powers of the step size, the factors L and U of the matrix and the solution
+    X. The bounds do not depend on the step size as long as 1 is the largest element of each row.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -203,12 +183,10 @@ def solver_roundings(program: str) -> tuple[float, float]:
 def singular_below(program: str, bits: int = 53) -> float:
     """Return the step size (s) at and below which LEQT1F must declare the matrix singular.
 
-    LEQT1F is the linear solver of the collocation programs. The matrix is the collocation matrix of
-    `program`, "two-term" or "four-term", with N rows. LEQT1F declares it singular if the computed
-    sum N + p equals N, where p is a scaled pivot. The sum equals N if p is at most half a unit in
-    the last place of N. A tie is included, because it is rounded to even N. N is a power of 2, so
-    that this unit is N 2**(1 - bits) in an arithmetic of `bits` bits that rounds to nearest. The
-    last scaled pivot is proportional to step**(N-1), and determines the step size.
+    It does if the computed sum N + p equals N, p a scaled pivot and N the number of rows: if p is
+    at most half a unit in the last place of N (a tie is rounded to even N). N is a power of 2, so
+    that this unit is N 2**(1 - bits) with rounding to nearest. The last scaled pivot, proportional
+    to step**(N-1), decides.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -219,11 +197,7 @@ def singular_below(program: str, bits: int = 53) -> float:
 
 
 def declared_singular_below(program: str) -> float:
-    """Return the largest step size (s) whose matrix the compiled LEQT1F declares singular.
-
-    LEQT1F is the linear solver of the collocation programs. The matrix is the collocation matrix of
-    `program`, "two-term" or "four-term". The step size is found by bisection.
-    """
+    """Return the largest step (s) that the compiled LEQT1F declares singular, by bisection."""
     from pyharness.model.extension import extension
 
     def singular(step: float) -> bool:
@@ -252,12 +226,9 @@ def _errors(
 ) -> tuple[float, ...]:
     """Return the ratios of three errors of a solution X to their bounds, and a relative error.
 
-    `found` is the computed solution X of the linear system `matrix` X = `side`. The ratios are for
-    the residual, for the elements of X, and for the increment, which is the change of an unknown
-    over the step. The fourth number is the error of the increment, relative to the step size `step`
-    (s) times the largest element of `side`. The argument `solver` is the exact inverse of the
-    matrix. `sizes` is abs(L) abs(U) for the LU factors of the matrix, with the rows in the order of
-    the matrix.
+    The ratios are for the residual, the elements of X, and the increment of an unknown over the
+    step. The last is the error of the increment over `step` (s) times the largest element of
+    `side`. `solver` is the exact inverse, `sizes` abs(L) abs(U) in the matrix's order of rows.
     """
     count = len(matrix)
     x, b = fractions(found), fractions(side)
@@ -287,11 +258,10 @@ def _theorem_holds(
     order: Sequence[int],
     operands: Sequence[ArrayLike],
 ) -> bool:
-    """Return whether the hypotheses of Higham's theorem 9.4 hold for a solved linear system.
+    """Return whether the hypotheses of Higham's theorem 9.4 hold.
 
-    `lower` and `upper` must be LU factors of the rows of `matrix` in the given `order`, except for
-    the rounding errors of theorem 9.3. The nonzero elements of the `operands` must be in a range in
-    which no operation underflows or overflows.
+    `lower` and `upper` must be LU factors of the rows in `order`, except for the errors of theorem
+    9.3, and no operation on `operands` may underflow or overflow.
     """
     sizes = np.abs(np.concatenate([np.ravel(each) for each in operands]))
     sizes = sizes[sizes != 0.0]
@@ -311,12 +281,10 @@ def _share(error: Fraction, bound: Fraction) -> float:
 
 
 def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:
-    """Return the largest relative shortfall of a pivot from the largest candidate, and its bound.
+    """Return the largest relative shortfall of a pivot from the best candidate, and its bound.
 
-    The candidates in a column are the scaled elements of the rows that are not pivot rows yet. The
-    pivots are those of an exact elimination of `matrix` with the pivot rows in `order`, as the
-    solver chose them. The bound is the shortfall that rounding may cause. It follows from `sizes`,
-    which is abs(L) abs(U) for the LU factors.
+    The pivots are those of exact elimination in `order`, as the solver chose them. The bound, from
+    `sizes` (abs(L) abs(U)), is what rounding may cause.
     """
     shortfall, allowed = Fraction(0), Fraction(0)
     scale = 1 / abs(matrix).max(axis=1)
@@ -332,12 +300,10 @@ def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tupl
 def _columns(
     matrix: Fractions, order: Sequence[int] | None = None
 ) -> Iterator[tuple[int, dict[int, Fraction], Fractions]]:
-    """Eliminate a matrix exactly, and yield the choice of the pivot in each column.
+    """Eliminate a matrix exactly; yield pivot row, candidates and rows before each column.
 
-    For each column, yield the index of the pivot row, the pivot candidates by row index, and all
-    rows before this column is eliminated. A candidate is the magnitude of an element divided by the
-    largest magnitude in its row of `matrix`. The pivot rows are taken in `order`. Without `order`
-    the row with the largest candidate is taken, as in the programs' linear solver LEQT1F.
+    A candidate is an element's magnitude over the largest in its row of `matrix`. Without `order`
+    the largest is taken, as in LEQT1F.
     """
     rows = matrix.copy()
     scale = 1 / abs(matrix).max(axis=1)

@@ -1,8 +1,7 @@
-"""Error amplification by Euler's equations themselves, from which bounds for all methods follow.
+"""Error amplification by Euler's equations themselves, which bounds all methods.
 
-An error of omega at time s is multiplied by the matrix Phi(t, s) until time t. Phi is the
-state-transition matrix of the equations, linearised along the solution. `conditioning` computes the
-amplification, so that bounds on the errors of a method are known before the method is run.
+The state-transition matrix Phi(t, s), of the equations linearised along the solution, multiplies an
+error of omega at s until t.
 """
 
 import math
@@ -39,7 +38,7 @@ _MOST_NODES = 400_000
 
 @dataclass(frozen=True)
 class Conditioning:
-    """The sensitivity of omega at the end of one motion to errors of omega during the motion."""
+    """The sensitivity of omega at the end of a motion to errors during it."""
 
     # largest factor from an error of omega at any time to the error at the end, at least 1
     amplification: float
@@ -53,37 +52,32 @@ class Conditioning:
     largest: float  # largest magnitude of any component of omega until the end (rad/s)
 
     def limit(self, made: float, steps: float = 0.0) -> float:
-        """Return the largest final error of omega that a method may have, divided by `largest`.
+        """Return the largest final error of omega that a method may have, over `largest`.
 
-        `largest` is the largest magnitude of any component of omega until the end. `made` is the
-        sum of the errors, divided by `largest`, that the method's tolerance or order allows in its
-        steps. The limit is the sum of `made` times the error amplification, and two bounds of
-        amplified rounding errors. The second of them is proportional to `steps`, the number of
-        steps after which the method rounds omega. `steps` is 0 if the method retains its rounding
-        errors by compensated summation. The limit is at most 2. This is no restriction, because
-        components of magnitude up to `largest` differ by at most 2 times `largest`.
+        `made` is the relative sum of the errors allowed in the steps. It is multiplied by the
+        amplification, and two bounds of amplified rounding errors are added; the second is
+        proportional to `steps`, the number of times that omega is rounded (0 with compensated
+        summation). The limit is at most 2, as components up to `largest` differ by no more.
         """
         allowed = made * self.amplification + self.rounding + steps * self.storing
         # If the limit is NaN, no error is allowed.
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
     def angle_limit(self, made: float, time: float) -> float:
-        """Return the largest error that an attitude at `time` (s) may have (rad).
+        """Return the largest error of an attitude at `time` (s), in rad.
 
-        `made` is the error that the method's tolerance allows (rad). The limit is the sum of three
-        angles: `made`, the rounding error of the attitude, and the angle that results if omega has
-        its largest rounding error at all times.
+        It is `made` (rad), the attitude's rounding error, and the angle from the largest rounding
+        error of omega at all times.
         """
         turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
         return made + turned + ATTITUDE
 
 
 def conditioning(scene: Scene, time: float) -> Conditioning:
-    """Return the sensitivity of a scene's omega at `time` (s) to earlier errors of omega.
+    """Return the sensitivity of omega at `time` (s) to earlier errors.
 
-    The sensitivity follows from the equations linearised along the solution. Raise InputError if
-    the solution grows without bound before `time`, or if `time` is so long that the solution would
-    be needed at too many times. Raise it also if the amplification is beyond the range of binary64.
+    Raise InputError if the solution grows without bound before, if it would be needed at too many
+    times, or if the amplification is beyond binary64.
     """
     times = _nodes(scene, time)
     omega, complete = _path(scene, times)
@@ -93,11 +87,10 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 
 
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
-    """Return the sensitivity of a scene's final omega to errors of omega along a known solution.
+    """Return the final sensitivity along the solution `omega` (rad/s, (n, 3)) at `times` (s).
 
-    The solution is `omega` (rad/s, shape (n, 3)) at `times` (s), which begin at 0. It must change
-    little from each time to the next. Raise InputError if the amplification is beyond the range of
-    binary64.
+    The times begin at 0, and omega changes little between them. Raise InputError if the
+    amplification is beyond the range of binary64.
     """
     with np.errstate(all="ignore"):
         found = _along(scene, times, omega)
@@ -107,10 +100,7 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 
 
 def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
-    """Return omega at `times` (rad/s, shape (n, 3)), and whether it is known at the last time.
-
-    The solution ends before the last time if omega grows without bound.
-    """
+    """Return omega (rad/s, shape (n, 3)), and whether it reaches the last time."""
     from pyharness.methods.problem import closed_form
     from pyharness.methods.solve import solve
 
@@ -121,7 +111,7 @@ def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
 
 
 def _nodes(scene: Scene, time: float) -> Array:
-    """Return equally spaced times from 0 to `time` (s), with little change of omega between them.
+    """Return equally spaced times up to `time` (s), with little change of omega between them.
 
     Raise InputError if more than 400 000 intervals (`_MOST_NODES`) would be needed.
     """
@@ -151,11 +141,11 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 
 
 def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: float) -> Conditioning:
-    """Return the sensitivity of a final state to earlier errors, from state-transition matrices.
+    """Return the sensitivity of a final state, from state-transition matrices.
 
-    `flow` has the matrix from each of n `times` (s) to the last one, shape (n, m, m). `state` is
-    the solution, shape (n, m), and `source` the sum of the magnitudes of all terms of its
-    derivative (1/s), of the same shape. Errors are divided by `largest`.
+    `flow` has the matrix from each time to the last, shape (n, m, m); `state` is (n, m), like
+    `source`, the sums of magnitudes of the terms of its derivative (1/s). Errors are divided by
+    `largest`.
     """
     steps, sizes = np.diff(times), np.abs(flow)
 
@@ -178,11 +168,9 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
 
 
 def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
-    """Return the sum of the magnitudes of all terms of each right-hand side (1/s2), shape (n, 3).
+    """Return the sums of magnitudes of the terms of Euler's equations (1/s2), shape (n, 3).
 
-    The right-hand sides are those of Euler's equations for `omega` (rad/s, shape (n, 3)) at `times`
-    (s). The magnitude of a sine or cosine of the torque is multiplied by 1 plus its angle. The
-    reason is that the angle, the product of frequency and time, has a rounding error in proportion
+    That of a sine or cosine is multiplied by 1 plus its angle, whose rounding error is proportional
     to its size.
     """
     products = np.abs(scene.euler_coefficients) * np.abs(

@@ -1,7 +1,6 @@
 """The time between flips of bodies without torque, in closed form.
 
-At a flip, the component of omega about the middle axis changes its sign. The time between flips is
-half the period of omega.
+At a flip, omega about the middle axis changes its sign.
 """
 
 import numpy as np
@@ -18,23 +17,11 @@ _NEAR = 2.0**-27
 
 
 def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
-    """Return the time (s) between sign changes of omega about the middle axis, without torque.
+    """Return the time (s) between flips of each body, shape (n,).
 
-    This time is half the period of omega, and equals pi divided by the arithmetic-geometric mean of
-    two rates (1/s), which follow from the moments and the initial omega. It is infinite on the
-    separatrix and for a steady rotation.
-
-    Parameters
-    ----------
-    moments : array_like, shape (n, 3) or (3,)
-        Principal moments of inertia of n bodies, kg m2, in any order.
-    omega0 : array_like, shape (n, 3) or (3,)
-        Initial angular velocities about the axes of these moments, rad/s.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        The time between flips of each body, s.
+    It is half the period of omega: pi over the arithmetic-geometric mean of two rates (1/s). It is
+    infinite on the separatrix and for a steady rotation. `moments` (kg m2, in any order) and
+    `omega0` (rad/s) have the shape (n, 3) or (3,).
     """
     bodies, omega = np.broadcast_arrays(np.atleast_2d(moments), np.atleast_2d(omega0))
     order = np.argsort(bodies, axis=1, kind="stable")
@@ -51,7 +38,7 @@ def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
 
 
 def mean(upper: Array, lower: Array) -> Array:
-    """Return the arithmetic-geometric mean of each pair of non-negative `upper` and `lower`."""
+    """Return the arithmetic-geometric mean of each pair of non-negative numbers."""
     for _ in range(_LEVELS):
         if (np.abs(upper - lower) <= _NEAR * upper).all():
             break

@@ -1,8 +1,6 @@
-"""Polhodes of a body, and the growth rates of all bodies, as data for plots.
+"""Polhodes, and the growth rates of all bodies, as data for plots.
 
-A polhode is the path of omega in a body without torque. It is represented by the path of the
-direction of the angular momentum, on a sphere. A growth rate is that of a perturbation of steady
-rotation about the middle axis.
+A polhode, the path of omega without torque, is shown by the direction of the angular momentum.
 """
 
 import math
@@ -20,14 +18,12 @@ _POINTS = 181
 
 
 def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
-    """Yield the name and the points of curves that L / abs(L) follows without torque.
+    """Yield the name and the points, shape (n, 3), of curves of L / abs(L) without torque.
 
-    L is the angular momentum in components along the body axes, and `moments` are the moments of
-    inertia I (kg m2). Each curve has the shape (n, 3). The sum of L**2 and the sum of L**2 / I over
-    the axes are constant along a curve. The last two curves are in the two planes of the
-    separatrix, L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)). Here j is 1 / I, and axis 2 is the one of
-    the middle moment. If two moments are equal, both curves are in the plane perpendicular to the
-    axis of the third moment. A sphere has no curves.
+    L is the angular momentum along the body axes. The last two curves are in the planes of the
+    separatrix, L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)), j = 1 / I (kg m2), axis 2 that of the
+    middle moment. With two equal moments both are perpendicular to the third axis. A sphere has no
+    curves.
     """
     high, middle, low = sorted(range(3), key=lambda axis: moments[axis])
     j = min(moments) / np.array(moments)
@@ -55,12 +51,10 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
 
 
 def growth_of_bodies(first: Array, third: Array) -> Array:
-    """Return the growth rate Re Q of each body about its middle axis, divided by the spin.
+    """Return the growth rate Re Q about each middle axis, over the spin.
 
-    A perturbation of steady rotation about the middle axis grows like exp(Q t), where Q is the
-    fastest rate of equation 32 of the thesis. A body is described by Smelt's numbers K1 = A and K3
-    = -C, where A and C are Euler coefficients. `first` contains K1 and `third` contains K3 of each
-    body. Both are from -1 to 1 for every body.
+    Q is the fastest rate of equation 32. `first` and `third` are Smelt's numbers K1 = A and K3 =
+    -C, from -1 to 1.
     """
     a, c = first, -third
     # Coefficients that belong to moments satisfy A + B + C + ABC = 0. At two corners of the square

@@ -1,11 +1,9 @@
-"""Bounds on the sum of the errors of a method's steps, known before the method is run.
+"""Bounds on the sum of the errors of a method's steps, known before it is run.
 
-No bound is fitted to results. For a method with a tolerance, the bound of the sum is the tolerance.
-For a method with a fixed step, the bound follows from its order and from a bound on derivatives.
-The derivative of omega is at most a number `a` times the product of two components. Therefore the
-k-th derivative is at most k! (a W)**k W, where W is the largest omega. The solution of y' = a y**2
-with y(0) = W attains this limit. Likewise, no term of the method's own power series exceeds the
-term that the method yields for y' = a y**2.
+No bound is fitted. With a tolerance, it is the bound. With a fixed step it follows from the order:
+the derivative of omega is at most `a` times the product of two components, so that the k-th is at
+most k! (a W)**k W, W the largest omega, as for y' = a y**2, y(0) = W. Likewise no term of the
+method's own power series exceeds its term for that equation.
 """
 
 import math
@@ -29,12 +27,9 @@ STEPS = Basis(
 
 
 def steps_of(name: str, run_steps: int, evaluations: int) -> float:
-    """Return how often a run of a method rounds omega to binary64 at the end of a step.
+    """Return how often a run rounds omega to binary64 at the end of a step.
 
-    `name` is the method, `run_steps` is the number of steps of the run, and `evaluations` is the
-    number of right-hand sides that it evaluated. The result is 0 for a method that retains the
-    rounding errors of omega by compensated summation. For SciPy's methods the result is estimated
-    from `evaluations`.
+    It is 0 with compensated summation, and for SciPy's methods an estimate from `evaluations`.
     """
     if name in SCIPY_METHODS:
         return evaluations / (1 if name == "lsoda" else 6)
@@ -42,11 +37,10 @@ def steps_of(name: str, run_steps: int, evaluations: int) -> float:
 
 
 def fixed_step_sum(name: str, angle: float, steps: int) -> float:
-    """Return a bound of the sum of the relative errors of `steps` steps of a fixed-step method.
+    """Return a bound of the relative truncation errors of all fixed steps.
 
-    The errors are truncation errors relative to the largest omega. `name` is the method. `angle`
-    (rad) is the product of the largest Euler coefficient, the largest omega and the step size. The
-    bound is infinite if the angle is 0.5 or more.
+    `angle` (rad) is the product of the largest Euler coefficient, the largest omega and the step.
+    The bound is infinite from 0.5 on.
     """
     if angle >= 0.5:
         return math.inf
@@ -57,10 +51,9 @@ def fixed_step_sum(name: str, angle: float, steps: int) -> float:
 
 @cache
 def _series(name: str) -> tuple[float, ...]:
-    """Return the coefficients of the powers of the step size in a method's result after one step.
+    """Return the coefficients of powers of the step in one step of y' = y**2, y(0) = 1.
 
-    The step starts from y(0) = 1 and integrates y' = y**2, which is Euler's equations with A = B =
-    C = 1 for three equal components.
+    This is Euler's equations with A = B = C = 1 and equal components.
     """
     ones = np.ones(3)
     equal = Scene("equal", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))

@@ -1,7 +1,4 @@
-"""Regions of linear stability, and growth of perturbations for imaginary z, as data for plots.
-
-z is the step size times an eigenvalue of the Jacobian of the equations.
-"""
+"""Regions of linear stability in the plane of z (`amplification`), as data for plots."""
 
 from dataclasses import dataclass
 
@@ -21,10 +18,9 @@ _HIDDEN = 1e-13  # largest growth that is regarded as a rounding error
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """The spectral radius of one amplification matrix on a grid in the plane of complex z.
+    """The spectral radius of one amplification matrix on a grid of z.
 
-    The amplification matrix is the matrix by which one step multiplies a perturbation. z is the
-    step size times an eigenvalue of the Jacobian. The imaginary axis has additional, finer samples.
+    The imaginary axis has finer samples.
     """
 
     name: str  # a text that names the programs and methods that have this matrix
@@ -38,11 +34,7 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """The stability regions of all programs on the same grid of complex z.
-
-    z is the step size times an eigenvalue of the Jacobian. The stability region of a program is the
-    set of z for which the spectral radius of its amplification matrix is at most 1.
-    """
+    """The stability regions, where the spectral radius is at most 1, on one grid of z."""
 
     # real and imaginary parts of z on the grid in the complex plane
     real: Array
@@ -52,11 +44,9 @@ class Regions:
 
 
 def matrices() -> dict[str, Amplification]:
-    """Return the distinct amplification matrices of the programs and of the method `rk4`, by name.
+    """Return the distinct amplification matrices, by the names of programs and `rk4`.
 
-    An amplification matrix is the matrix by which one step multiplies a perturbation. Two further
-    matrices belong to the Runge-Kutta program with a single defect. Each name lists the programs
-    and methods that have the matrix.
+    Two more belong to the Runge-Kutta program with a single defect.
     """
     return {
         "two-term and four-term, original and corrected": amplification(
@@ -72,11 +62,10 @@ def matrices() -> dict[str, Amplification]:
 
 
 def regions() -> Regions:
-    """Return the stability regions of all programs of the thesis, original and corrected.
+    """Return the stability regions of all programs, original and corrected.
 
-    The Runge-Kutta program is included also with the defect `stage-base` alone, and with the defect
-    `base-not-restored` alone. Gauss collocation is left out, because its stability region is known:
-    the left half-plane.
+    The Runge-Kutta program is included also with `stage-base` or `base-not-restored` alone; Gauss
+    collocation, whose region is the left half-plane, is not.
     """
     real, imaginary = np.linspace(*_REAL), np.linspace(*_IMAGINARY)
     low, high, count = _DISTANCES

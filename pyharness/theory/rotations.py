@@ -1,15 +1,12 @@
 """Steady rotations under constant torque, and their linear stability.
 
-The method is Grammel's, equation 32 of the thesis (III.4.a). It assumes that omega is a steady
-rotation (a, b, c) plus a small perturbation proportional to exp(Q t). A, B, C are the coefficients
-of Euler's equations, N the torque about each axis, and I the moments of inertia. With M = N / I the
-rotation (a, b, c) is steady if
+Grammel's method, equation 32 of the thesis (III.4.a): omega is a steady rotation (a, b, c) plus a
+small perturbation proportional to exp(Q t). With A, B, C of Euler's equations and M = N / I, torque
+over moment, (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3, and the rates Q (1/s) are
+the roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
 
-    A bc = -M1,    B ca = -M2,    C ab = -M3,
-
-and the rates Q (1/s) of the perturbation are the roots of
-
-    Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
+Below, `share` is the initial perturbation over the rotation, and a place is a pair of a description
+and omega (rad/s). Of a continuous family only some members are reported.
 """
 
 import cmath
@@ -42,7 +39,7 @@ OFF = 0.1
 
 @dataclass(frozen=True)
 class SteadyRotation:
-    """One steady rotation of a scene, and the behaviour of a small perturbation of it."""
+    """One steady rotation of a scene, and a small perturbation of it."""
 
     place: str  # a description: an axis, a point of a hyperbola, ...
     omega: Triple  # of the steady rotation, rad/s
@@ -56,30 +53,22 @@ class SteadyRotation:
 
     @property
     def doubling_time(self) -> float | None:
-        """Return the time in which the fastest-growing perturbation doubles (s).
-
-        It is None if no perturbation grows like exp(Q t), with the rates Q of equation 32 of the
-        thesis.
-        """
+        """Return the doubling time of the fastest growth exp(Q t) (s); None without growth."""
         rate = self.rates[0].real
         return math.log(2.0) / rate if rate > 0.0 else None
 
     @property
     def period(self) -> float | None:
-        """Return the period of a perturbation's oscillation (s), or None if it does not oscillate.
-
-        Of several oscillations, the fastest one determines the period.
-        """
+        """Return the period of the fastest oscillation (s), or None."""
         rate = max(abs(each.imag) for each in self.rates)
         return 2.0 * math.pi / rate if rate > 0.0 else None
 
 
 @dataclass(frozen=True)
 class SteadyRotations:
-    """The steady rotations of a scene, each with the analysis of its stability.
+    """The steady rotations of a scene, with their stability.
 
-    If the rotations form a continuous family, only some members are included. All rotations are
-    analysed with a perturbation of the same relative magnitude.
+    All have a perturbation of the same relative magnitude.
     """
 
     told: str  # text: which steady rotations exist, and which of them are shown
@@ -88,11 +77,10 @@ class SteadyRotations:
 
 
 def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
-    """Return the steady rotations of a scene, and how a small perturbation of each develops.
+    """Return the steady rotations of a scene, and how perturbations of them develop.
 
-    `disturbance` is the magnitude of the perturbation divided by the magnitude of the rotation.
-    Raise InputError if the torque varies with time, or if a rotation or its rates are beyond the
-    range of binary64.
+    `disturbance` is the perturbation over the rotation. Raise InputError if the torque varies with
+    time, or if a rotation or its rates are beyond the range of binary64.
     """
     if scene.body_torque.varies:
         raise InputError(
@@ -107,12 +95,7 @@ def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
 
 
 def rates(coefficients: Triple, omega: Triple) -> Rates:
-    """Return the three rates Q of a steady rotation (1/s), the largest real part first.
-
-    A small perturbation of the rotation is a sum of terms proportional to exp(Q t), by equation 32
-    of the thesis. `coefficients` are A, B, C of Euler's equations, and `omega` is the steady
-    rotation (rad/s).
-    """
+    """Return the three rates Q of a steady rotation (1/s), the largest real part first."""
     size = max(map(abs, omega))
     if size == 0.0:
         return 0j, 0j, 0j
@@ -128,10 +111,7 @@ def rates(coefficients: Triple, omega: Triple) -> Rates:
 
 
 def _roots(slope: float, half: float) -> Rates:
-    """Return the three roots of Q**3 - slope Q - 2 half = 0, without loss of digits in small roots.
-
-    The roots Q are in no particular order.
-    """
+    """Return the roots of Q**3 - slope Q - 2 half = 0, without loss of digits in small ones."""
     if half == 0.0:
         root = cmath.sqrt(slope)
         return root, 0j, -root
@@ -184,9 +164,8 @@ def _growing(
     """Return the time (s) up to which linear theory describes a growing perturbation.
 
     It is the time at which the second-order terms reach a tenth of the perturbation. It is infinite
-    if these terms are zero, and None if they are beyond the range of binary64. `rate` is the
-    fastest rate Q (1/s), and `matrix` is the Jacobian (1/s) at the steady rotation `omega` (rad/s).
-    `share` is the initial magnitude of the perturbation divided by the magnitude of the rotation.
+    if these are zero, and None beyond binary64. `rate` is the fastest Q, `matrix` the Jacobian
+    (1/s).
     """
     # The eigenvector of `rate` is the null vector of the matrix less the rate.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
@@ -207,13 +186,11 @@ def _growing(
 def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | None:
     """Return the time (s) until an oscillation about a stable axis has a phase error of 0.1 rad.
 
-    It is the phase error of linear theory for a small perturbation of a rotation without torque.
-    `coefficients` are A, B, C in cyclic order from the axis of the rotation. `rate` is the
-    frequency of the oscillation in linear theory (rad/s), and `share` is the magnitude of the
-    perturbation divided by the magnitude of the rotation. A perturbation that tilts the rotation by
-    d (rad) towards another axis changes the frequency by the fraction d**2 / 4 times the first
-    coefficient divided by the coefficient of the other axis. The time is infinite if the first
-    coefficient is 0. The result is None if the frequency is 0, because then only the spin drifts.
+    This is the error of linear theory without torque. `coefficients` are in cyclic order from the
+    axis; `rate` is the linear frequency (rad/s). A perturbation that tilts the rotation by d (rad)
+    towards another axis changes the frequency by the fraction d**2 / 4 times the first coefficient
+    divided by the coefficient of the other axis. The time is infinite if the first coefficient is
+    0, and None if the frequency is: then only the spin drifts.
     """
     spun, *others = map(abs, coefficients)
     if spun == 0.0:
@@ -225,15 +202,13 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | 
 
 
 def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> float | None:
-    """Return the shortest time (s) between flips of a perturbed rotation about the middle axis.
+    """Return the shortest time (s) between flips about the middle axis.
 
-    At a flip, omega about the middle axis changes its sign. `coefficients` are A, B, C in cyclic
-    order from the middle axis. `spin` is the rotation (rad/s), and `share` is the magnitude of the
-    perturbation divided by the magnitude of the rotation. The time is 2 K / lambda, which is near
-    (2 / lambda) ln(4 / k') if the perturbation is small. K is the complete elliptic integral with
-    the complementary modulus k', and lambda is near the growth rate of the perturbation. The time
-    is shortest if the perturbation is along that other axis whose coefficient has the smaller
-    magnitude. The result is None if the signs of the coefficients are impossible for a middle axis.
+    `coefficients` are in cyclic order from that axis, `spin` is in rad/s. The time is 2 K / lambda,
+    near (2 / lambda) ln(4 / k') for a small perturbation: K is the complete elliptic integral with
+    the complementary modulus k', lambda is near the growth rate. It is shortest for a perturbation
+    along the other axis with the smaller coefficient. None if the signs are impossible for a middle
+    axis.
     """
     first, second, third = coefficients
     if first * second >= 0.0 or first * third >= 0.0:
@@ -248,11 +223,7 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
 
 
 def _places(scene: Scene) -> tuple[str, Places]:
-    """Return a text about the steady rotations of a scene, and a list of rotations for its report.
-
-    Each rotation is a pair of a description and omega (rad/s). If the rotations form a continuous
-    family, the list has only some members.
-    """
+    """Return a text about a scene's steady rotations, and places."""
     coefficients, torque = scene.euler_coefficients, scene.normalized_torque(0.0)
     held = [axis for axis in range(3) if torque[axis] != 0.0]
     if not held:
@@ -292,13 +263,10 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 
 
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
-    """Return a text and some steady rotations for a torque about one axis, for a report.
+    """Return a text and places for a torque about the axis `held`, from 0.
 
-    Each rotation is a pair of a description and omega (rad/s). `held` is the number of this axis,
-    from 0. The steady rotations form a hyperbola, because the product of the two other components
-    of omega is constant and equal to `product` (rad2/s2). Rotations of one branch are shown. The
-    other branch consists of the opposite rotations. `coefficients` are A, B, C of Euler's
-    equations.
+    The product of the other components is constant, `product` (rad2/s2). One branch is shown; the
+    other is opposite.
     """
     one, other = (held + 1) % 3, (held + 2) % 3
     told = (
@@ -323,12 +291,10 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
 
 
 def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
-    """Return a text and some steady rotations for a torque perpendicular to the axis of symmetry.
+    """Return a text and places for a torque perpendicular to the axis of symmetry, `axis`.
 
-    Each rotation is a pair of a description and omega (rad/s). The text and the rotations are for a
-    report. The number of the axis of symmetry, from 0, is `axis`. `products` are the products w2
-    w3, w3 w1 and w1 w2 of components of omega that balance the torque (rad2/s2). The steady
-    rotations form a hyperbola. The result contains points of one branch.
+    `products` are w2 w3, w3 w1 and w1 w2 that balance the torque (rad2/s2). One branch of the
+    hyperbola is shown.
     """
     one, other = (axis + 1) % 3, (axis + 2) % 3
     # The products w_one w_axis and w_other w_axis.

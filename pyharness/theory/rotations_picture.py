@@ -1,9 +1,4 @@
-"""The picture of the verb `rotations`: polhodes of one body, and growth rates of all bodies.
-
-A polhode is the path of omega in a body without torque. It is drawn as the path of the direction of
-the angular momentum, on a sphere. The growth rate is that of a perturbation of steady rotation
-about the middle axis.
-"""
+"""The picture of the verb `rotations`: polhodes of one body, and growth rates of all bodies."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -33,12 +28,10 @@ _MIDDLES = {(0.72, -0.36): 2, (-0.5, 0.5): 2, (0.7, 0.3): 1, (-0.7, -0.3): 1, (0
 
 
 def rotations_picture(scene: Scene) -> Picture:
-    """Return a picture of the polhodes of a scene's body, beside the growth rates of all bodies.
+    """Return the polhodes of a scene with moments, beside the growth rates of all bodies.
 
-    The left panel shows the polhodes on the sphere of directions of the angular momentum. The right
-    panel shows, for the moments of every possible body, the growth rate of a perturbed rotation
-    about the middle axis, divided by the spin. It also marks the cases of Table 1 of the thesis.
-    The scene must have moments.
+    The right panel has the growth rate about the middle axis over the spin, and marks the cases of
+    Table 1.
     """
     from matplotlib.figure import Figure
 
@@ -86,11 +79,9 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
 
 
 def _seen(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
-    """Return the coordinates of points in the picture and towards the viewer, shape (n,) each.
+    """Return the coordinates of points (n, 3) to the right, upwards, and towards the viewer.
 
-    The three coordinates are measured to the right, upwards, and towards the viewer. `points` has
-    the shape (n, 3). `toward` is the unit vector to the viewer, and `upward` is a vector that
-    appears vertical in the picture.
+    `toward` is the unit vector to the viewer; `upward` appears vertical.
     """
     right = np.cross(upward, toward)
     right /= np.linalg.norm(right)

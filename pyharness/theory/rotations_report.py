@@ -1,4 +1,4 @@
-"""The report of the verb `rotations`: steady rotations of a scene and their stability."""
+"""The report of the verb `rotations`."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -26,10 +26,7 @@ _SECONDS = digits(".3g")
 
 
 def rotations_report(scene: Scene, found: SteadyRotations) -> Report:
-    """Return the report of the steady rotations of a scene, with a table row for each rotation.
-
-    `found` contains the rotations, as `steady_rotations` returns them for `scene`.
-    """
+    """Return the report of a scene's steady rotations."""
     text: list[Section] = [
         [*heading(scene), f"perturbation: {found.disturbance:g} of the rotation"]
     ]
@@ -64,10 +61,7 @@ def _table(rotations: Sequence[SteadyRotation]) -> Table:
 
 
 def _rates(rates: Rates) -> str:
-    """Return the three rates Q of a steady rotation (1/s) as short text.
-
-    Two rates that are opposite or complex conjugate are written as one number with +-.
-    """
+    """Return three rates (1/s) as text, opposite or conjugate ones with +-."""
     first, second, third = rates
     if not any(rates):
         return "0"

@@ -1,8 +1,8 @@
-"""The schemes of the programs and fixed-step methods, implemented a second time for comparison.
+"""The schemes of programs and fixed-step methods, implemented again for comparison.
 
-A scheme computes one step of a method, but shares no code with the method. It computes either with
-numbers or with power series in the step size. With power series, it yields each term of the
-truncation error of a step, before any method is run. The torque is assumed to be constant.
+A scheme, without code of the method, computes one step: with `Numbers`, or with `Series`, power
+series in the step size, which yield each term of the truncation error. Its arguments are `on`, one
+of the two, and `omega` at the start. The torque is constant; equations 16-18.
 """
 
 import math
@@ -23,18 +23,13 @@ TERMS = 24
 
 
 class Numbers:
-    """Euler's equations of a scene, evaluated for numerical values of omega and of the step size.
-
-    A scheme, a function that computes one step of a method, uses this class to compute with
-    numbers. It uses the class `Series` to compute with power series in the step size. Omega (rad/s)
-    is an array of shape (..., 3).
-    """
+    """Euler's equations for numbers; omega (rad/s) has the shape (..., 3)."""
 
     def __init__(self, scene: Scene, step: float, sizes: bool = False) -> None:
-        """Store the coefficients and the torque of a scene's equations, and a step size (s).
+        """Store the equations and a step size (s).
 
-        If `sizes`, the absolute values of coefficients and torque are stored. For non-negative
-        omega the method `rate` then returns the sum of the magnitudes of each equation's terms.
+        If `sizes`, absolute values are stored, so that `rate` returns, for non-negative omega, the
+        sums of the magnitudes of the terms.
         """
         self._step = step
         size = np.abs if sizes else np.positive
@@ -42,37 +37,28 @@ class Numbers:
         self._torque = size(np.array(scene.normalized_torque(0.0)))
 
     def rate(self, omega: Array) -> Array:
-        """Return the right-hand sides of Euler's equations for each omega (rad/s2).
-
-        The equations are 16-18 of the thesis.
-        """
+        """Return the right-hand sides for each omega (rad/s2)."""
         turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
         return np.asarray(self._torque + self._coefficients * turned * onward)
 
     def times_step(self, x: Array) -> Array:
-        """Return the step size times the array `x`."""
+        """Return `x` times the step size."""
         return self._step * x
 
 
 class Series:
-    """The equations of a scene for a scheme that computes with power series in the step size.
+    """Euler's equations for power series in the step size.
 
-    A scheme is a function that computes one step of a method. Omega is an array of shape
-    (TERMS, ..., 3), where TERMS is the number of terms. Its element k contains the coefficients of
-    power k.
+    Omega has the shape (TERMS, ..., 3), the first axis for the powers.
     """
 
     def __init__(self, scene: Scene) -> None:
-        """Store the coefficients and the torque of a scene's equations."""
+        """Store the equations of a scene."""
         self._coefficients = np.array(scene.euler_coefficients)
         self._torque = np.array(scene.normalized_torque(0.0))
 
     def rate(self, omega: Array) -> Array:
-        """Return the power series of the right-hand sides of Euler's equations.
-
-        The equations are 16-18 of the thesis. `omega` is the power series of omega. The products of
-        series are Cauchy products.
-        """
+        """Return the power series of the right-hand sides, by Cauchy products."""
         turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
         result = np.zeros(omega.shape)
         for k in range(TERMS):
@@ -82,17 +68,11 @@ class Series:
         return result
 
     def times_step(self, x: Array) -> Array:
-        """Return the power series `x` times the step size.
-
-        The last term of `x` is dropped, because every series has the same number of terms.
-        """
+        """Return the series times the step size, without its last term."""
         return np.concatenate([np.zeros_like(x[:1]), x[:-1]])
 
     def solution(self, omega: Array) -> Array:
-        """Return the exact solution after one step, as a power series in the step size.
-
-        The step starts at `omega` (rad/s, shape (..., 3)).
-        """
+        """Return the exact solution after a step from `omega` (rad/s), as a power series."""
         result = constant(omega)
         for k in range(TERMS - 1):
             result[k + 1] = self.rate(result)[k] / (k + 1)
@@ -105,10 +85,7 @@ Scheme = Callable[[Arithmetic, Array], Array]
 
 @dataclass(frozen=True)
 class FixedStep:
-    """A program or method with a fixed step: its order, rounding error and scheme.
-
-    The scheme is a function that computes one step.
-    """
+    """A program or method with a fixed step: order, rounding error and scheme."""
 
     name: str  # of the program or method
     order: int  # of the global error of the program or method
@@ -117,20 +94,14 @@ class FixedStep:
 
 
 def constant(omega: Array) -> Array:
-    """Return a constant as a power series: the term of power 0 is `omega`, the others are 0.
-
-    `omega` has the shape (..., 3).
-    """
+    """Return a constant (..., 3) as a power series."""
     result = np.zeros((TERMS, *omega.shape))
     result[0] = omega
     return result
 
 
 def collocation(program: str) -> Scheme:
-    """Return the function that computes a step of a collocation program, its scheme.
-
-    A step consists of a first estimate and one correction. `program` is "two-term" or "four-term".
-    """
+    """Return the scheme of a collocation program: a first estimate and one correction."""
     parts = PARTS[program]
     weights = inverse(collocation_matrix(parts)).sum(axis=0).astype(float)
 
@@ -145,11 +116,9 @@ def collocation(program: str) -> Scheme:
 
 
 def collocation_singular(program: str) -> Scheme:
-    """Return the function for a step of a collocation program whose matrix is declared singular.
+    """Return the scheme of a collocation program whose matrix is declared singular.
 
-    `program` is "two-term" or "four-term". If the matrix is singular, the linear solver LEQT1F
-    returns the right-hand sides of the linear system unchanged. The program then uses these
-    right-hand sides as c1, c2, ..., the coefficients of t, t**2, ... in the polynomial of a step.
+    LEQT1F then returns the right-hand sides of the system, which the program uses as c1, c2, ...
     """
     parts = PARTS[program]
 
@@ -173,11 +142,7 @@ def collocation_singular(program: str) -> Scheme:
 
 
 def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after a step of the classical Runge-Kutta method of order 4 (thesis, eq. 31).
-
-    `on` evaluates the equations of a scene, and multiplies by the step size. `omega` is the value
-    at the start of the step.
-    """
+    """Return omega after a step of classical Runge-Kutta (eq. 31)."""
     first = on.times_step(on.rate(omega))
     second = on.times_step(on.rate(omega + 0.5 * first))
     third = on.times_step(on.rate(omega + 0.5 * second))
@@ -186,11 +151,10 @@ def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
 
 
 def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after the first step of the original Runge-Kutta program, as it was punched.
+    """Return omega after the first step of the original Runge-Kutta program.
 
-    Its third stage starts from the point of the second stage, and its fourth stage from the point
-    of the third stage. In the classical method both start from `omega`, the value at the start of
-    the step. `on` evaluates the equations of a scene, and multiplies by the step size.
+    Its third stage starts from the point of the second, and its fourth from that of the third;
+    classically both start from `omega`.
     """
     first = on.times_step(on.rate(omega))
     at = omega + 0.5 * first
@@ -202,21 +166,16 @@ def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
 
 
 def improved_euler(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after a step of the improved Euler method (thesis, eq. 29).
-
-    `on` evaluates the equations of a scene, and multiplies by the step size. `omega` is the value
-    at the start of the step.
-    """
+    """Return omega after a step of the improved Euler method (eq. 29)."""
     first = on.times_step(on.rate(omega))
     return np.asarray(omega + 0.5 * (first + on.times_step(on.rate(omega + first))))
 
 
 def taylor_3(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after a step of the Taylor method with three terms (thesis, eq. 30).
+    """Return omega after a step of the Taylor method with three terms (eq. 30).
 
-    The second derivative of omega is the derivative of the right-hand side F in the direction F. It
-    equals half of F(omega + F) - F(omega - F), because F is quadratic. `on` evaluates F for a
-    scene, and multiplies by the step size. `omega` is the value at the start of the step.
+    The derivative of the right-hand side F in the direction F is half of F(omega + F) - F(omega -
+    F), because F is quadratic.
     """
     rate = on.rate(omega)
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))
@@ -224,10 +183,7 @@ def taylor_3(on: Arithmetic, omega: Array) -> Array:
 
 
 def gauss(stages: int) -> Scheme:
-    """Return the function for a step of Gauss collocation with `stages` stages, its scheme.
-
-    The step consists of 24 fixed-point iterations. The order is twice the number of stages.
-    """
+    """Return the scheme of Gauss collocation, with 24 fixed-point iterations."""
     nodes, weights = legendre.leggauss(stages)
     nodes, weights = 0.5 * (nodes + 1.0), 0.5 * weights
     powers = np.array([[node**k for k in range(stages)] for node in nodes])
@@ -261,23 +217,16 @@ SCHEMES = {each.name: each for each in _ALL}
 
 
 def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
-    """Return the truncation error of a step from each omega, as a power series in the step size.
-
-    `scheme` is the function that computes a step of a method. `omega` (rad/s) has the shape (n, 3).
-    The series has the shape (TERMS, n, 3), where TERMS is the number of terms. Its element k
-    contains the coefficients of power k.
-    """
+    """Return the truncation error of a step, shape (TERMS, n, 3), from n omegas (rad/s)."""
     on = Series(scene)
     return scheme(on, constant(omega)) - on.solution(omega)
 
 
 def spacing(count: int) -> Sequence[Fraction]:
-    """Return the weights of a central difference formula for the first derivative.
+    """Return the weights of a central difference for the first derivative.
 
-    The formula uses the values of a function at `count` pairs of equally spaced points. It is exact
-    for polynomials of degree 2 count and below. The weight of pair i, from 1, multiplies the
-    difference of the values at i and -i spacings. The sum over all pairs, divided by the spacing,
-    is the derivative at the middle of the points.
+    Weight i, from 1, multiplies the difference of the values at i and -i spacings; the sum over
+    `count` pairs, over the spacing, is exact up to degree 2 count.
     """
     middle = math.comb(2 * count, count)
     return [

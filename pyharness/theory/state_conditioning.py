@@ -1,9 +1,7 @@
 """Error amplification under a torque that depends on omega and attitude.
 
-Such a torque transmits errors between omega and attitude. The state-transition matrix therefore is
-that of both, if the scene has an attitude. Its derivative follows from the derivatives of the tape
-on which the equations of motion are recorded. Errors of omega are divided by the largest |omega|,
-and those of the attitude are angles (rad), so that all are pure numbers.
+The state-transition matrix is that of both; its derivative follows from the tape of the equations.
+Errors of omega are divided by the largest |omega|, and those of the attitude are angles (rad).
 """
 
 import math
@@ -35,10 +33,9 @@ _OF_ANGLE = 0.5
 def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
     """Return the sensitivity of a scene's solution at `times` (s) to earlier errors.
 
-    Under a torque law it is the sensitivity of omega at the last time (`conditioning`). Under a
-    torque that depends on the state, it is the larger sensitivity at any of the times, because
-    damping may reduce errors towards the last one. Raise InputError if the torque is opaque, if the
-    solution grows without bound, or if it would be needed at too many times.
+    Under a torque law it is that at the last time; else the largest at any of the times, because
+    damping may reduce errors. Raise InputError if the torque is opaque, if the solution grows
+    without bound, or if it would be needed at too many times.
     """
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])
@@ -84,7 +81,7 @@ def _of_state(scene: Scene, time: float) -> Conditioning:
 
 
 def _path(scene: Scene, times: Array) -> Array:
-    """Return omega, and the attitude if the scene has one, at `times`, which begin at 0."""
+    """Return omega and the scene's attitude at `times`, which begin at 0."""
     if times[-1] == 0.0:
         return np.tile([*scene.omega, *(scene.attitude or ())], (len(times), 1))
     attitude = scene.attitude is not None
@@ -98,17 +95,16 @@ def _path(scene: Scene, times: Array) -> Array:
 
 
 def _jacobians(slopes: Tape, times: Array, state: Array) -> Array:
-    """Return the Jacobian matrices (1/s) of the equations of motion, shape (n, m, m)."""
+    """Return the Jacobians (1/s) of the equations, shape (n, m, m)."""
     n, m = state.shape
     return outputs_at(slopes, times, state)[:, m:].reshape(n, m, m)
 
 
 def _sources(tape: Tape, times: Array, state: Array) -> Array:
-    """Return bounds of the rounding errors of the equations of motion, over the unit roundoff.
+    """Return bounds of the rounding errors of the equations (1/s) over the unit roundoff.
 
-    The unit roundoff is that of binary64. The result (1/s) has the shape of `state`. Each operation
-    of the tape adds a rounding error of its own result to the errors of its operands (running error
-    analysis). For a sum the magnitudes of all terms are added.
+    By running error analysis each operation adds the error of its result; for a sum the magnitudes
+    of all terms count.
     """
     given = [_Bounded(each, np.zeros(len(times))) for each in inputs_of(times, state)]
     with np.errstate(all="ignore"):
@@ -119,13 +115,13 @@ def _sources(tape: Tape, times: Array, state: Array) -> Array:
 
 
 class _Bounded:
-    """Values, and bounds of their rounding errors over the unit roundoff; both are arrays."""
+    """Values, and bounds of their rounding errors over the unit roundoff."""
 
     def __init__(self, value: Any, error: Any) -> None:
         self.value, self.error = value, error
 
     def chained(self, value: Any, slope: Any) -> "_Bounded":
-        """Return a function of this value, from its value and its derivative."""
+        """Return a function of this value, from its value and derivative."""
         return _Bounded(value, np.abs(slope) * self.error + np.abs(value))
 
     def __add__(self, other: Any) -> "_Bounded":

@@ -1,8 +1,7 @@
-"""Prediction of the truncation and rounding errors of fixed steps at the end of a scene.
+"""Predicted truncation and rounding errors of fixed steps at the end of a scene.
 
-The truncation error of each step follows from the method's scheme (`pyharness.theory.schemes`). The
-truncation and rounding errors of a step are propagated to the end by the state-transition matrix.
-The methods themselves are not run.
+The errors of a step, the truncation error from `pyharness.theory.schemes`, are propagated by the
+state-transition matrix. The methods are not run.
 """
 
 import math
@@ -37,7 +36,7 @@ FORECAST = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The solution of one scene, and the state-transition matrices from each time to the end."""
+    """The solution of a scene, and the state-transition matrices from each time to the end."""
 
     scene: Scene  # its torque must be constant
     times: Array  # shape (n,), s: from 0 to the end
@@ -49,17 +48,17 @@ class Path:
 
     @property
     def norms(self) -> Array:
-        """Return the row-sum norm of each state-transition matrix, shape (n,)."""
+        """Return the row-sum norm of each matrix, shape (n,)."""
         return np.asarray(np.abs(self.propagators).sum(axis=2).max(axis=1))
 
     def over_time(self, values: Array) -> Array:
-        """Return the time integral of `values`, whose first axis has an element for each time."""
+        """Return the time integral of `values`, an element for each time."""
         return np.asarray(np.trapezoid(values, self.times, axis=0))
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """The predicted errors at the end of a run with a fixed step, relative to the largest omega."""
+    """Predicted final errors of a fixed-step run, relative to the largest omega."""
 
     truncation: float  # expected truncation error of the component with the largest one
     # bound of truncation and rounding error together; infinite if the steps are too large for it
@@ -69,10 +68,9 @@ class Forecast:
 
 
 def path(scene: Scene, time: float) -> Path:
-    """Return the solution from 0 to `time` (s), with its state-transition matrices.
+    """Return the solution to `time` (s), with its state-transition matrices.
 
-    There is a matrix from each time of the solution to the end. Raise InputError if the solution
-    grows without bound before `time`.
+    Raise InputError if the solution grows without bound before `time`.
     """
     from pyharness.methods.solve import solve
 
@@ -93,25 +91,17 @@ def path(scene: Scene, time: float) -> Path:
 
 
 class Forecaster:
-    """The error predictions for one method along one solution, for any number of steps."""
+    """The error predictions for one method along one solution."""
 
     def __init__(self, along: Path, method: str) -> None:
-        """Store a solution, `along`, and a method by its name.
-
-        The names are the keys of `pyharness.theory.schemes.SCHEMES`. The mean rounding error of one
-        step, which does not depend on the step size, is computed.
-        """
+        """Store a solution and a method, a key of `schemes.SCHEMES`."""
         self._path = along
         self.method = SCHEMES[method]
         self._missed = cache(self._series)
         self._wandering = self._of_one_step()
 
     def at(self, steps: int) -> Forecast:
-        """Return the predicted errors at the end if the method takes `steps` equal steps.
-
-        The result is a `Forecast` of the truncation and rounding errors, relative to the largest
-        omega.
-        """
+        """Return the predicted errors of `steps` equal steps."""
         here = self._path
         h = float(here.times[-1]) / steps
         largest = here.flow.largest
@@ -135,11 +125,9 @@ class Forecaster:
         return Forecast(truncation, 2.0 * worst + rounding, rounding, wandering)
 
     def crossing(self, smallest: float) -> float:
-        """Return the step size (s) below which rounding dominates the predicted error at the end.
+        """Return the step (s) below which expected rounding exceeds the truncation error.
 
-        At smaller step sizes the predicted truncation error is below the expected rounding error.
-        The step size is found by bisection between `smallest` (s) and the duration of the whole
-        run.
+        It is found by bisection between `smallest` (s) and the whole run.
         """
         time = float(self._path.times[-1])
         high = max(1, math.floor(time / smallest))
@@ -152,10 +140,9 @@ class Forecaster:
         return time / high
 
     def _of_one_step(self) -> float:
-        """Return the mean final error caused by one step's rounding, relative to the largest omega.
+        """Return the mean relative final error from one step's rounding.
 
-        The rounding error of a component of omega is assumed to be proportional to the component. A
-        component that never changes has no rounding error.
+        A component's error is proportional to it, and 0 if it never changes.
         """
         here = self._path
         changes = (self._rates() != 0.0).any(axis=0)

@@ -1,11 +1,9 @@
-"""The corrections of weighted residual methods as Runge-Kutta tableaux, for any step size.
+"""Weighted residual methods as Runge-Kutta tableaux, for any step size.
 
-The methods are collocation, subdomain, Galerkin and least squares. The trial function of a step of
-size h is omega(0) + c1 t + ... + cn t**n. If the right-hand side f is known along the step, the
-weighted residual conditions are linear in c1, ..., cn. These conditions determine the derivative of
-the trial function as a projection of f on the polynomials of degree n - 1. The projection is
-computed once on the unit interval s = t / h. It is well conditioned, because its basis is the
-Legendre polynomials. The coefficients c1, ..., cn themselves are never formed.
+The methods are collocation, subdomain, Galerkin and least squares, with the trial function omega(0)
++ c1 t + ... + cn t**n. The conditions make its derivative a projection of the right-hand side f
+along the step on the polynomials of degree n - 1. It is computed on the unit interval s = t / h in
+the basis of Legendre polynomials, well conditioned; c1, ..., cn are never formed.
 """
 
 from dataclasses import dataclass
@@ -21,10 +19,9 @@ from pyharness.model.trajectory import Array
 
 @dataclass(frozen=True, eq=False)
 class Tableau:
-    """One correction of a step by a weighted residual method, as a Runge-Kutta tableau.
+    """One correction of a step on the unit interval, as a Runge-Kutta tableau.
 
-    A correction evaluates the right-hand side f along the first estimate of the step, or along the
-    previous correction. The tableau is for a step that is scaled to the unit interval.
+    It evaluates f along the first estimate or the previous correction.
     """
 
     # shape (m,); the points at which f is evaluated, in units of the step size h: the collocation
@@ -36,18 +33,14 @@ class Tableau:
 
 @cache
 def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None = None) -> Tableau:
-    """Return the tableau of one weighted residual method from its conditions on the unit interval.
+    """Return the tableau of one weighted residual method.
 
-    `weighting` is "collocation", "subdomain", "galerkin" or "least-squares". `terms` is n, the
-    number of powers of t in the trial function. `points` selects the collocation points: "gauss",
-    "thesis" or a tuple, as in the function `grid`. It has an effect only for collocation.
-
-    The quadrature of the weighted residual is exact for constant torques, for the following reason.
-    Along a trial function the products of two omegas in equations 13-15 of the thesis have degree
-    2n. The weight functions have degree n (Galerkin), n - 1 (least squares) or, in each subdomain,
-    0. The Gauss-Legendre quadrature with m points is exact to degree 2m - 1. For torques that vary
-    with time the error of the quadrature is of order 2n + 1 or higher in the step size. This
-    exceeds the order of each of the methods.
+    `weighting` is "collocation", "subdomain", "galerkin" or "least-squares", `terms` is n; `points`
+    is for collocation, as in `grid`. The Gauss-Legendre quadrature with m points is exact to degree
+    2m - 1: for constant torques the products of two omegas have degree 2n, and the weights n
+    (Galerkin), n - 1 (least squares) or 0. For torques that vary with time the error of the
+    quadrature is of order 2n + 1 or higher in the step size. This exceeds the order of each of the
+    methods.
     """
     n = terms
     if weighting == "collocation":
@@ -84,7 +77,7 @@ def _product(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Frac
 
 
 def _solved(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fraction]]:
-    """Return the exact solution x of a x = b by elimination, where a, b and x are matrices."""
+    """Return the exact solution x of a x = b, all matrices."""
     rows = [[*left, *right] for left, right in zip(a, b, strict=True)]
     for k in range(len(rows)):
         pivot = next(i for i in range(k, len(rows)) if rows[i][k])
@@ -97,10 +90,10 @@ def _solved(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fract
 
 
 def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
-    """Return the n collocation points in units of the step size, shape (n,).
+    """Return the n collocation points in units of the step, shape (n,).
 
-    The choice "gauss" of `points` selects the nodes of Gauss-Legendre quadrature. "thesis" or None
-    selects the points k / (n + 1) with k = 1 to n. A tuple contains the points themselves.
+    `points` is "gauss" for Gauss-Legendre nodes, "thesis" or None for k / (n + 1) with k = 1 to n,
+    or the tuple itself.
     """
     if points == "gauss":
         return _gauss(n)[0]
@@ -110,7 +103,7 @@ def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
 
 
 def _gauss(m: int) -> tuple[Array, Array]:
-    """Return the m nodes and weights of Gauss-Legendre quadrature on the unit interval."""
+    """Return m Gauss-Legendre nodes and weights on the unit interval."""
     nodes, weights = [], []
     for near in legendre.leggauss(m)[0].tolist():
         # leggauss computes the nodes as eigenvalues; one Newton step removes their error.
@@ -123,7 +116,7 @@ def _gauss(m: int) -> tuple[Array, Array]:
 
 
 def _legendre(m: int, x: Fraction) -> tuple[Fraction, Fraction]:
-    """Return the Legendre polynomial of degree m and its derivative at x inside (-1, 1)."""
+    """Return the Legendre polynomial of degree m and its derivative inside (-1, 1)."""
     before, value = Fraction(1), x
     for k in range(2, m + 1):
         before, value = value, ((2 * k - 1) * x * value - (k - 1) * before) / k
@@ -131,19 +124,14 @@ def _legendre(m: int, x: Fraction) -> tuple[Fraction, Fraction]:
 
 
 def basis(s: Array, n: int) -> Array:
-    """Return the values of the Legendre polynomials of degree 0 to n - 1 at m points, shape (m, n).
-
-    The polynomials are shifted to the unit interval. `s` contains the points, from 0 to 1.
-    """
+    """Return Legendre polynomials 0 to n - 1, shifted to [0, 1], at m points, shape (m, n)."""
     return np.asarray(legendre.legvander(2.0 * s - 1.0, n - 1), dtype=float)
 
 
 def _integrals(s: Array, n: int) -> Array:
-    """Return the integrals of n shifted Legendre polynomials from 0 to m points, shape (m, n).
+    """Return the integrals of `basis` from 0 to m points, shape (m, n).
 
-    The polynomials are those of the function `basis`, of degree 0 to n - 1 on the unit interval.
-    `s` contains the points, from 0 to 1. The integral from 0 to 1 is 1 for the first polynomial and
-    0 for each of the others.
+    The integral from 0 to 1 is 1 for the first polynomial and 0 for each of the others.
     """
     antiderivatives = legendre.legint(np.eye(n), lbnd=-1.0, scl=0.5)
     return np.asarray(legendre.legval(2.0 * s - 1.0, antiderivatives).T, dtype=float)

@@ -256,7 +256,7 @@ class TapeSeries:
 
 
 def _powers(tape: Tape) -> tuple[list[_Power], int]:
-    """Return the products that are not merely factors of others, and the most factors.
+    """Return the products that are no factors of larger ones, and the most factors.
 
     A sum has as many factors as one of its terms.
     """

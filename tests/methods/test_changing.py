@@ -29,6 +29,7 @@ from pyharness import (
 from pyharness.methods.registry import METHODS
 from pyharness.model.attitude import IDENTITY
 from pyharness.truth.reference import Reference, reference
+from tests.methods.tolerance_scenes import draw_changing as draw
 
 BOOMS = ChangingMoments([[40.0, 0.5, -0.01], [30.0, -0.3, 0.0, 0.001], [20.0, 0.4]])
 SCENE = Scene("booms", (0.3, 1.0, -0.6), moments=BOOMS)

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from pyharness import Scene, solve
+from pyharness import Scene, Stepper, Taylor, prepare, solve, solve_many
 from pyharness.model.state_torque import recorded
 from pyharness.truth.reference import reference
 
@@ -31,6 +32,27 @@ BOUNDED: dict[str, Callable[[Any], Any]] = {
 
 def _scene(torque: Callable[[Any], Any]) -> Scene:
     return Scene("", (0.0, 0.0, 0.0), moments=(1, 1, 1), torque=lambda t, w: [torque(t), 0.0, 0.0])
+
+
+@pytest.mark.parametrize("name", BOUNDED)
+def test_bounded_torque_is_solved(name: str) -> None:
+    scene = _scene(BOUNDED[name])
+    found = solve(scene, [5.0, 25.0], tolerance=1e-8)
+    assert found.ended == "complete"
+    assert found.omega[:, 0] == pytest.approx([0.0, 0.5], abs=1e-8)
+    assert found.error is not None
+    assert abs(found.omega[1, 0] - 0.5) / 0.5 <= found.error < 1e-8
+    solver = prepare(scene, tolerance=1e-8)
+    assert solver((0.0, 0.0, 0.0), 25.0)[0] == pytest.approx(0.5, abs=1e-8)
+    many = solve_many(scene, 25.0, omega0=np.zeros((3, 3)), tolerance=1e-8)
+    assert many.omega[:, 0] == pytest.approx(0.5, abs=1e-8)
+    stepper = Stepper(scene, 1e-10)
+    stepper.until(25.0)
+    assert stepper.omega[0] == pytest.approx(0.5, abs=1e-6)
+    series = solve_ivp(
+        lambda t, y: [BOUNDED[name](t)], (0.0, 25.0), [0.0], method=Taylor, rtol=1e-9, atol=1e-9
+    )
+    assert series.y[0, -1] == pytest.approx(0.5, abs=1e-6)
 
 
 @pytest.mark.parametrize("name", BOUNDED)

@@ -61,7 +61,7 @@ def by_solve(method: str, motion: Motion, tolerance: float, attitude: bool, what
 def by_dense_output(
     method: str, motion: Motion, tolerance: float, attitude: bool, what: str
 ) -> None:
-    """Check the dense output at a time that is no row."""
+    """Check the dense output at a time that is no row, and at many against a fine series."""
     found = solve(
         motion.scene, motion.times[-1], method, tolerance, attitude=attitude, dense_output=True
     )
@@ -69,24 +69,36 @@ def by_dense_output(
     state = found.sol(motion.times).T
     turns = state[:, 3:] if attitude else None
     check_error(motion, state[:, :3], turns, tolerance, what, steps=found.steps)
+    times = motion.times[-1] * np.random.default_rng(5).uniform(0.0, 1.0, 60)
+    times = times[np.argsort(abs(times))]
+    fine = solve(motion.scene, times, "taylor", 1e-13, attitude=attitude)
+    apart = np.abs(found.sol(times).T - fine.y) / ([motion.largest] * 3 + [0.5] * 4 * attitude)
+    assert apart.max() <= 2.0 * tolerance + 8e-15 * motion.growth, what
 
 
 def by_call(method: str, motion: Motion, tolerance: float, attitude: bool, what: str) -> None:
-    """Check a prepared solver: its call, and its trajectory without attitude."""
-    scene, end = motion.scene, motion.times[-1]
+    """Check a prepared solver, from another start than that of its scene."""
+    start, end = motion.scene.omega, motion.times[-1]
+    scene = replace(motion.scene, omega=(1.0, 2.0, 3.0))
+    starts = np.tile(start, (9, 1))
     if attitude:
-        turning = prepare(scene, method, tolerance, attitude=True)
-        omega, turns = turning(scene.omega, end)
+        turning = prepare(replace(scene, attitude=None), method, tolerance, attitude=True)
+        turned = motion.scene.attitude or IDENTITY
+        omega, turns = turning(start, end, turned)
         assert turning.status in _ENDED, what
         check_error(motion, omega, turns, tolerance, what, estimate=turning.error)
+        many, turns, _ = turning.many(starts, end, np.tile(turned, (9, 1)))
+        check_error(motion, many[8], turns[8], tolerance, f"{what}, many")
         return
     solver = prepare(scene, method, tolerance)
-    omega = solver(scene.omega, end)
+    omega = solver(start, end)
     assert solver.status in _ENDED, what
     steps = abs(solver.steps)
     check_error(motion, omega, None, tolerance, what, steps=steps, estimate=solver.error)
+    many = solver.many(starts, end)[0]
+    check_error(motion, many[8], None, tolerance, f"{what}, many", steps=steps)
     if method in METHODS:
-        rows = solver.trajectory(scene.omega, motion.times)
+        rows = solver.trajectory(start, motion.times)
         check_error(motion, rows.omega, None, tolerance, what, steps=steps, estimate=rows.error)
 
 
@@ -181,12 +193,21 @@ def test_errors_are_within_the_tolerance(entry: str, kind: str) -> None:
         pytest.skip("no scene of this kind is for this entry point")
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_instruction_set(kind: str, level: int) -> None:
+    for name, motion in motions(kind).items():
+        for tolerance in (1e-4, 1e-12):
+            by_solve("taylor", motion, tolerance, True, name)
+        if takes("quick", motion.scene, False):
+            by_call("quick", motion, 1e-6, False, f"{name}, quick")
+
+
 def alone(scene: Scene) -> bool:
     """Return whether a scene of a list is solved without the others."""
     return is_recorded(scene) or scene.torque.in_space
 
 
-# The kinds whose scenes are solved side by side, each in a lane of one call.
+# The kinds whose scenes share a call.
 LAWS = [kind for kind in KINDS if not any(alone(drawn()[0]) for drawn in KINDS[kind].values())]
 
 
@@ -198,9 +219,12 @@ def test_many_bodies_side_by_side(
 ) -> None:
     rows = [
         (name, motion)
-        for kind in LAWS
+        for kind in KINDS
         for name, motion in motions(kind).items()
-        if (motion.scene.coefficients is None) == by_moments
+        # A list takes no torque in space together with an inertia that changes.
+        if not (motion.scene.changing and motion.scene.torque.in_space)
+        and (motion.scene.coefficients is None) == by_moments
+        and (attitude or not motion.scene.torque.needs_attitude)
     ]
     scenes = [
         replace(
@@ -218,6 +242,16 @@ def test_many_bodies_side_by_side(
         turns = None if found.attitude is None else found.attitude[row]
         estimate = float(found.error[row])
         check_error(motion, found.omega[row], turns, tolerance, name, estimate=estimate)
+    if by_moments and not attitude:
+        # One by one the bodies would have the bits of a prepared solver.
+        laws = [(n, row) for n, row in enumerate(scenes) if not alone(row)]
+        bits = [
+            np.array_equal(
+                prepare(scene, tolerance=tolerance)(scene.omega, times[n]), found.omega[n]
+            )
+            for n, scene in laws
+        ]
+        assert np.count_nonzero(bits) < 0.7 * len(laws)
 
 
 @pytest.mark.parametrize("tolerance", TOLERANCES)

@@ -140,6 +140,16 @@ WAVES = TorqueLaw(
 MATRIX = ((40.0, 3.0, 0.0), (3.0, 30.0, 1.0), (0.0, 1.0, 20.0))
 REST = (0.0, 0.0, 0.0)
 
+# Omega and moments: middle axis, separatrix, symmetry, spheres, rest, extreme sizes.
+EDGES: list[tuple[Any, Any]] = [
+    ((0.0, 1.0, 0.0), (40.0, 30.0, 20.0)), ((1e-9, 1.0, 0.0), (40.0, 30.0, 20.0)),
+    ((1.0, 1.0, np.sqrt(0.75)), (3.0, 2.0, 1.0)), ((1.0, 2.0, 3.0), (2.0, 2.0, 1.0)),
+    ((1.0, 2.0, 3.0), (1.0, 2.0, 2.0)), ((1.0, 2.0, 3.0), (5.0, 5.0, 5.0)),
+    (REST, (3.0, 2.0, 1.0)), ((1.0, 2.0, 3.0), (1e9, 1.0, 1e9 + 1e-3)),
+    ((1.0, 0.0, 0.0), (3.0, 2.0, 1.0)), ((-1.0, -2.0, 0.5), (1.0, 3.0, 2.5)),
+    ((0.0, 0.0, 20.0), (3.0, 3.0, 3.0)),
+]  # fmt: skip
+
 # By kind, and by name, a function that returns a scene and a time (s).
 KINDS: dict[str, dict[str, Callable[[], Timed]]] = {
     "torque free": {kind: partial(_free, kind) for kind in FREE if kind != "needle"},
@@ -170,6 +180,15 @@ KINDS: dict[str, dict[str, Callable[[], Timed]]] = {
         "waves on a top": partial(_space, WAVES, moments=(30.0, 30.0, 20.0)),
         "waves on a sphere": partial(_space, WAVES, moments=(30.0, 30.0, 30.0)),
         "waves, full inertia": partial(_space, WAVES, inertia=MATRIX),
+        "along the axis of a spin": lambda: (
+            Scene(
+                "", (0.0, 2.0, 0.0), BODY,
+                torque=TorqueLaw((0.0, 3.0, 0.0), sines=[((0.0, 2.0, 0.0), 3.0)], frame="space"),
+            ), 2.0,
+        ),
+        "however small, from rest": lambda: (
+            Scene("", REST, BODY, torque=TorqueLaw((3e-200, 0.0, 1e-201), frame="space")), 1e100
+        ),
     },
     "changing inertia": {
         f"{'matrix' if full else 'moments'} {kind}": partial(_changing, full, kind)
@@ -181,8 +200,20 @@ KINDS: dict[str, dict[str, Callable[[], Timed]]] = {
         "damping": lambda: (
             Scene("", (0.3, -1.0, 2.0), inertia=MATRIX, torque=torques.damping(3.0)), 3.0
         ),
+        "field": lambda: (
+            replace(_state("field", 1)[0], moments=None, inertia=MATRIX), 1.0
+        ),
+    },
+    "edges": {
+        str(n): partial(lambda omega, moments: (Scene("", omega, moments), 1.0), *edge)
+        for n, edge in enumerate(EDGES)
     },
     "from rest": {
+        "recorded": lambda: (
+            Scene("", REST, (1.0, 2.0, 2.5),
+                  torque=lambda t, w: [t, t * t - w[0], np.sin(t)]), 4.0,
+        ),
+        "fast sine": partial(_law, TorqueLaw(sines=[((1e-9, 2e-9, -3e-9), 20.0)]), REST, 1.0),
         "constant": partial(_law, TorqueLaw((5.0, 3.0, 1.0)), REST),
         "ramp": partial(_law, TorqueLaw(rate=(90.0, 60.0, 70.0)), REST, -2.0),
         "sine": partial(_law, TorqueLaw(sines=[((50.0, 30.0, 10.0), 2.0)]), REST),

@@ -102,10 +102,7 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
 
 
 def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> float:
-    """Return the largest error of the attitude that a method may have at `time` (s), in rad.
-
-    Only above a thousandfold does the amplification apply to the tolerance.
-    """
+    """Return the largest error of the attitude (rad) that a method may have at `time` (s)."""
     if method in FORMS:
         return ATTITUDE
     return flow.angle_limit(tolerance * lively(flow.amplification), time)

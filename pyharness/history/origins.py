@@ -59,11 +59,7 @@ def unexplained_defects() -> dict[str, str]:
 
 
 def shared_statements(scanned_names: bool = False) -> dict[tuple[str, str], int]:
-    """Return the number of statements that two decks share, for each pair of programs.
-
-    Numbers, blanks and comments are ignored. With `scanned_names`, names that we made uniform are
-    those of the scan.
-    """
+    """Return the number of statements that two decks share, by programs, with uniform names."""
     found = {program: Counter(_statements(program, scanned_names)) for program in PROGRAMS}
     return {(a, b): (found[a] & found[b]).total() for a, b in combinations(PROGRAMS, 2)}
 
@@ -74,11 +70,7 @@ def statement_count(program: str) -> int:
 
 
 def mistakes() -> list[str]:
-    """Return one sentence for each mistake in the table of disagreements.
-
-    Quotations and references must be right, and each defect and differing step explained or
-    excepted.
-    """
+    """Return one sentence for each mistake in the table of disagreements."""
     found = disagreements()
     return [*_of_each(found), *_of_defects(found), *_of_steps(found)]
 

@@ -16,10 +16,7 @@ They are the cards of each program with the scan's variants, and the apparatus.
 
 
 def text_digest(table: Callable[[str], Mapping[str, Any]] = facts) -> str:
-    """Return the first 12 hexadecimal digits of the SHA-256 of the tables of our edition.
-
-    It does not depend on Fortran, Python, version or comments.
-    """
+    """Return 12 hexadecimal digits of the SHA-256 of our tables, without comments."""
     told = {name: table(name) for name in TABLES}
     text = json.dumps(told, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
     return sha256(text.encode()).hexdigest()[:12]

@@ -68,10 +68,7 @@ def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
 
 
 def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
-    """Grade the claim that all three programs coincide with the known solution of a case.
-
-    `limit` (rad/s) is half a unit of the last printed digit.
-    """
+    """Grade the claim of no error above `limit` (rad/s), half a unit of the last printed digit."""
     numbers = {f"{name}: largest error (rad/s)": bench.error(name, case) for name in PROGRAMS}
     return Grade(numbers, _most(numbers) < limit)
 
@@ -99,7 +96,10 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 
 
 def fails(bench: Bench, case: int, share: float) -> Grade:
-    """Grade the claim that the Runge-Kutta program fails in a case: ends early, errs, or both."""
+    """Grade the claim that the Runge-Kutta program fails in a case: ends early or is wrong.
+
+    In part, one of the two.
+    """
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
     ended, far = ~runs.complete, error > share

@@ -104,10 +104,7 @@ def converged_order(member: Member) -> int:
 
 
 def predicted_order(member: Member) -> int:
-    """Return the order p of a method, whose global error is O(h**p) in general motion.
-
-    Each correction raises it by one, from 1 to `converged_order`.
-    """
+    """Return the order p of the global error O(h**p), one more for each correction."""
     return min(member.corrections + 1, converged_order(member))
 
 

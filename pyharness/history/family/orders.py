@@ -58,10 +58,7 @@ class OrderFinding:
 
     @property
     def misses(self) -> bool:
-        """Return whether the measured order settled below the derived order by more than `SLACK`.
-
-        In special scenes the limiting error term is small, so that an order above it is no miss.
-        """
+        """Return whether the order is too low; a higher one may be due to the special scene."""
         return self.settled and self.deviation < -SLACK
 
 

@@ -26,10 +26,7 @@ _EDGES = [
 
 
 def draw_sphere(axes: Any, found: Trajectory) -> None:
-    """Draw the paths of the body's axes and of omega's direction on the unit sphere in space.
-
-    Dots mark the ends of the axes, a cross the end of omega.
-    """
+    """Draw paths of the body's axes (to dots) and of omega's direction (to a cross) in space."""
     assert found.attitude is not None
     _frame(axes)
     turned = matrices(found.attitude)
@@ -58,11 +55,7 @@ def _frame(axes: Any) -> None:
 
 
 def check_animation(path: str, scene: Scene) -> None:
-    """Raise InputError if no animation of the scene can be written to the file `path`.
-
-    It is checked before the scene is solved: the file must end in .gif or .html, and no moment may
-    exceed the sum of the other two.
-    """
+    """Raise InputError unless `path` ends in .gif or .html, and a brick can have the moments."""
     if _form(path) not in ANIMATIONS:
         raise InputError(f"--animate '{path}': unknown format; allowed: .gif, .html")
     if scene.changing is not None:
@@ -83,10 +76,9 @@ def check_animation(path: str, scene: Scene) -> None:
 
 
 def animation(scene: Scene, method: str, tolerance: float | None, end: float, path: str) -> bytes:
-    """Return an animation of a brick with the scene's moments, from 0 to `end` (s), as a file.
+    """Return a GIF or HTML file, by `path`, of a brick with the scene's moments up to `end` (s).
 
-    The format follows `path`. A motion of 2 to 10 s is in true time; others are stretched to 2 s or
-    compressed to 10 s, as the title states.
+    A motion of 2 to 10 s is in true time; others are stretched to 2 s or compressed to 10 s.
     """
     from matplotlib import rc_context
     from matplotlib.animation import FuncAnimation
@@ -124,10 +116,7 @@ def animation(scene: Scene, method: str, tolerance: float | None, end: float, pa
 
 
 def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: float) -> Any:
-    """Draw what is static, and return the function that draws a frame, a row of `found`.
-
-    `rate` is the seconds of the motion per second of the animation.
-    """
+    """Return the function that draws a frame, a row of `found`, at `rate` times true speed."""
     axes: Any = figure.add_axes((0.02, 0.02, 0.96, 0.86), projection="3d")
     _frame(axes)
     assert found.attitude is not None
@@ -156,10 +145,7 @@ def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: flo
 
 
 def _brick(scene: Scene) -> Array:
-    """Return the corners of a brick with the scene's moments, shape (8, 3), in the unit sphere.
-
-    Only ratios of moments matter. No side is below 1 % of the longest, to remain visible.
-    """
+    """Return the corners, shape (8, 3), of a brick whose sides are at least 1 % of the longest."""
     moments = np.array(scene.moments)
     sides = np.sqrt(np.maximum(0.0, moments.sum() - 2.0 * moments))
     sides = np.maximum(sides, 0.01 * sides.max())

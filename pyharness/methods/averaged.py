@@ -55,14 +55,11 @@ def averaged(
 ) -> Trajectory:
     """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
 
-    `steps` of the trajectory are macro-steps; its `error` is measured with more nodes and a higher
-    order of averaging.
-
-    Raise InputError for an opaque torque; if omega would not oscillate about a principal axis
-    without the torque, or the motion is near the separatrix; if the torque is not weak, or may be
-    in resonance with the motion; if a recorded torque is more than a polynomial in omega and time,
-    and waves, so that it may change within a part of a macro-step; and if the work limit is
-    exceeded.
+    `steps` are macro-steps; `error` is measured with more nodes and a higher order of averaging.
+    Raise InputError for an opaque torque; if torque-free omega would not oscillate about a
+    principal axis, or is near the separatrix; if the torque is not weak, or may be in resonance; if
+    a recorded torque is more than a polynomial in omega and time, and waves, so that it may change
+    within a part of a macro-step; and if the work limit is exceeded.
     """
     coordinates = Coordinates.of(scene.euler_coefficients, scene.omega)
     if coordinates is None:
@@ -76,8 +73,6 @@ def averaged(
 
 
 class _Run:
-    """The integration of one scene to the last of `times` (s)."""
-
     def __init__(
         self,
         scene: Scene,
@@ -108,7 +103,7 @@ class _Run:
         self._check_waves()
 
     def _check_waves(self) -> None:
-        """Set the highest frequency of the torque's waves, and raise InputError if it is high."""
+        """Raise InputError if the highest frequency of the torque's waves is too high."""
         self.fastest = fastest_of(self.scene.torque)  # rad/s
         slow = _FASTEST * self.pace
         if self.fastest > slow:
@@ -119,7 +114,6 @@ class _Run:
             )
 
     def trajectory(self) -> Trajectory:
-        """Return the trajectory at the requested times."""
         rows: list[Array] = []
         n_rows = 0
         while True:
@@ -166,7 +160,7 @@ class _Run:
         return self.coordinates.rate * math.sqrt(0.5 * (low + high) * math.sqrt(low * high))
 
     def _forecast(self) -> float:
-        """Return a length (rad) of the next macro-step, from the slopes at its start."""
+        """Return a length (rad) of the next macro-step."""
         point = self.point
         slopes = self.forward * MacroStep.mean_slopes(
             self.coordinates, self.torque, point, self.begin[0], _FEWEST_ANGLES
@@ -193,10 +187,7 @@ class _Run:
         return min(self.longest, _RELATIVE / change, rest + _TURNS_BEYOND * _TURN)
 
     def _step(self) -> MacroStep:
-        """Return the solution over the next macro-step, with as many revolutions as possible.
-
-        Raise TimedError if even the fewest are too many.
-        """
+        """Return the longest possible next macro-step, or raise TimedError."""
         time = self.begin[0]
         angles = self._angles(float(self.coordinates.modulus(self.point)))
         length = self._forecast()
@@ -257,6 +248,6 @@ class _Run:
         return bool(is_slow and late <= max(_FLOOR * self.phase, allowed))
 
     def _relative(self, step: MacroStep) -> Array:
-        """Return the largest relative error of the slow components, and that of the phase (rad)."""
+        """Return the largest relative error of the slow components, and of the phase (rad)."""
         slow = np.abs(step.error[:3]).max(axis=1) / step.scale[:3]
         return np.array([slow.max(), np.abs(step.error[3]).max() * self.pace])

@@ -1,16 +1,16 @@
 """Coordinates of omega that a weak torque changes slowly, for the method `averaged`.
 
 The body rotates about principal axis a, and b, c are the next axes in cyclic order. Euler's
-equations are b' = B w_c w_a + n_b, and so on, where n is the torque over the moment. Let the
-coefficients of b and c be P and Q, of opposite signs, and r the coefficient of a. With x =
-|Q|^(1/2) w_b, y = +-|P|^(1/2) w_c and u = w_a^2, and with the angle psi, for which psi' = |P
-Q|^(1/2) |w_a|, the motion without torque is exactly 2 pi-periodic in psi:
+equations are b' = B w_c w_a + n_b, and so on, with n the torque over the moment. The coefficients
+of b and c are P and Q, of opposite signs, and r that of a. With x = |Q|^(1/2) w_b, y = +-|P|^(1/2)
+w_c, u = w_a^2 and the angle psi, psi' = |PQ|^(1/2) |w_a|, the motion without torque is exactly 2
+pi-periodic in psi:
 
     dx/dpsi = -y,  dy/dpsi = x,  du/dpsi = 2 k x y,  with a constant k.
 
 Therefore x + i y = (p1 + i p2) exp(i psi) and u = p3 + k y^2 with constant p1, p2 and p3, which a
-torque changes slowly. The coordinates need no elliptic function, and are regular where the body
-rotates exactly about axis a. They end at the separatrix, where w_a reaches 0.
+torque changes slowly. They need no elliptic function, and are regular where the body rotates
+exactly about axis a. They end at the separatrix, where w_a reaches 0.
 """
 
 import math
@@ -38,10 +38,7 @@ class Coordinates(NamedTuple):
 
     @classmethod
     def of(cls, coefficients: Triple, omega: Triple) -> Self | None:
-        """Return the coordinates of the motion from omega (rad/s), with coefficients A, B, C.
-
-        None on a separatrix, or if omega does not oscillate about a principal axis.
-        """
+        """Return the coordinates from omega (rad/s), or None on a separatrix."""
         found: list[tuple[float, Self]] = []
         for a in range(3):
             b, c = (a + 1) % 3, (a + 2) % 3
@@ -67,10 +64,7 @@ class Coordinates(NamedTuple):
         return np.array([self.on_b * b, y, a * a - self.bend * y * y, 0.0])
 
     def modulus(self, point: Array) -> Array:
-        """Return the squared modulus of the elliptic functions of the orbit.
-
-        It is 0 for a rotation about axis a, 1 on the separatrix, and infinite beyond.
-        """
+        """Return the squared modulus of the orbit: 0 about axis a, 1 on the separatrix, or inf."""
         one = point[2]
         other = one + self.bend * (point[0] * point[0] + point[1] * point[1])
         low, high = np.minimum(one, other), np.maximum(one, other)

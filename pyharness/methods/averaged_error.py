@@ -35,10 +35,7 @@ class Done(NamedTuple):
 def estimates(
     coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
 ) -> tuple[float, float]:
-    """Return the largest measured error of omega (rad/s), and the largest error amplification.
-
-    They are computed at the last end, with `omega` (rad/s) and psi (rad), and at some others.
-    """
+    """Return the largest measured error of omega (rad/s) and amplification at several ends."""
     count = len(done)
     error, growth = _at(coordinates, coefficients, done, omega, angle)
     for n in range(1, count, -(-count // _MOST_ENDS)):
@@ -52,7 +49,7 @@ def estimates(
 def _at(
     coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
 ) -> tuple[float, float]:
-    """Return the measured error and the error amplification at the end of the last macro-step."""
+    """Return them at the end of the last macro-step."""
     a, b, c = coefficients
     x, y, z = omega
     cosine, sine = np.cos([angle]), np.sin([angle])

@@ -1,7 +1,7 @@
-"""Nodes, and matrices that integrate, differentiate and interpolate, for the method `averaged`.
+"""Chebyshev nodes of the slow variable, and equidistant angles, for the method `averaged`.
 
-Chebyshev points are for the slow variable, equidistant angles for the fast one (Trefethen 2000,
-Spectral Methods in MATLAB, chapters 3 and 6; Berrut and Trefethen 2004, SIAM Review 46).
+The formulas are in Trefethen 2000, Spectral Methods in MATLAB, chapters 3 and 6, and Berrut and
+Trefethen 2004, SIAM Review 46.
 """
 
 from functools import lru_cache

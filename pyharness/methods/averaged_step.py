@@ -1,7 +1,7 @@
 """One macro-step of the method `averaged`: the two-scale solution over very many revolutions.
 
-The unknowns v depend on the fast angle psi, with period 2 pi, and on the slow variable s = psi /
-length, from 0 to 1 in the macro-step. The equation dv/dpsi = F(v, psi) becomes
+The unknowns v depend on the fast angle psi, with period 2 pi, and on the slow s = psi/length, from
+0 to 1. The equation dv/dpsi = F(v, psi) becomes
 
     dv/dpsi + (1/length) dv/ds = F(v, psi).
 
@@ -11,9 +11,9 @@ over psi. The equation is equivalent to
     V + <W> = V(0) + <W>(0) + length (integral of <F> over s from 0),
     W = integral over psi, from 0, of F - (1/length) dW/ds, without their mean.
 
-Each sweep inserts V and W into the right-hand sides, and raises the order of averaging by one. The
-nodes are Chebyshev points in s and equidistant angles; Newton's method solves the first equation at
-all of them together. Sweeps with more nodes and angles measure the error.
+Each sweep inserts V and W into the right-hand sides, and raises the order of averaging by one.
+Newton's method solves the first equation at all Chebyshev points and angles together. Sweeps with
+more of them measure the error.
 """
 
 from functools import lru_cache
@@ -72,10 +72,9 @@ class MacroStep:
         length: float,
         sizes: tuple[int, int],
     ) -> None:
-        """Solve from the point `start` over the angle `length` (rad), a multiple of 2 pi.
+        """Solve over the angle `length` (rad), a multiple of 2 pi, or raise NotResolvedError.
 
-        `sizes` are the numbers of nodes and angles, both even. Raise NotResolvedError if the
-        iteration does not converge.
+        `sizes` are the numbers of nodes and angles, both even.
         """
         self.coordinates, self._torque, self._start_time = coordinates, torque, start_time
         self._start, self.length, self._sizes = start[:, None], length, sizes
@@ -136,7 +135,7 @@ class MacroStep:
             raise NotResolvedError
 
     def _slopes(self, point: Array, fast: Fast, slow: Slow | None = None) -> Array:
-        """Return the derivatives on a grid, whose last dimensions are the nodes and the angles."""
+        """Return the derivatives on a grid of nodes and angles, the last dimensions."""
         nodes = (slow or self._slow).nodes[: point.shape[-2], None]
         time = self._start_time + (self._pace * self.length) * nodes + point[3]
         self.evaluations += point[0].size // point.shape[-1] * len(fast.angles)
@@ -170,7 +169,7 @@ class MacroStep:
         return found
 
     def _newton(self, residual: Array) -> Array:
-        """Return the correction of the solution at the nodes, from a residual there."""
+        """Return the correction of the solution at the nodes."""
         n = self._n_unknowns
         found = residual.copy()
         found[:n] = (self._inverse @ residual[:n].ravel()).reshape(n, -1)
@@ -179,7 +178,7 @@ class MacroStep:
         return found
 
     def _measured(self) -> Array:
-        """Return the measured error at the nodes, by two sweeps with more nodes and angles."""
+        """Return the error at the nodes, by two sweeps with more nodes and angles."""
         count, angles = self._sizes
         nodes, turns, back = _finer(count, angles)
         slow, fast = slow_nodes(count + _MORE_NODES), fast_nodes(angles + _MORE_ANGLES)
@@ -232,7 +231,7 @@ class MacroStep:
 
 @lru_cache(maxsize=16)
 def _finer(count: int, angles: int) -> tuple[Array, Array, Array]:
-    """Return matrices that interpolate to more nodes and to more angles, and back to the nodes."""
+    """Return matrices that interpolate to more nodes and angles, and back."""
     more = slow_nodes(count + _MORE_NODES).nodes
     return (
         between_nodes(count, more),

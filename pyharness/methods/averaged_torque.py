@@ -38,7 +38,6 @@ def torque_of(scene: Scene) -> tuple[Torque, bool]:
 
 
 def _state_torque(scene: Scene, given: StateTorque) -> Torque:
-    """Return a recorded torque over the moments as a function of time and omega."""
     tape = given.tape
     if tape is None or given.needs_attitude:
         raise InputError(
@@ -59,9 +58,8 @@ def _state_torque(scene: Scene, given: StateTorque) -> Torque:
 class _Slot(NamedTuple):
     """The dependence of a slot of a tape on omega and time.
 
-    `degree` is that of a polynomial in omega and time, infinite if there is more than these and
-    waves; `fastest` the highest frequency of the waves (rad/s), and `rate` the derivative (1/s) of
-    a slot that is linear in time alone.
+    `degree` is infinite for more than a polynomial and waves; `fastest` (rad/s) is that of the
+    waves, `rate` (1/s) of a slot that is linear in time alone.
     """
 
     degree: float = 0.0
@@ -72,8 +70,7 @@ class _Slot(NamedTuple):
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
     """Return the highest frequency of the waves of a torque (rad/s).
 
-    Raise InputError for a torque that a macro-step may miss, as a pulse, or one in a narrow range
-    of energy.
+    Raise InputError for what a macro-step may miss: a pulse, or a narrow range of energy.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

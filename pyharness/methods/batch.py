@@ -33,11 +33,9 @@ _EFFORT = 1e9  # in effect no work limit: the caller has requested the whole bat
 class Solver:
     """The method, or the program of the thesis, that solves a batch; the other of the two is None.
 
-    `tolerance` is that of the method, relative to the largest |omega|. `t_end` is the final time
-    (s), by default step size times steps of the scene. The other fields are for programs: `listing`
-    selects the mistakes that remain (``original``, ``corrected``), `reading` the interpretations of
-    doubtful statements, `lipschitz` is the limit of the Lipschitz test (1/s), and `may_stop`
-    whether it stops.
+    `t_end` (s) is by default step size times steps. For programs alone, `listing` selects the
+    mistakes that remain (``original``, ``corrected``), `reading` the interpretations of doubtful
+    statements, `lipschitz` the limit (1/s) of the test, and `may_stop` whether it stops.
     """
 
     method: str | None = "auto"
@@ -92,7 +90,7 @@ class Batch:
 
     @property
     def bodies(self) -> Array:
-        """Return the principal moments (kg m2), shape (n, 3), or (1, 3) if bodies are the same."""
+        """Return the principal moments (kg m2), shape (n, 3), or (1, 3) for one body."""
         return self.arrays.get("moments", np.array([self.scene.moments]))
 
     @property
@@ -117,10 +115,7 @@ class Batch:
 
     @property
     def stop_variable(self) -> NDArray[np.int8]:
-        """Return the variable for which a program's Lipschitz test stopped each run, shape (n,).
-
-        It is a position in `pyharness.model.trajectory.STOP_VARIABLES`, from 1, or 0.
-        """
+        """Return the positions, from 1, in STOP_VARIABLES for which runs stopped, or 0, (n,)."""
         return self._program.stop_variable
 
     def sample_steps(self, samples: int) -> list[int]:
@@ -174,10 +169,10 @@ class Batch:
         return replace(self, arrays={**self.arrays, "omega0": omega0})
 
     def run(self, at: list[int]) -> ProgramEnsemble:
-        """Run the program of the thesis, and return its results at the steps `at`, ascending.
+        """Return the results of the program at the steps `at`, ascending.
 
-        Scenes are run one by one, without the error codes IER, if their `torque_rate` differ or the
-        program refuses one of them; only that one is then REFUSED.
+        Scenes are run one by one, without the codes IER, if `torque_rate` differs or the program
+        refuses one; only that is then REFUSED.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:
@@ -214,7 +209,6 @@ class Batch:
         return {}
 
     def _samples(self, samples: int) -> list[Ensemble]:
-        """Return the states at the ends of `samples` equal parts of the time."""
         if samples not in self._found:
             parts = [(i + 1) / samples for i in range(samples - 1)]
             ends = [self._solve_own(self.t_end * part) for part in parts]
@@ -232,10 +226,7 @@ class Batch:
         return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
-        """Return the states at `t_end` (s, shape (n,)); `more` has arguments of `solve_many`.
-
-        Methods without a compiled kernel for these scenes solve them one by one.
-        """
+        """Return the states at `t_end` (s), one by one if no compiled kernel takes all."""
         by_state = isinstance(self.scene.torque, StateTorque)
         if method not in (PREPARED_FOR_STATE if by_state else PREPARED):
             return self._solve_each(method, tolerance, t_end)

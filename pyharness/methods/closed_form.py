@@ -32,11 +32,7 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return the estimated error and the error amplification, the largest at any of the times (s).
-
-    Near the separatrix, the amplification may be larger at an earlier time than at the last; it is
-    then computed at some of these too.
-    """
+    """Return the largest error and amplification at the last, and near a separatrix other times."""
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth
@@ -54,8 +50,8 @@ def known_solution(
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) from its closed form.
 
-    If amplified rounding errors exceed the tolerance, it ended ``sensitive``. Raise InputError if
-    the scene has no closed form, or if the work limit is exceeded.
+    It is ``sensitive`` if amplified rounding errors exceed the tolerance. Raise InputError if there
+    is no closed form, or if the work limit is exceeded.
     """
     work = np.array([effort, 0.0])
     attitudes = None

@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 class CompiledCall(NamedTuple):
     """A prepared solver as a function for compiled code, as numba calls it.
 
-    ``function(data, start, t_end, state)`` reads the state at the address `start`, and writes that
-    at `t_end` (s) to `state`: omega (rad/s), three floats, and for a solver of the attitude a unit
-    quaternion. It returns an integer of `pyharness.h`, 0 for a complete solution. The address
-    `data` is valid as long as `solver` exists.
+    ``function(data, start, t_end, state)`` reads floats at the address `start`, omega (rad/s) and
+    for an attitude a unit quaternion, and writes those at `t_end` (s) to `state`. It returns an
+    integer of `pyharness.h`, 0 if complete. `data` is valid as long as `solver` exists.
     """
 
     function: Any

@@ -36,8 +36,7 @@ def integrated(
 ) -> CompiledRows:
     """Return the state at `times` (s), by Dormand and Prince's Runge-Kutta method of order 8.
 
-    `relative` and `absolute` are local tolerances, as in SciPy's DOP853, `longest` the longest step
-    (s), and `most` the largest number of calls.
+    Local tolerances are as in SciPy's DOP853; `longest` is in s, `most` in calls.
     """
     n = 3 if scene.attitude is None else _WIDTH
     # A function that takes the attitude without saying so returns NaN.

@@ -22,10 +22,7 @@ from pyharness.model.trajectory import Trajectory
 def solution_of(
     scene: Scene, found: Trajectory, rows: dense.Rows, method: str, tolerance: float
 ) -> DenseOutput:
-    """Return the solution as a function of time, between 0 and the times of `found`.
-
-    `rows` returns the trajectory at other times and tolerances.
-    """
+    """Return the solution as a function of time, between 0 and the times of `found`."""
     is_closed = not found.evaluations and method != "reference"
     return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
 
@@ -73,7 +70,7 @@ def with_events(
 def _first_periods(
     found: Trajectory, rows: dense.Rows, tolerance: float, period: float
 ) -> Trajectory:
-    """Return a trajectory that ends after a few periods (s) on each side of 0, if it is longer."""
+    """Return a trajectory over at most a few periods (s) on each side of 0."""
     ends = found.time[[0, -1]]
     last = PERIODS * period
     # A little more than these periods is not worth another way to find events.

@@ -1,7 +1,7 @@
 """Dense output of every method: Chebyshev polynomials through the method's own results.
 
-Intervals are divided until the last coefficients are far below the tolerance. A closed form is not
-approximated, but evaluated.
+Intervals are divided until the last coefficients are far below the tolerance. A closed form is
+evaluated instead.
 """
 
 import itertools
@@ -43,7 +43,7 @@ _SHORT = 0.25  # a shorter part of an interval than the largest gap of its nodes
 
 @dataclass(frozen=True, eq=False)
 class _Open:
-    """An interval (s) without a polynomial, and the longer one of which it is a part."""
+    """An interval (s) without a polynomial, a part of a longer one."""
 
     low: float
     high: float
@@ -53,10 +53,7 @@ class _Open:
     def is_rough(
         self, tail: float, times: Array, values: Array, scale: float, rough: float
     ) -> bool:
-        """Return whether a polynomial with this tail has errors of the method that are not smooth.
-
-        The errors at `times` (s), relative to `scale`, and the tail must be below `rough`.
-        """
+        """Return whether the method has errors, below `rough`, that are not smooth."""
         if self.whole is None or not self.tail / _DIVIDED < tail <= rough:
             return False
         # A fast wave between few nodes has small tails too, but another polynomial.
@@ -71,13 +68,10 @@ Rows = Callable[[Array, float], Trajectory]
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """The states at any times, computed by the method itself."""
-
     rows: Rows
     tolerance: float
 
     def __call__(self, times: Array) -> Array:
-        """Return the states at `times` (s), one row for each."""
         if not times.size:
             return self(np.zeros(1))[:0]
         each, place = np.unique(times, return_inverse=True)
@@ -87,10 +81,9 @@ class _Solved:
 def dense_output(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float, is_closed: bool
 ) -> DenseOutput:
-    """Return the solution of a scene as a function of time, between 0 and the rows of `found`.
+    """Return the solution as a function of time, between 0 and the rows of `found`, in order.
 
-    The rows are in order of time; `rows` returns more of the same method. `finest` is the method's
-    smallest tolerance; a tolerance of 1 means a fixed step. Raise InputError if too many
+    `rows` returns more of them; a tolerance of 1 means a fixed step. Raise InputError if too many
     polynomials would be needed.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
@@ -105,10 +98,7 @@ def dense_output(
 def state_pieces(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float
 ) -> Pieces:
-    """Return the solution as polynomials, a closed form too, between 0 and the rows of `found`.
-
-    There must be a row at a time other than 0.
-    """
+    """Return the solution as polynomials; there must be a row at a time other than 0."""
     ends = sorted({0.0, *found.time[[0, -1]].tolist()})
     if tolerance == 1.0:
         return _of_fixed_steps(scene, ends, rows, partial(rates, scene))
@@ -123,8 +113,8 @@ def _first_edges(
 ) -> list[float]:
     """Return the ends of the first intervals (s), among them all changes of tables.
 
-    A short torque hardly shows at the few nodes of an interval, but in the steps of a Taylor
-    series. An interval with a short step is divided where its steps end.
+    A short torque shows in the steps of a Taylor series, at which an interval is therefore divided,
+    but hardly at few nodes.
     """
     tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
     inner = {time for time in (tape.breaks if tape else ()) if ends[0] < time < ends[-1]}
@@ -158,8 +148,7 @@ def _fitted(
 ) -> Pieces:
     """Return polynomials through the rows of a method, for intervals that are divided as needed.
 
-    `own` are tolerances of the rows, the second for when the first can't be met; `rough` is their
-    largest error that is not smooth, relative to the largest |omega|.
+    `own` are two tolerances of the rows, `rough` is their largest error that is not smooth.
     """
     open_pieces = [_Open(low, high) for low, high in itertools.pairwise(edges)]
     done: dict[float, tuple[float, Array]] = {}
@@ -212,7 +201,7 @@ def _fitted(
 def _of_fixed_steps(
     scene: Scene, ends: list[float], rows: Rows, derivatives: Callable[[Array, Array], Array]
 ) -> Pieces:
-    """Return the cubic polynomials that have the states and derivatives at the ends of steps."""
+    """Return the cubics with the states and derivatives at the ends of steps."""
     step = scene.step_size
     steps = [math.ceil(abs(end) / step) for end in ends]
     if max(steps) > _MOST_PIECES:

@@ -57,19 +57,14 @@ class Ensemble(BatchResult):
 
     @property
     def error(self) -> Array | None:
-        """The estimated errors, shape (n,); None if not requested, NaN where unknown.
-
-        They are relative to the largest component of omega so far; with attitudes, the larger of
-        this and the angle (rad).
-        """
+        """The estimated errors, shape (n,), as of `Trajectory`; NaN where unknown."""
         return None if self.estimates is None else self.estimates[:, 0]
 
     @property
     def growth(self) -> Array | None:
-        """The error amplifications, shape (n,); None if not requested, NaN where unknown.
+        """The error amplifications, shape (n,); NaN where unknown.
 
-        Each is the largest norm of the state-transition matrices from 0 on, or a bound of that to
-        the end.
+        Each is the largest norm of state-transition matrices from 0 on, or a bound to the end.
         """
         return None if self.estimates is None else self.estimates[:, 1]
 
@@ -84,10 +79,7 @@ _NO_ESTIMATES = np.empty((2, 0), order="F")
 def place_for(
     out: "Ensemble | Array | None", n: int, with_attitude: bool, with_estimates: bool = False
 ) -> Ensemble:
-    """Return an Ensemble for the results of n bodies: `out`, or one with the array `out`, or new.
-
-    Raise InputError if an array of `out` has the wrong shape or type.
-    """
+    """Return `out`, or a new Ensemble, for n bodies; raise InputError for a wrong array."""
     shape = (n, 3)
     if out is None or isinstance(out, np.ndarray):
         omega = np.empty(shape) if out is None else buffer_of("out", out, shape, "d")

@@ -97,7 +97,7 @@ class Solution:
 
     @cached_property
     def _largest(self) -> Array:
-        """The largest component of omega (rad/s) between time 0 and the ends of each polynomial."""
+        """The largest component of omega (rad/s) up to the end of each polynomial."""
         sizes = np.abs(self.pieces.values[:, :, :3]).max(axis=(1, 2))
         count = int(np.sum(self.pieces.edges[:-1] < 0.0))
         before, after = np.maximum.accumulate(sizes[:count][::-1])[::-1], sizes[count:]
@@ -165,7 +165,7 @@ def _all_fits(parts: list[Fits]) -> Fits:
 
 
 def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> Array:
-    """Return the noise of a function on intervals, the largest at three of their nodes."""
+    """Return the largest noise at three nodes of each interval."""
     if not low.size:
         return np.zeros(0)
     times = nodes(low, high, POINTS)[:, NODES // 6 :: NODES // 3]
@@ -181,7 +181,7 @@ def with_noise(g: EventFunction, solution: Solution, fits: Fits) -> Fits:
 
 
 def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
-    """Return the sign changes between adjacent nodes of intervals, without further refinement."""
+    """Return the sign changes between adjacent nodes of intervals."""
     values = values.copy()
     values[:, 0] = first
     is_negative = values < 0.0
@@ -214,10 +214,9 @@ class ZeroIntervals:
     after: Array
 
     def roots(self, counts_touches: bool) -> Roots:
-        """Return the roots that stand for the intervals.
+        """Return the roots where the integration from 0 reaches the intervals.
 
-        A root is where the integration from 0 reaches the interval. If touches do not count, only
-        changes between the two sides are roots.
+        If touches do not count, only changes between the two sides are roots.
         """
         is_before = self.high < 0.0
         is_first = (self.low <= 0.0) & ~is_before
@@ -289,8 +288,7 @@ def _refined(
 ) -> Array:
     """Return the times, between two lists of times, from which on a function is below a level.
 
-    The polynomial beside a kink may extend beyond it. Kinks of the solution are at the ends of its
-    polynomials.
+    A polynomial may extend beyond a kink; those of the solution are at its ends.
     """
     inner, outer = ends.copy(), others.copy()
     k = np.flatnonzero(~np.isin(inner, solution.pieces.edges))
@@ -306,7 +304,6 @@ def _refined(
 
 
 def _beside(solution: Solution, times: Array, side: int) -> Array:
-    """Return times slightly before (-1) or after (1) others."""
     edges = solution.pieces.edges
     piece = np.searchsorted(edges, times, side="left" if side < 0 else "right") - 1
     piece = np.clip(piece, 0, len(edges) - 2)

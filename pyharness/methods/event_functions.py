@@ -72,10 +72,7 @@ class EventFunction:
     is_vectorized: bool | None = None
 
     def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:
-        """Return the values at `times` (s) and `states`, one row each.
-
-        Raise InputError if a value is not finite.
-        """
+        """Return a row of values each; raise InputError if one is not finite."""
         columns = (states[:, :3].T, states[:, 3:].T, None if rates is None else rates[:, :3].T)
         found = self._of_arrays(times, *columns) if self.is_vectorized is not False else None
         if found is None:
@@ -92,7 +89,7 @@ class EventFunction:
     def _of_arrays(
         self, times: Array, omega: Array, attitude: Array, rates: Array | None
     ) -> Array | None:
-        """Return the values for arrays of arguments, or None if the function takes no arrays."""
+        """Return the values for arrays, or None if the function takes none."""
         try:
             with np.errstate(all="ignore"):
                 found = self.event.function(times.copy(), omega.copy(), attitude.copy(), rates)
@@ -171,7 +168,7 @@ def _without_attitude(given: Callable[..., Any]) -> Callable[[Any, Any, Any, Any
 
 
 def _arguments(given: Callable[..., Any], name: str) -> int:
-    """Return the number of arguments with which a function is called, 2 or 3."""
+    """Return the number of arguments of a function, 2 or 3."""
     try:
         signature = inspect.signature(given)
     except (TypeError, ValueError):

@@ -1,10 +1,9 @@
 """Isolation of all real roots of polynomials on intervals, for many intervals at once.
 
-No Chebyshev polynomial exceeds 1 on the interval, so that coefficients with |c[0]| > |c[1]| +
-|c[2]| + ... exclude a root. The same bound for the derivative leaves at most one root, and for the
-second derivative at most two, with one extremum between them. Other intervals are divided in two.
-No root is therefore missed, as it may be by sampling (Trefethen 2013, Approximation Theory and
-Approximation Practice, chapters 3 and 18).
+No Chebyshev polynomial exceeds 1 on the interval, so that |c[0]| > |c[1]| + |c[2]| + ... excludes a
+root. The same bound for the derivative leaves at most one root, and for the second derivative at
+most two, with one extremum between. Other intervals are halved, so that no root is missed
+(Trefethen 2013, Approximation Theory and Approximation Practice, chapters 3 and 18).
 """
 
 from dataclasses import dataclass
@@ -32,7 +31,7 @@ FIT_ERROR = 4e-13
 
 
 def _transforms() -> tuple[Array, Array, Array]:
-    """Return matrices for the coefficients of the derivative, and of the two halves."""
+    """Return matrices for the derivative, and for the two halves."""
     slope = np.zeros((NODES, NODES))
     slope[:-1] = chebyshev.chebder(np.eye(NODES))
     left = TO_COEFFICIENTS @ chebyshev.chebvander(0.5 * (POINTS - 1.0), NODES - 1)
@@ -133,10 +132,7 @@ def may_vanish(fits: Fits) -> Array:
 
 
 def isolated(fits: Fits) -> Roots:
-    """Return all roots of polynomials, and the extrema that may be 0 to within the fit.
-
-    Roots that the fit does not distinguish are all returned, for the caller to combine.
-    """
+    """Return all roots of polynomials, even undistinguished, and extrema that may be 0."""
     near = np.maximum(fits.noise, FIT_ERROR * fits.sizes)
     smallest = np.maximum(fits.noise / 16.0, 1e-15 * fits.sizes)
     found = [_at(fits, np.zeros(0), np.zeros(0, dtype=int), np.zeros(0, dtype=int), near)]
@@ -189,7 +185,7 @@ def _has_no_root(coefficients: Array) -> Array:
 
 
 def _at(fits: Fits, x: Array, change: Index, number: Index, near: Array) -> Roots:
-    """Return roots at the points x, from -1 to 1, of the polynomials of the given numbers."""
+    """Return roots at the points x, from -1 to 1, of some polynomials."""
     half = 0.5 * fits.high[number] - 0.5 * fits.low[number]
     time = 0.5 * fits.low[number] + 0.5 * fits.high[number] + half * x
     time = np.clip(time, fits.low[number], fits.high[number])
@@ -201,7 +197,6 @@ def _at(fits: Fits, x: Array, change: Index, number: Index, near: Array) -> Root
 
 
 def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
-    """Return one root of each polynomial where its sign changes to `sign`."""
     slopes = c @ _DERIVATIVE.T
     x = 0.5 * (low + high)
     for _ in range(80):
@@ -222,7 +217,7 @@ def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
 def _bent(
     c: Array, first: Array, last: Array, slopes: Array, near: Array
 ) -> list[tuple[Array, Index, Index]]:
-    """Return the roots of polynomials with one extremum at most: points, changes and numbers."""
+    """Return the roots of polynomials with one extremum at most."""
     count = len(c)
     low, high = np.full(count, -1.0), np.ones(count)
     starts, ends = values_at(slopes, low), values_at(slopes, high)

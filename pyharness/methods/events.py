@@ -1,10 +1,9 @@
 """Events: the times at which functions of time, omega and attitude are 0.
 
-The solution is a polynomial on each of many intervals. A function of it is approximated by
-polynomials on the same intervals, which are divided until they have converged, and all their roots
-are isolated. Close and double roots of a smooth function are therefore found. Where a function is
-not smooth, the intervals become tiny, and sign changes between nodes are found, but not one that is
-undone before the next node.
+The solution is a polynomial on each of many intervals. A function of it is approximated on these,
+which are divided until the polynomials have converged, and all their roots are isolated: also close
+and double roots of a smooth function. Where it is not smooth, intervals become tiny, and sign
+changes between nodes are found, but not one that is undone before the next node.
 """
 
 import math
@@ -33,9 +32,9 @@ _WIDER = 16.0  # factor on the half width of an interval, until the sign changes
 
 
 def event_roots(g: EventFunction, solution: Solution) -> Roots:
-    """Return all events of a function between the ends of the solution, in ascending order.
+    """Return all events of a function, with sign changes in the order of time.
 
-    Sign changes are in the order of time; those at an end are to, or from, the values beside it.
+    Those at an end are to, or from, the values beside it.
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         fits, rough = fitted(g, solution)
@@ -52,7 +51,7 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
 
 
 def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
-    """Return roots with the noise at their own times, without extrema that are not near 0."""
+    """Return roots with the noise at their own times, without extrema not near 0."""
     if not roots.time.size:
         return roots
     noise = solution.noise(g, roots.time) + ROUNDING / FIT_ERROR * roots.near
@@ -64,7 +63,6 @@ def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
-    """Return roots whose times are improved by the function itself."""
     if not roots.time.size:
         return roots
     time, value = roots.time, solution.values(g, roots.time)
@@ -83,7 +81,7 @@ def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index) -> Array:
-    """Return the times of roots, those of inexact changes of sign by bisection.
+    """Return the times of roots, those of inexact sign changes by bisection.
 
     A root of odd multiplicity is lost in the errors of polynomials, but not of signs.
     """
@@ -116,7 +114,6 @@ def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index
 def _have_change(
     g: EventFunction, solution: Solution, low: Array, high: Array, changes: Index
 ) -> Index:
-    """Return in which intervals a function has a change of sign."""
     values = solution.values(g, np.concatenate([low, high]))
     first, last = values.reshape(2, -1) * changes
     found: Index = (first < 0.0) & (last > 0.0)
@@ -124,7 +121,6 @@ def _have_change(
 
 
 def _at_ends(g: EventFunction, solution: Solution) -> Roots:
-    """Return the roots at the ends of the solution, and at time 0."""
     edges = solution.pieces.edges
     ends = np.unique([edges[0], 0.0, edges[-1]])
     # A function that is not 0 to rounding at an end is on one side of 0 there.
@@ -137,7 +133,6 @@ def _at_ends(g: EventFunction, solution: Solution) -> Roots:
 
 
 def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
-    """Return roots in which those that can't be distinguished from each other are one."""
     count = len(roots.time)
     if not count:
         return roots
@@ -169,10 +164,7 @@ def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _have_any_sign(g: EventFunction, solution: Solution, times: Array) -> Index:
-    """Return at which times rounding errors of the state decide the sign of a function.
-
-    Where a function jumps, its own values do not show it.
-    """
+    """Return at which times rounding errors of the state decide the sign, as at a jump."""
     found: Index = np.zeros(len(times), dtype=bool)
     if not times.size:
         return found
@@ -188,10 +180,7 @@ def _have_any_sign(g: EventFunction, solution: Solution, times: Array) -> Index:
 
 
 def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:
-    """Return which adjacent roots are a pair only because of the errors of the polynomials.
-
-    The function is 0, to within noise, at the extremum between.
-    """
+    """Return which adjacent roots are a pair only by errors, around an extremum that is 0."""
     found: Index = np.zeros(len(noise), dtype=bool)
     gap = np.diff(roots.time)
     for k in (slice(None, -1), slice(1, None)):
@@ -207,7 +196,7 @@ def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise
 def _with_extrema(
     g: EventFunction, solution: Solution, roots: Roots, ends: tuple[float, ...]
 ) -> Roots:
-    """Return roots in which a double one, which may be one of a pair, is at the extremum."""
+    """Return roots in which a double one is at its extremum."""
     is_double = (roots.change == 0) & ~np.isin(roots.time, ends)
     if not is_double.any():
         return roots
@@ -222,7 +211,7 @@ def _with_extrema(
 
 
 def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) -> int:
-    """Return the number of the root that stands for a group: an end, or the middle one."""
+    """Return the root that stands for a group: an end, or the middle one."""
     at_end = group[np.isin(roots.time[group], ends)]
     if at_end.size:
         return int(at_end[0])
@@ -234,7 +223,7 @@ def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) ->
 def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Array:
     """Return the times of the events after (1) or before (-1) 0, in the order away from 0.
 
-    As in SciPy, a root at 0 has the sign change from 0, and one at the end that to 0.
+    As in SciPy, sign changes at 0 are from 0, and those at the end to 0.
     """
     end = solution.pieces.edges[-1 if side > 0 else 0]
     if side * end <= 0.0:
@@ -257,7 +246,7 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
 def _repeated(
     g: EventFunction, solution: Solution, times: Array, side: int, period: float
 ) -> Array:
-    """Return the times of all events on one side of 0, also beyond the polynomials."""
+    """Return all events on one side of 0, also beyond the polynomials."""
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min

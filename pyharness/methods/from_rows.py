@@ -18,12 +18,9 @@ _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
     """Return the attitudes at the times (s) of a table of omega (rad/s), shape (n, 4).
 
-    `scene` supplies omega and attitude at time 0. Quaternions are from body to space, scalar first.
-
     Each row is one commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003): two
-    exponentials of weighted sums of omega at the Gauss points, from a cubic polynomial through two
-    rows and their derivatives by Euler's equations. After a rotation that overflows, all attitudes
-    are NaN.
+    exponentials of weighted sums of omega at the Gauss points, from the cubic through two rows and
+    their derivatives. After a rotation that overflows, all attitudes are NaN.
     """
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])
@@ -47,10 +44,7 @@ def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
 
 
 def _between(rows: Array, slopes: Array, span: Array, part: float) -> Array:
-    """Return omega (rad/s), (n, 3), at the fraction `part` of n steps, by cubic Hermite.
-
-    `slopes` (rad/s2) are the derivatives of `rows`, (n + 1, 3), and `span`, (n, 1), the steps (s).
-    """
+    """Return omega (rad/s), (n, 3), at the fraction `part` of n steps, by cubic Hermite."""
     rest = 1.0 - part
     ends = (
         rest * rest * (1.0 + 2.0 * part) * rows[:-1] + part * part * (1.0 + 2.0 * rest) * rows[1:]
@@ -60,7 +54,7 @@ def _between(rows: Array, slopes: Array, span: Array, part: float) -> Array:
 
 
 def _turn(angle: Array) -> list[Quaternion]:
-    """Return the quaternions, scalar first, of n rotation vectors (rad), shape (n, 3)."""
+    """Return the quaternions of n rotation vectors (rad)."""
     half = 0.5 * np.linalg.norm(angle, axis=1)
     parts = np.column_stack([np.cos(half), 0.5 * np.sinc(half / np.pi)[:, None] * angle])
     return [(w, x, y, z) for w, x, y, z in parts.tolist()]

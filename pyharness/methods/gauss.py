@@ -29,10 +29,10 @@ _NEAR_THE_END = 1e300
 def gauss(stages: int) -> Integrator:
     """Return a solver by Gauss collocation with 1 to 8 `stages`, of twice this order.
 
-    Let d be the largest difference in omega between two successive solutions, and r the quotient of
-    their step sizes, at most 2. The estimated error of the finer is 2 d / (r**p - 1), where 2 is
-    for safety, and p the order, but at most 8: methods of higher order take longer steps, with
-    which the error does not yet fall at the full order.
+    With d the largest difference in omega between two solutions, and r <= 2 the quotient of their
+    steps, the estimated error of the finer is 2 d / (r**p - 1). The 2 is for safety; p is the
+    order, but at most 8: methods of higher order take longer steps, with which the error does not
+    yet fall at the full order.
     """
 
     def solve(
@@ -120,17 +120,15 @@ class _Solution:
     evaluations: int
 
     def difference(self, other: "_Solution", n: int) -> float:
-        """Return the largest difference of two solutions in the first `n` rows (rad/s)."""
         return float(np.abs(self.rows[:, :n] - other.rows[:, :n]).max(initial=0.0))
 
     def blows_up(self, coarser: "_Solution", start: float) -> bool:
         """Return whether this solution and a coarser one end because omega grows without bound.
 
-        Both must end before the last time, at nearly the same time. With m the largest |omega|
-        (rad/s) at the end, either m exceeds 1e300 in both, or the finer m exceeds 1.5 coarser m,
-        and this product 1000 times `start` and every |omega| at a requested time. `start` is the
-        largest initial |omega| (rad/s), or that by torque alone; perhaps no requested time is
-        reached.
+        Both end before the last time, and nearly together. With m the largest |omega| (rad/s)
+        there, m exceeds 1e300 in both, or the finer m exceeds 1.5 coarser m, and this product 1000
+        times every |omega| at a requested time, if any, and `start`, the initial one or that by
+        torque alone.
         """
         if COMPLETE in (self.status, coarser.status):
             return False
@@ -143,11 +141,10 @@ class _Solution:
 
 
 class _Kernel(NamedTuple):
-    """The function that solves a scene with equal steps, and quantities that determine its steps.
+    """The function that solves a scene with equal steps, and what determines its steps.
 
-    `solution` takes the largest step size (s), and `counts` returns its numbers of steps. `rate` is
-    the largest rate (rad/s) of the phases of motion and torque, `pushed` the omega (rad/s) by the
-    torque alone, and `most` the work limit, in right-hand sides.
+    `rate` (rad/s) is that of the phases of motion and torque, `pushed` the omega (rad/s) by the
+    torque alone, and `most` the work limit in right-hand sides.
     """
 
     solution: "Callable[[float], _Solution]"
@@ -175,16 +172,12 @@ def _kernel(scene: Scene, stages: int, times: Sequence[float], effort: float) ->
 
 
 def _step_counts(lengths: Array, step: float) -> Array:
-    """Return the number of equal steps in each interval of `lengths` (s).
-
-    A step exceeds `step` (s) by at most a relative 1e-6.
-    """
+    """Return the number of steps in each interval, at most `step` (s) and a relative 1e-6 long."""
     with np.errstate(over="ignore", divide="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 
 
 def _lengths(times: Sequence[float]) -> Array:
-    """Return the lengths (s) of the intervals between 0 and the requested times, above 0."""
     lengths = np.abs(np.diff(np.array(times, dtype=float), prepend=0.0))
     found: Array = lengths[lengths > 0.0]
     return found
@@ -193,7 +186,6 @@ def _lengths(times: Sequence[float]) -> Array:
 def _first_step(rate: float, shortest: float) -> float:
     """Return a first step size (s), in which each phase grows by at most about half a radian.
 
-    The `shortest` interval (s) is a multiple of it, so that its number of steps exactly doubles
-    when it is halved.
+    It divides the `shortest` interval (s), so that halving doubles the number of steps exactly.
     """
     return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))

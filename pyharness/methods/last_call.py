@@ -1,6 +1,6 @@
-"""The status of the last call of a prepared solver, and the error estimates of its result.
+"""The status of this thread's last call of a prepared solver, and its error estimates.
 
-Each report is on this thread's last call; a call that raised an error or was interrupted is none.
+A call that raised an error or was interrupted is none.
 """
 
 from dataclasses import replace
@@ -35,7 +35,7 @@ class LastCall:
         def _ending(self) -> tuple[int, int, float, float, Triple, float] | None: ...
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and the arguments with which `copy` and `pickle` recreate the solver."""
+        """Return the class and the arguments for `copy` and `pickle`."""
         return type(self), (self.plan, *self._given)
 
     def __repr__(self) -> str:
@@ -44,7 +44,6 @@ class LastCall:
 
     @property
     def _scene_of_calls(self) -> Scene:
-        """The scene about the axes of the arguments and results."""
         return self.plan.scene
 
     @property
@@ -68,10 +67,10 @@ class LastCall:
     def status(self) -> str:
         """Return how the last call ended; ``complete`` before the first.
 
-        ``gave up`` means that the work limit was exceeded, or no correct digit of the phase was
-        left, and ``refused`` that the method does not apply. A ``sensitive`` call has a result,
-        with `digits` correct digits, but amplified rounding errors exceed the tolerance; to find
-        this takes microseconds for a closed form, and milliseconds for Gauss collocation.
+        ``gave up``: the work limit was exceeded, or no correct digit of the phase left;
+        ``refused``: the method does not apply; ``sensitive``: amplified rounding errors exceed the
+        tolerance, and leave `digits`. To find the last takes microseconds for a closed form,
+        milliseconds for Gauss collocation.
         """
         return self._found()[0]
 
@@ -79,17 +78,14 @@ class LastCall:
     def error(self) -> float | None:
         """Return the estimated error of the last result, or None.
 
-        It is relative to the largest component of omega so far; with attitude, the larger of this
-        and the angle (rad).
+        It is relative to the largest component of omega so far, or the angle (rad) if that is
+        larger.
         """
         return self._found()[1]
 
     @property
     def growth(self) -> float | None:
-        """Return the error amplification of the last motion, at least 1, or None if unknown.
-
-        It is the largest norm of the derivatives of the last omega with respect to an earlier one.
-        """
+        """Return the error amplification of the last motion, or None, as in `Trajectory`."""
         return self._found()[2]
 
     @property
@@ -103,12 +99,11 @@ class LastCall:
         return abs(self._counted())
 
     def _counted(self) -> int:
-        """Return the number of steps, negative if the kernel chose `quick` instead of `taylor`."""
+        """Return the number of steps, negative if the kernel chose `quick`."""
         ending = self._ending
         return 0 if ending is None else ending[1]
 
     def _found(self) -> tuple[str, float | None, float | None]:
-        """Return status, estimated error and `growth`; None if unknown."""
         ending = self._ending
         if ending is None:
             return "complete", None, None

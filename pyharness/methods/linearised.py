@@ -11,16 +11,13 @@ _HUGE = 1e100  # limit of a matrix element, which keeps products finite
 def propagators(scene: Scene, times: Array, omega: Array) -> Array:
     """Return the state-transition matrix of omega from each time to the last, shape (n, 3, 3).
 
-    `omega` (rad/s, shape (n, 3)) must change little from each of the `times` (s) to the next.
+    Omega (rad/s) must change little from each time (s) to the next.
     """
     return transitions(times, jacobians(scene, 0.5 * (omega[1:] + omega[:-1])))
 
 
 def transitions(times: Array, slopes: Array) -> Array:
-    """Return the state-transition matrix from each time to the last, shape (n, m, m).
-
-    `slopes`, shape (n - 1, m, m), are the Jacobian matrices (1/s) in the middle of the intervals.
-    """
+    """Return the state-transition matrices, (n, m, m), from Jacobians (1/s) between the times."""
     # The Jacobian hardly changes from one time to the next. Therefore the exponential of the
     # Jacobian times the interval is the state-transition matrix over this interval.
     pieces = exponentials(np.diff(times)[:, None, None] * slopes)
@@ -38,9 +35,9 @@ def growth(propagators: Array) -> float:
 
 
 def exponentials(small: Array) -> Array:
-    """Return the exponentials of matrices, (n, m, m), of norm below 1, by Taylor's polynomial.
+    """Return the exponentials of matrices of norm below 1, by Taylor's polynomial of degree 8.
 
-    Its degree is 8, and the norm of the truncation error below 3.1e-6.
+    The norm of the truncation error is below 3.1e-6.
     """
     one = np.eye(small.shape[-1])
     total = np.broadcast_to(one, small.shape)

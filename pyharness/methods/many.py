@@ -1,7 +1,6 @@
 """Solution of many bodies in one call, in parallel in the kernel and in several threads.
 
-The result of a body is bit-for-bit the same whatever the other bodies, their order and the number
-of threads.
+A result is bit-for-bit the same whatever the other bodies, their order and the threads.
 """
 
 from collections.abc import Iterable, Sequence
@@ -189,7 +188,6 @@ def _solved(
     out: "Ensemble | Array | None", step: Number | None, *, method: str, tolerance: Number | None,
     effort: float, estimates: bool, threads: int,
 ) -> Ensemble:  # fmt: skip
-    """Return the final states; `arrays` has the arrays of `solve_many` by name."""
     own = {name: value for name, value in arrays.items() if value is not None}
     kind = only_one({name: own[name] for name in _BODY if name in own})
     ready: dict[str, Any] = {}
@@ -264,11 +262,10 @@ def _solve_groups(
     scenes: list[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
     **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Solve scenes that need several kernel calls, and return all final states in their order.
+    """Return the final states of scenes that need several kernel calls.
 
-    Scenes with moments or coefficients share one call, scenes with an inertia matrix another. A
-    torque about the axes of space, or that depends on the state, has a call of its own. `settings`
-    are further arguments of `solve_many`.
+    Bodies with moments or coefficients share one, those with an inertia matrix another; a torque in
+    space or of the state has its own.
     """
     check_alike(scenes)
     if scenes[0].attitude is None and any(each.torque.needs_attitude for each in scenes):
@@ -297,12 +294,7 @@ def _solve_groups(
 
 
 class _Bodies:
-    """The checked arguments of the kernel that solves n bodies in one call.
-
-    `ready` has the rows of a scene, as `rows_of_scene` returns them, and may be empty; `own` has
-    arrays that replace them, and the final times `t_end` (s). `code` selects the method in the
-    kernel.
-    """
+    """The checked arguments of the kernel: `ready` rows of a scene, replaced by `own` arrays."""
 
     def __init__(
         self, ready: dict[str, Any], own: dict[str, Any], step: float, code: int, tolerance: float,
@@ -340,7 +332,6 @@ class _Bodies:
             )
 
     def solve(self, threads: int, out: "Ensemble | Array | None", with_estimates: bool) -> Ensemble:
-        """Return the final states, written into `out` if it is not None."""
         found = place_for(out, self.n, self.attitude is not None, with_estimates)
         if found.estimates is not None:
             found.estimates[:] = _UNKNOWN
@@ -371,10 +362,7 @@ class _Bodies:
 
 
 def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:
-    """Return the integer that selects a method in the kernel, and the tolerance.
-
-    Raise InputError if the method is unknown or the tolerance out of range.
-    """
+    """Return the kernel's integer for a method, and the tolerance, or raise InputError."""
     if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)
     finest = max(FINEST, REGISTRY[method].finest if method == "quick" else 0.0)

@@ -29,8 +29,7 @@ def many_attitudes(
 ) -> tuple[Array, Array, NDArray[np.int8]]:  # fmt: skip
     """Solve one scene from n initial omegas and attitudes, as `AttitudeSolver.many` does.
 
-    Each is solved alone if the torque is about the axes of space or depends on the state, or if
-    moments change or belong to a full matrix. Raise InputError for another shape.
+    Torques in space or of the state, changing moments and full matrices are solved one by one.
     """
     starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
     n = len(starts)

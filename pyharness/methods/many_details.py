@@ -31,11 +31,7 @@ class Details:
         tolerance: Number | None, effort: float, events: object,
         sensitivities: Iterable[str] | None,
     ) -> None:  # fmt: skip
-        """Check the request; copy the arrays, over which the results may be written.
-
-        Raise InputError for a method without events and sensitivities, an event that is no function
-        or is terminal, and an unknown parameter.
-        """
+        """Check the request, or raise InputError; copy the arrays, which may be overwritten."""
         if method not in _METHODS:
             where = "sensitivities" if events is None else "events"
             raise InputError(f"{where}: the method is {method}; allowed: {', '.join(_METHODS)}")
@@ -108,7 +104,7 @@ class Details:
         return self.scenes[i] if self.scenes else scene_of_row(self.scene, self.rows, i)
 
     def _any_scene(self) -> Scene:
-        """Return the scene of the first body whose numbers are allowed, or else the common one."""
+        """Return the first scene whose numbers are allowed, or else the common one."""
         for i in range(max(map(len, self.rows.values()), default=0)):
             try:
                 return self._scene_of(i)
@@ -118,7 +114,7 @@ class Details:
 
 
 def _checked_rows(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return copies of the arrays of `solve_many` that were given, one row for each body."""
+    """Return copies of the given arrays, one row for each body."""
     rows = rows_of_bodies(arrays)
     for name, shape in (("coefficients", 3), ("omega0", 3), ("attitude0", 4)):
         if arrays[name] is not None:
@@ -129,7 +125,6 @@ def _checked_rows(arrays: dict[str, Any]) -> dict[str, Array]:
 
 
 def _stacked(names: Sequence[str], slopes: Sequence[dict[str, Array] | None]) -> dict[str, Array]:
-    """Return the derivatives of all bodies by name, NaN for a body without them."""
     known = next((each for each in slopes if each is not None), None)
     found = {}
     for name in names:

@@ -18,9 +18,8 @@ def solve_side_by_side(
 ) -> list[int]:  # fmt: skip
     """Solve the bodies in `piece` side by side, and return the numbers of those that are left.
 
-    The arrays have a row for each body, or one for all: initial omegas (rad/s), final times (s),
-    attitudes or None. A body is left if its error can't be measured; all are, if the torque is
-    neither recorded nor about the axes of space, or the solver does more than its kernel.
+    Left is a body whose error can't be measured; all are, if the torque is neither recorded nor in
+    space, or the solver does more than its kernel.
     """
     is_plain = "__call__" not in vars(type(solver))
     packed = getattr(solver, "packed_for_lanes", solver.packed) if is_plain else None

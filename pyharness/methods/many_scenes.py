@@ -23,7 +23,7 @@ class Axes:
     """The principal axes of n bodies, or one set for all, and conversions to and from them."""
 
     def __init__(self, axes: Array, turns: Array) -> None:
-        """Store the axes, columns of `axes`, (n, 3, 3), and the same as quaternions, (n, 4)."""
+        """Store the axes, columns of `axes`, (n, 3, 3), also as quaternions, (n, 4)."""
         self.axes, self.turns = axes, turns
 
     def about_principal(self, given: dict[str, Any], names: Iterable[str]) -> None:
@@ -50,10 +50,10 @@ class Axes:
 
 
 def from_rows(rows: Sequence[Scene | None]) -> tuple[dict[str, Any], Axes]:
-    """Return scenes with full inertia matrices as arrays of `solve_many` about principal axes.
+    """Return scenes with full inertia matrices as arrays about principal axes; None as NaN.
 
-    The row of a None is NaN, so that the kernel refuses it. Coefficients A, B, C replace moments:
-    `principal` computes them more accurately than rounded moments would give.
+    Coefficients A, B, C replace moments: `principal` computes them more accurately than rounded
+    moments would give.
     """
     each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
     axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))
@@ -84,13 +84,12 @@ def _full_row(scene: Scene) -> dict[str, Any]:
 
 
 def _filled(laws: list[Any]) -> list[Any]:
-    """Return the waves of several torque laws, the shorter lists with waves of amplitude 0."""
+    """Return lists of waves filled up to one length."""
     most = max(map(len, laws))
     return [waves + [[0.0] * 4] * (most - len(waves)) for waves in laws]
 
 
 def _from_scene(scene: Scene) -> dict[str, Any]:
-    """Return the quantities of a scene as a dict of arguments of `solve_many`."""
     law = checked_scene(scene).body_torque
     kind = "coefficients" if scene.moments is None else "moments"
     return {
@@ -108,10 +107,9 @@ _kept: dict[int, tuple[Scene, dict[str, Any]]] = {}
 
 
 def rows_of_scene(scene: Scene) -> dict[str, Any]:
-    """Return `checked_rows` of a scene, which the caller must not change; they are kept.
+    """Return `checked_rows` of a scene, kept and not to be changed, and its `merged` torque.
 
-    `merged` has the torque after `with_merged_rows`. For few bodies the conversion takes longer
-    than the solution.
+    For few bodies the conversion takes longer than the solution.
     """
     # Equal scenes may differ in the signs of zeros. Hence an entry holds for one object only, and
     # keeps it alive so that no other object gets its identity.
@@ -127,10 +125,7 @@ def rows_of_scene(scene: Scene) -> dict[str, Any]:
 
 
 def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
-    """Return the arrays of `solve_many` as float arrays with one row per body, or one for all.
-
-    Raise InputError for another shape, or elements that are not real numbers.
-    """
+    """Return float arrays with one row per body, or one for all; raise InputError for others."""
     rows = {}
     for name, convert in _CONVERSIONS.items():
         values = given.get(name)
@@ -150,10 +145,7 @@ def check_alike(scenes: Sequence[Scene]) -> None:
 
 
 def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
-    """Return the arrays of `solve_many` for scenes, a row each.
-
-    Raise InputError if there is none, or if one call of the kernel can't solve all.
-    """
+    """Return arrays for scenes, or raise InputError if one kernel call can't solve all."""
     if not scenes:
         raise InputError("the sequence of scenes is empty; give at least one scene")
     check_alike(scenes)
@@ -167,7 +159,6 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 
 def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return arrays with one row for each of the dicts `rows`."""
     found: dict[str, Any] = {"attitude0": None}
     for name in ("moments", "coefficients", "omega0", "torque_constant", "torque_rate"):
         if name in rows[0]:

@@ -1,7 +1,7 @@
 """Conversion of many bodies, given by arrays, to one scene each, for `solve_many`.
 
-Torques about the axes of space or that depend on the state, and full inertia matrices, need this.
-Bodies under such torques are solved here, one after the other, by prepared solvers.
+Full inertia matrices need it, and torques about the axes of space or of the state, whose bodies
+prepared solvers solve here, one after the other.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,10 +31,9 @@ NO_ATTITUDE = "the torque needs the initial attitude; give attitude0, or scenes 
 
 
 def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
-    """Return whether no kernel takes several bodies under this torque, or of changing inertia.
+    """Return whether no kernel takes several bodies of this kind.
 
-    `arrays` are those of the torque, about the axes that the scene's `frame` names; None means not
-    given. Raise InputError for one beside a torque that depends on the state.
+    Raise InputError for an array of the torque beside one that depends on the state.
     """
     named = [name for name, each in arrays.items() if each is not None]
     if isinstance(scene.torque, StateTorque):
@@ -52,11 +51,9 @@ def solve_one_by_one(
     scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
     method: str, tolerance: float, effort: float, estimates: bool, threads: int,
 ) -> Ensemble:  # fmt: skip
-    """Return the final states of many bodies, each of which is solved alone.
+    """Return the final states of bodies that are each solved alone; invalid ones are REFUSED.
 
-    The arguments are those of `solve_many`. A body whose numbers are not allowed is NaN and
-    REFUSED. Raise InputError if the torque needs an attitude that is not given, or a torque about
-    the axes of space acts on bodies given by coefficients.
+    Raise InputError if the torque lacks an attitude, or in space acts on coefficients.
     """
     check_torque(scene, method, attitude=True)
     check_prepared(scene, method)
@@ -129,10 +126,9 @@ _kept: dict[tuple[int, str, float, float, bool], tuple[Scene, Any]] = {}
 def _kept_solver(
     scene: Scene, method: str, tolerance: float, effort: float, with_attitude: bool
 ) -> Any:
-    """Return the prepared solver of a scene at rest, kept for further calls.
+    """Return the prepared solver of a scene, kept because preparation takes long.
 
-    For few bodies the preparation takes longer than the solution. An entry keeps its scene alive,
-    so that no other object gets its identity.
+    An entry keeps its scene alive, so that no other object gets its identity.
     """
     key = id(scene), method, tolerance, effort, with_attitude
     if key not in _kept:

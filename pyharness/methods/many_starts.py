@@ -14,9 +14,8 @@ from pyharness.model.trajectory import Array
 def many_starts(
     packed: Array, omega0: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
 ) -> tuple[Array, NDArray[np.int8]]:
-    """Solve one scene from n initial omegas, and return the n final omegas and statuses.
+    """Return the final omegas (rad/s), (n, 3), and statuses, (n,), from n initial omegas.
 
-    Omegas (rad/s) have shape (n, 3), statuses and times (s) shape (n,); one time may serve all.
     Raise InputError for another shape.
     """
     starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)

@@ -11,10 +11,7 @@ from pyharness.model.trajectory import Array
 
 
 def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
-    """Return a scene and its method's settings as one array, in the order of `Places`.
-
-    `code` selects the method. Raise InputError if the torque is opaque.
-    """
+    """Return a scene and its method's settings as one array, in the order of `Places`."""
     packed = np.zeros(Places.WAVES)
     packed[Places.METHOD] = code
     packed[Places.TOLERANCE] = tolerance

@@ -75,11 +75,10 @@ def checked_names(
 def sensitivities_at(
     scene: Scene, found: Trajectory, names: Sequence[str], tolerance: float, effort: float
 ) -> dict[str, Array]:
-    """Return the derivatives of the solution `found` at its times, by the name of each parameter.
+    """Return the derivatives of `found` by name, of shape (n, 3, m) or (n, 7, m) for m values.
 
-    They have shape (n, 3, m), or (n, 7, m) with the attitude, for m values; `tolerance` is relative
-    to the largest in a column so far. Raise InputError if the work limit is exceeded, or a
-    derivative overflows.
+    `tolerance` is relative to the largest in a column so far. Raise InputError if the work limit is
+    exceeded, or a derivative overflows.
     """
     if not names:
         return {}
@@ -102,7 +101,7 @@ def _by_series(
     scene: Scene, names: Sequence[str], attitude: bool, times: Array, tolerance: float,
     effort: float,
 ) -> tuple[dict[str, slice], Array, Array]:  # fmt: skip
-    """Return the columns of each name, all derivatives, shape (n, 3 or 7, m), and those at 0."""
+    """Return the columns of each name, all derivatives, and those at 0."""
     equations = varied_equations(scene, names, attitude)
     state, starts = initial_state(scene, equations)
     packed, forcings = _packed(equations.tape, len(state), equations.forcings)
@@ -123,9 +122,9 @@ def _by_series(
 
 
 def _period(scene: Scene) -> float:
-    """Return the period of omega (s) without torque; 0 if there is none, or hardly any change.
+    """Return the period of omega (s), or 0 under a torque or for nearly constant omega.
 
-    The derivatives of the period of a nearly constant omega would have few digits.
+    The latter's derivatives of the period would have few digits.
     """
     # A function that is 0 now, and has a parameter of this name, may depend on time.
     period = 0.0 if getattr(scene.torque, "named", None) else period_of(scene)
@@ -134,7 +133,7 @@ def _period(scene: Scene) -> float:
 
 
 def _slope(scene: Scene) -> Array:
-    """Return the derivative of omega at time 0 of a scene without torque, shape (3,)."""
+    """Return the derivative of omega at time 0 without torque."""
     x, y, z = scene.omega
     if scene.inertia is None:
         return np.array(scene.euler_coefficients) * (y * z, z * x, x * y)
@@ -148,12 +147,11 @@ def _by_periods(
 ) -> tuple[dict[str, slice], Array]:
     """Return the columns of each name, and all derivatives of a periodic omega, shape (n, 3, m).
 
-    The equations of the derivatives have periodic coefficients (Floquet's theorem). A perturbation
-    of the initial omega changes the period, and grows by the same multiple of the slope of omega in
-    every period: M = I + N is the matrix of one period, where N has rank 1, and N N = 0. Therefore
-    k periods add up to M^k = I + k N, and the part F that the parameters cause in the first period
-    to k F + k (k - 1)/2 N F. The moments change the period once and for all, so that their N F is
-    0.
+    By Floquet's theorem, a perturbation of the initial omega changes the period, and grows by the
+    same multiple of the slope of omega in every period: M = I + N is the matrix of one period,
+    where N has rank 1, and N N = 0. Therefore k periods add up to M^k = I + k N, and the part F
+    that the parameters cause in the first period to k F + k (k - 1)/2 N F. The moments change the
+    period once and for all: their N F is 0.
     """
     whole = np.floor(times / period)
     rest = times - whole * period
@@ -180,7 +178,7 @@ def _by_periods(
 def _packed(
     tape: Tape, n_unknowns: int, forcings: NDArray[np.int32]
 ) -> tuple[Array, NDArray[np.int32]]:
-    """Return a tape as the kernel reads it, with its combinations in place of its outputs."""
+    """Return a tape as the kernel reads it, with combinations in place of outputs."""
     packed = kernel_tape(tape, n_unknowns)
     # The outputs are the last combinations, which the array counts here.
     first = int(packed[3]) - len(tape.outputs)
@@ -188,7 +186,7 @@ def _packed(
 
 
 def _check(status: int, n_rows: int, times: Array, derivatives: Array) -> None:
-    """Raise InputError if a kernel's derivatives at `times` (s) are not complete or not finite."""
+    """Raise InputError if derivatives are not complete or not finite."""
     time = times[min(n_rows, len(times) - 1)]
     if status == GAVE_UP:
         raise TimedError(

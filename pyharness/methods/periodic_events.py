@@ -22,10 +22,7 @@ _MARGIN = 1e-6
 
 
 def are_of_omega(functions: Sequence[EventFunction]) -> bool:
-    """Return whether functions are known to depend on omega and its derivative alone.
-
-    Each is called once with symbols, and unknown if it can't be recorded.
-    """
+    """Return whether functions, called once with symbols, depend on omega and its slope alone."""
     return all(map(_is_of_omega, functions))
 
 
@@ -41,10 +38,9 @@ def _is_of_omega(g: EventFunction) -> bool:
 
 
 def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
-    """Return the times of events until `end`, and how many of them are those of `times`.
+    """Return the times of events until `end`, and how many are those of `times`.
 
-    `times` (s) are those of the first PERIODS periods, ascending. Raise InputError, after `where`,
-    for too many events.
+    The latter (s) are of the first PERIODS periods. Raise InputError for too many events.
     """
     # An event at the end of a period may be found on either side of it, and is not lost here.
     margin = _MARGIN * period

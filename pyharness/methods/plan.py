@@ -33,9 +33,7 @@ class Decision:
 class Plan:
     """The choices that are made before a scene is solved: the method and the computed quantities.
 
-    `closed_form` is the kind of closed form, such as ``sphere``, or None; `fallback` the method if
-    `method` can't solve the scene, or None. `velocity` and `rows` request the translational
-    velocity and intermediate output.
+    `closed_form` is its kind, as ``sphere``; `fallback` a method if `method` can't solve the scene.
     """
 
     scene: Scene
@@ -63,10 +61,9 @@ def plan(
     velocity: bool = False,
     rows: bool = False,
 ) -> Plan:
-    """Return the plan for a scene; `auto` lets it choose the method.
+    """Return the plan for a scene; `rows` requests intermediate output.
 
-    `velocity` requests the translational velocity, `rows` intermediate output. Raise InputError if
-    the method can't solve the scene, or if the tolerance is out of range.
+    Raise InputError if the method can't solve the scene, or the tolerance is out of range.
     """
     tolerance = requested_tolerance(method, tolerance)
     finest = REGISTRY["quick"].finest if method == "quick" else FINEST

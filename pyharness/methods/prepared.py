@@ -1,8 +1,4 @@
-"""Preparation of a solver for many calls with one scene.
-
-`prepare` validates the scene, chooses the method, and packs the scene for the compiled kernel, so
-that a call takes little longer than the kernel itself.
-"""
+"""Preparation of a solver: the scene is checked, its method chosen, and both packed for C."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, overload

@@ -57,7 +57,7 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
     _code: int
 
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
-        """Create a solver, with the arguments of `Solver`; users call `prepare` instead."""
+        """Create a solver; users call `prepare` instead."""
         scene, code = chosen.scene, Methods.TAYLOR
         attitude = scene.attitude or IDENTITY
         if is_recorded(scene):
@@ -82,10 +82,10 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
     def many(self) -> Callable[..., tuple[Array, Array, NDArray[np.int8]]]:
         """Return the function that solves many initial omegas and attitudes in one call.
 
-        Call it as ``solver.many(omega0, t_end, attitude0=None, threads=1, out=None)``, with
-        arguments as in `Solver.many` and quaternions of shape (n, 4) or (4,). It returns omega
-        (rad/s), shape (n, 3), the attitudes, shape (n, 4), and the statuses, int8, shape (n,), in
-        the Ensemble `out` if that is not None; `out` may also be an array for omega.
+        Call it as ``solver.many(omega0, t_end, attitude0=None, threads=1, out=None)``, as
+        `Solver.many`, with quaternions of shape (n, 4) or (4,). It returns omega (rad/s), (n, 3),
+        the attitudes, (n, 4), and the statuses, int8, (n,); `out` may be an Ensemble, or an array
+        for omega.
         """
         return partial(many_attitudes, self, self._code)
 
@@ -93,7 +93,7 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
     def packed_for_lanes(self) -> Array:
         """Return the scene for the kernel that solves bodies side by side under recorded torques.
 
-        A torque about the axes of space is recorded, unless it has too many terms.
+        A torque in space is recorded, unless it has too many terms.
         """
         if self._code != Methods.SPACE_TORQUE:
             return self.packed
@@ -111,10 +111,7 @@ def prepared_attitude(scene: Scene, method: str, tolerance: float, effort: float
 
 
 def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
-    """Return the plan for omega and attitude, by default from the attitude (1, 0, 0, 0).
-
-    Raise InputError if the method can't propagate attitudes.
-    """
+    """Return the plan for omega and attitude, or raise InputError if the method has none."""
     check_attitude(method)
     return plan(replace(scene, attitude=scene.attitude or IDENTITY), method, tolerance, rows=True)
 
@@ -122,10 +119,7 @@ def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
 def _check(
     usual: Quaternion, omega0: object, t_end: object, attitude0: object
 ) -> tuple[tuple[float, ...], float]:
-    """Return omega and quaternion at 0 in one tuple, and `t_end` (s), for types unknown to C.
-
-    `usual` replaces an `attitude0` of None. Raise InputError for a wrong type or number of values.
-    """
+    """Return omega and quaternion in one tuple, and `t_end` (s), of types unknown to C."""
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     attitude = usual if attitude0 is None else unit_quaternion("attitude0", attitude0)[0]
     return (*start, *attitude), time

@@ -22,7 +22,7 @@ class ChangingSolver(Solver):
     """A `Solver` whose calls raise InputError if a principal moment reaches 0 before the end."""
 
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array:
-        """Return omega (rad/s) at `t_end` (s), shape (3,); see `Solver` for the arguments."""
+        """Return omega (rad/s) at `t_end` (s), shape (3,)."""
         _check_time(self.plan.scene, number("t_end", t_end))
         return super().__call__(omega0, t_end, out=out)
 
@@ -51,7 +51,7 @@ class ChangingAttitudeSolver(AttitudeSolver):
     def __call__(
         self, omega0: Numbers, t_end: Number, attitude0: Numbers | Rotation | None = None
     ) -> tuple[Array, Array]:
-        """Return omega (rad/s) and the attitude at `t_end` (s); see `AttitudeSolver`."""
+        """Return omega (rad/s) and the attitude at `t_end` (s)."""
         _check_time(self.plan.scene, number("t_end", t_end))
         return super().__call__(omega0, t_end, attitude0)
 
@@ -68,7 +68,6 @@ def prepared_changing(
 
 
 def _check_time(scene: Scene, time: float) -> None:
-    """Raise InputError if a moment reaches 0 before `time` (s)."""
     assert scene.changing is not None
     if math.isfinite(time):
         scene.changing.check([time])

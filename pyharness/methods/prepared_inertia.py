@@ -1,7 +1,6 @@
 """Prepared solvers of scenes with a full inertia matrix.
 
-A call transforms its arguments to principal axes, solves there, and transforms the result back, in
-Python; a solver of a scene with principal moments calls the kernel from C.
+Calls transform to principal axes and back in Python; other solvers call the kernel from C.
 """
 
 from dataclasses import replace
@@ -35,7 +34,7 @@ def _no_compiled_call(solver: object) -> Any:
 class InertiaSolver(Solver):
     """A `Solver` whose omegas are about the axes of the inertia matrix.
 
-    `plan` has the scene about principal axes; `growth` is the error amplification about these axes.
+    `plan` and `growth` are about principal axes.
     """
 
     ctypes = capsule = property(_no_compiled_call)
@@ -44,11 +43,7 @@ class InertiaSolver(Solver):
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
         scene: Scene | None = None,
     ) -> Self:  # fmt: skip
-        """Create a solver; users call `prepare` instead.
-
-        `chosen` has the scene about principal axes, `scene` the matrix; `asked` is the requested
-        method.
-        """
+        """Create a solver; `chosen` has the scene about principal axes, `scene` the matrix."""
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
         solver._scene = scene
@@ -59,11 +54,11 @@ class InertiaSolver(Solver):
     _axes: Array  # the principal axes, in columns
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and the arguments with which `copy` and `pickle` recreate the solver."""
+        """Return the class and the arguments for `copy` and `pickle`."""
         return type(self), (self.plan, *self._given, self._scene)
 
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array:
-        """Return omega (rad/s) at `t_end` (s), shape (3,), in `out` if it is not None."""
+        """Return omega (rad/s) at `t_end` (s), shape (3,)."""
         start = np.array(three_floats("omega0", omega0))
         if out is not None and (found := no_buffer(out)):
             raise InputError(
@@ -104,7 +99,7 @@ class InertiaAttitudeSolver(AttitudeSolver):
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
         scene: Scene | None = None,
     ) -> Self:  # fmt: skip
-        """Create a solver, with the arguments of `InertiaSolver`."""
+        """Create a solver, as `InertiaSolver`."""
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
         solver._scene = scene
@@ -116,16 +111,13 @@ class InertiaAttitudeSolver(AttitudeSolver):
     _turn: Quaternion  # from principal axes to the axes of the inertia matrix
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and the arguments with which `copy` and `pickle` recreate the solver."""
+        """Return the class and the arguments for `copy` and `pickle`."""
         return type(self), (self.plan, *self._given, self._scene)
 
     def __call__(
         self, omega0: Numbers, t_end: Number, attitude0: Numbers | Rotation | None = None
     ) -> tuple[Array, Array]:
-        """Return omega (rad/s), shape (3,), and the quaternion, shape (4,), at `t_end` (s).
-
-        The default `attitude0` is the scene's, or (1, 0, 0, 0).
-        """
+        """Return omega (rad/s), shape (3,), and the quaternion, shape (4,), at `t_end` (s)."""
         start = np.array(three_floats("omega0", omega0))
         attitude = self._scene.attitude or IDENTITY
         if attitude0 is not None:
@@ -147,9 +139,9 @@ def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:
 
 
 def rotated(vectors: Array, matrix: Array) -> Array:
-    """Return the products of matrices, shape (3, 3) or (n, 3, 3), and vectors, (3,) or (n, 3).
+    """Return the products of one or n matrices, (3, 3), and vectors, (3,) or (n, 3).
 
-    They are summed in a fixed order, so that a result is bit-for-bit the same for any n.
+    They are summed in a fixed order, so as to be bit-for-bit the same for any n.
     """
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack(
@@ -159,10 +151,7 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Convert attitudes of principal axes to attitudes of the axes of the inertia matrix.
-
-    Shapes are (4,) or (n, 4); `turn` rotates from principal axes to those of the matrix.
-    """
+    """Convert attitudes, (4,) or (n, 4), of principal axes to those of the matrix by `turn`."""
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
     parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))

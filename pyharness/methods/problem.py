@@ -21,17 +21,16 @@ _NOT_FINITE = (
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     """Return the coefficients A, B, C, and the torque over the moments, as five arrays.
 
-    The torque is constant (1/s2), rate (1/s3), sines and cosines, shape (4, n), with columns of
-    three amplitudes (1/s2) and the frequency (rad/s). Raise InputError if a value is not finite.
+    They are constant (1/s2), rate (1/s3), sines and cosines, shape (4, n), with columns of three
+    amplitudes and the frequency (rad/s). Raise InputError if one is not finite.
     """
     return _over(scene, scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0)))
 
 
 def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
-    """Return the coefficients, the largest moment over each, and the torque over the largest.
+    """Return coefficients, the largest moment over each, and torque over it, in four arrays.
 
-    It is for torques about the axes of space, in the form of `normalized`, and moments are needed.
-    Raise InputError if a value is not finite.
+    Moments are needed. Raise InputError if a value is not finite.
     """
     moments = np.array(scene.moments)
     largest = moments.max()
@@ -61,8 +60,8 @@ def _over(scene: Scene, law: TorqueLaw, moments: Array) -> tuple[Array, Array, A
 def remainders(scene: Scene) -> Triple:
     """Return the exact coefficients A, B, C minus their values in binary64.
 
-    Without them, a closed form would have an error of 1e-10 rad after 1e6 rad. They are 0 for a
-    body given by coefficients, and under a torque, where no kernel uses them.
+    Without them, a closed form has an error of 1e-10 rad after 1e6 rad. They are 0 for a body given
+    by coefficients, and under a torque, where no kernel uses them.
     """
     found, moments = scene.euler_coefficients, scene.exact_moments
     if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
@@ -90,10 +89,9 @@ def trajectory_of(
     growth: float | None = None,
     attitudes: Array | None = None,
 ) -> Trajectory:
-    """Return a trajectory of the results of a kernel at `times` (s).
+    """Return a trajectory of the first `n_rows` columns of a kernel's omega and attitudes.
 
-    Of `rows`, omega (rad/s), shape (3, n), and `attitudes`, shape (4, n), the first `n_rows`
-    columns are results. `error` and `growth` are omitted if the last time was not reached.
+    `error` and `growth` are omitted if the last time was not reached.
     """
     ended = ENDS[status] if ENDS[status] in WITH_ALL_ROWS else "overflow"
     more = {"error": error, "growth": growth} if ended in WITH_ALL_ROWS else {}
@@ -114,8 +112,7 @@ def rows_trajectory(
 def closed_form(scene: Scene) -> str | None:
     """Return the kind of closed form of a scene, or None.
 
-    It is ``sphere`` (A = B = C = 0), ``symmetric`` (two equal moments) or ``elliptic`` (three
-    unequal moments).
+    ``sphere`` has A = B = C = 0, ``symmetric`` two equal moments, ``elliptic`` none.
     """
     law = scene.torque
     if not isinstance(law, TorqueLaw) or law.in_space or scene.changing is not None:

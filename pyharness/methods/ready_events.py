@@ -251,7 +251,7 @@ def tilt(
 
 
 def _component(unit: list[float], k: int, attitude: Any) -> Any:
-    """Return the component of a direction `unit` in space along body axis k, from 0."""
+    """Return the component of `unit`, in space, along body axis k."""
     scalar, vector = attitude[0], attitude[1:]
     i, j = (k + 1) % 3, (k + 2) % 3
     # Column k of the rotation matrix of a unit quaternion.
@@ -262,7 +262,6 @@ def _component(unit: list[float], k: int, attitude: Any) -> Any:
 
 
 def _axis(where: str, axis: object) -> int:
-    """Return the number, from 0, of a body axis that a user numbers from 1."""
     found = integer(f"{where} axis", axis)
     if found not in (1, 2, 3):
         raise InputError(f"{where} axis: {found}; allowed: 1, 2, 3")

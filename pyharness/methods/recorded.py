@@ -41,8 +41,8 @@ def system(scene: Scene) -> Tape:
 def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
     """Return a tape as the array that the kernel reads; fortran/modern/tape.f90 describes it.
 
-    The last `n_unknowns` outputs, by default all, are the derivatives. Sine and cosine of one angle
-    become one operation, because each recurrence needs the other.
+    The last `n_unknowns` outputs, by default all, are derivatives. Sine and cosine of one angle
+    become one operation, as each recurrence needs the other.
     """
     places = {slot: slot + 1 for slot in range(tape.n_inputs)}
     n_slots = tape.n_inputs
@@ -107,7 +107,7 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
 
 
 def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
-    """Return integers as bits in an array of floats, two integers in a float."""
+    """Return integers as bits in floats, two in each."""
     pairs = np.zeros(len(integers) + len(integers) % 2, dtype=np.int32)
     pairs[: len(integers)] = integers
     return pairs.view(np.float64)

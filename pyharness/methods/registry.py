@@ -89,9 +89,9 @@ def _no_rows(*given: object) -> Trajectory:
 
 
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
-    """Return a function that solves scenes, and imports its module when it is first called.
+    """Return a solver, `name` in the module `room`, that imports it when first called.
 
-    It is `name` in the module `room`, or what `name` returns for the arguments.
+    With arguments, `name` makes the solver.
     """
 
     def solve(*given: Any) -> Trajectory:
@@ -237,10 +237,7 @@ def check_attitude(method: str) -> None:
 
 
 def check_prepared(scene: Scene, method: str) -> None:
-    """Raise InputError if no solver can be prepared for a scene and the method with this name.
-
-    Torques of the state and changing inertia have only prepared Taylor series.
-    """
+    """Raise InputError if no solver can be prepared, as only by series for torques of the state."""
     if is_recorded(scene) and method not in PREPARED_FOR_STATE:
         what = "an inertia that changes" if scene.changing else "a torque that depends on the state"
         raise InputError(
@@ -250,11 +247,7 @@ def check_prepared(scene: Scene, method: str) -> None:
 
 
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
-    """Raise InputError if the method with this name can't solve a scene because of its torque.
-
-    That depends on its axes, on its dependence on omega or attitude, on changing inertia, and on
-    whether the attitude is computed.
-    """
+    """Raise InputError if the method with this name can't solve a scene because of its torque."""
     torque, chosen = scene.torque, REGISTRY[method]
     kind = "a torque about the axes of space"
     able: list[str] = []

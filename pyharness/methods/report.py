@@ -49,9 +49,8 @@ def trajectory_report(
 ) -> Report:
     """Return the report of one trajectory of a scene, with a table of its rows and a picture.
 
-    `listing` is the program with a choice of its defects, `word` its arithmetic if not binary64,
-    and `form` that of the attitude: ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `bound` is
-    for the method `reference`.
+    `word` is a program's arithmetic if not binary64, and `form` that of the attitude:
+    ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `bound` is for the method `reference`.
     """
     columns = [*_TIMES, *_OMEGA]
     parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]
@@ -109,7 +108,7 @@ def trajectory_report(
 
 
 def _bounds(bound: "ErrorBound | None") -> list[str]:
-    """Return lines that state the error of the reference and, if it has one, of its attitude."""
+    """Return lines that state the error of the reference."""
     if bound is None:
         return []
     lines = [f"reference: error of any omega at most {bound.text()}"]
@@ -127,10 +126,7 @@ def _shown(attitude: Array, form: str) -> Array:
 
 
 def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
-    """Return a picture of omega, and of the attitude if there is one, over time.
-
-    The title has a note if the trajectory ends early.
-    """
+    """Return a picture of omega, and of the attitude if any, over time."""
     from matplotlib.figure import Figure
 
     has_attitude = trajectory.attitude is not None and len(trajectory.time) > 0
@@ -157,10 +153,7 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
 
 
 def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
-    """Mark the last value of component `row` (0 to 2) of omega by a cross in a diagram.
-
-    A value outside its limits, which do not change, is marked at the edge.
-    """
+    """Mark the last omega of a component by a cross, at the edge if outside the limits."""
     bottom, top = axes.get_ylim()
     axes.plot(trajectory.time[-1:], np.clip(trajectory.omega[-1:, row], bottom, top), **_END)
     axes.set_ylim(bottom, top)

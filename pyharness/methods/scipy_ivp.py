@@ -1,9 +1,8 @@
 """The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is first used.
 
-SciPy controls the local error of a step, whereas our tolerance limits the error at the requested
-times. A preliminary integration with few digits supplies the largest |omega|, the phase of the
-motion, in proportion to which local errors add up, and the error amplification; the local tolerance
-follows from these.
+SciPy controls the local error of a step, our tolerance the error at the requested times. A
+preliminary integration with few digits supplies what relates them: the largest |omega|, the phase,
+in proportion to which local errors add up, and the error amplification.
 """
 
 import math
@@ -60,8 +59,6 @@ _RADAU_SHARE = 2
 
 
 class _Ahead(NamedTuple):
-    """The results of the preliminary integration; phases of torque waves count as the motion's."""
-
     largest: float  # largest abs(omega) of any component from 0 to the end, rad/s
     # Integral over time of the largest coefficient times |omega|, plus the phases of the torque
     # waves (rad). The phase of a wave is limited in proportion to the omega that it can add.
@@ -73,8 +70,7 @@ class _Ahead(NamedTuple):
 def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
     """Return a bound of the ratio of a SciPy method's error at the end to its error per step.
 
-    `radians` is the phase (rad), `growth` the error amplification, and `turned` the angle (rad) by
-    which the body rotates, or 0 without attitude.
+    `radians` is the phase, `turned` the angle (rad) by which the body rotates, or 0.
     """
     found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
     return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)
@@ -158,10 +154,7 @@ def state_of(scene: Scene) -> tuple[float, ...]:
 
 
 def with_attitude(slopes: RightHandSide) -> RightHandSide:
-    """Return the right-hand side for omega and attitude, from that for omega alone.
-
-    The quaternion q, scalar first, has q' = q (0, omega)/2 with Hamilton's product.
-    """
+    """Return the right-hand side for omega and attitude, q' = q (0, omega)/2, from omega's."""
 
     def both(time: float, state: Sequence[float]) -> list[float]:
         x, y, z, a, b, c, d = state
@@ -177,13 +170,11 @@ def with_attitude(slopes: RightHandSide) -> RightHandSide:
 
 
 def _most(name: str, effort: float) -> float:
-    """Return the work limit, in right-hand sides, under a torque without waves."""
+    """Return the work limit, in right-hand sides, without waves."""
     return effort * _MOST_EVALUATIONS / (_RADAU_SHARE if name == "Radau" else 1)
 
 
 class _Run(Run):
-    """The integrations under a torque law from 0 to `end` (s) by SciPy's method `name`."""
-
     def __init__(self, scene: Scene, end: float, name: str, effort: float = 1.0) -> None:
         self.scene = scene
         rate = max(map(abs, scene.euler_coefficients))
@@ -191,13 +182,12 @@ class _Run(Run):
         super().__init__(scene.omega, scene.right_hand_side(), rate, end, name, effort, most)
 
     def add_attitude(self) -> None:
-        """Add the scene's attitude, if any, to the unknowns of later integrations."""
         if self.scene.attitude is not None:
             self.start = state_of(self.scene)
             self.slopes = with_attitude(self.slopes)
 
     def _scale_by_torque(self) -> float:
-        """Return a bound of the |omega| (rad/s) by the torque alone, or 1 if it is not finite."""
+        """Return a bound of |omega| (rad/s) by the torque alone; 1 if not finite."""
         bound = omega_by_torque(self.scene, self.end)
         return bound if math.isfinite(bound) else 1.0
 
@@ -205,10 +195,10 @@ class _Run(Run):
     def ahead(self) -> _Ahead:
         """Integrate with few digits, and return the quantities that set the local tolerance.
 
-        The absolute tolerance is a fraction of the estimated largest |omega|, at first |omega| at 0
-        or, at rest, from the torque; the integration is repeated if the solution is much smaller.
-        If omega grows without bound, the larger of the estimate and the omega by the torque alone
-        replaces the largest, and phase and amplification have their least values, 0 and 1.
+        The absolute tolerance is a fraction of an estimate of the largest |omega|: the initial one
+        or, at rest, that by the torque; if the solution is much smaller, the integration is
+        repeated. If omega grows without bound, the estimate, or the omega by torque alone if
+        larger, replaces the largest, and phase and amplification are 0 and 1.
         """
         scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()
         if scale == 0.0:
@@ -240,10 +230,7 @@ class _Run(Run):
 
 
 def _pushes(scene: Scene) -> list[tuple[float, float]]:
-    """Return size and frequency (rad/s) of each torque wave.
-
-    The size (1/s2) is the largest component of the amplitude, divided by its moment.
-    """
+    """Return the largest component of each wave, over its moment (1/s2), and the frequency."""
     moments = scene.moments or (1.0, 1.0, 1.0)
     return [
         (max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True)), abs(frequency))
@@ -254,7 +241,7 @@ def _pushes(scene: Scene) -> list[tuple[float, float]]:
 def _turned(scene: Scene, span: float, largest: float) -> float:
     """Return the sum of the phases (rad) of all torque waves over the time `span` (s).
 
-    The phase of a wave is at most the omega that it can add, relative to `largest` (rad/s).
+    Each is at most the omega that the wave can add, relative to `largest`.
     """
     found = 0.0
     for push, frequency in _pushes(scene):

@@ -36,9 +36,8 @@ class NoNumberError(Exception):
 class Run:
     """The integrations of one problem from 0 to `end` (s) by `solve_ivp`, with one work limit.
 
-    `most` limits the right-hand sides of preliminary and main integrations together. The first
-    components of the state `start` are omega (rad/s). `rate` is the largest Euler coefficient;
-    times omega and time it is the phase (rad).
+    `most` is that of all right-hand sides. The state begins with omega (rad/s). `rate` is the
+    largest Euler coefficient; times omega and time it is the phase (rad).
     """
 
     def __init__(
@@ -59,10 +58,7 @@ class Run:
         self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Do nothing; a subclass may record the time (s) and state of each accepted step.
-
-        It is also called at the beginning, and at times inside the last step.
-        """
+        """Do nothing, unless overridden; called at 0, after steps, and inside the last."""
 
     def solved(
         self,
@@ -74,11 +70,10 @@ class Run:
         begin: float = 0.0,
         state: Sequence[float] | None = None,
     ) -> Any:
-        """Integrate by SciPy's method `name` and return SciPy's result object.
+        """Return SciPy's result by its method `name`, with dense output if there are no `times`.
 
-        `relative` and `absolute` are its `rtol` and `atol`, `longest` and `begin` are in s, but
-        times in the result in `self.unit` seconds. Without `times`, it has dense output. Raise
-        NoNumberError if Radau's linear algebra refuses a number, or the time is NaN.
+        Its times are in `self.unit` seconds, but arguments in s. Raise NoNumberError if Radau's
+        linear algebra refuses a number, or the time is NaN.
         """
         from scipy.integrate import solve_ivp
 

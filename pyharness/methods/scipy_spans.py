@@ -1,7 +1,7 @@
 """The Taylor series of a recorded torque, beside an integration of it by SciPy.
 
-SciPy's methods may pass a short change of the torque. Where their results differ from the series,
-its steps bound theirs.
+SciPy may pass a short change of the torque. Where the results differ, the steps of the series bound
+SciPy's.
 """
 
 import math

@@ -1,10 +1,7 @@
-"""SciPy's methods for torques that depend on the state, recorded or opaque.
+"""SciPy's methods for torques that depend on the state; DOP853 is compiled if the torque is.
 
-DOP853 is compiled if the torque is a compiled function.
-
-How such a torque adds up and amplifies local errors is unknown. Therefore the scene is integrated
-with smaller and smaller local tolerances, until the difference of two integrations shows that the
-second meets the tolerance.
+How such a torque amplifies local errors is unknown. Therefore the local tolerance is reduced until
+the difference of two integrations shows that the second meets the tolerance.
 """
 
 import math
@@ -69,8 +66,6 @@ _COMPILED_WORK = 0.05
 
 
 class _Rows(NamedTuple):
-    """The states at the first of the requested times, as far as one integration reached."""
-
     state: Array  # shape (n, 3) or (n, 7): omega, and the attitude as a unit quaternion
     is_complete: bool  # whether there is a row for each time
     largest: float  # largest abs(omega) of any component from 0 to the end (rad/s)
@@ -86,14 +81,12 @@ def solve_state(
 ) -> Trajectory:
     """Return the trajectory of a scene whose torque depends on the state, by SciPy's `name`.
 
-    The error at `times` (s), from the difference of two integrations, is at most `tolerance`: omega
-    relative to the largest |omega|, the attitude as an angle (rad). `most` is the work limit, in
-    right-hand sides of a body without torque, to be multiplied by `effort`.
+    The error at `times` (s), from the difference of two integrations, is at most `tolerance`.
+    `most` is the work limit in right-hand sides of a body without torque.
 
-    The trajectory ends with ``overflow`` before omega grows without bound or the torque is
-    singular, and is ``unchecked`` if the series of a recorded torque does not reach the last time.
-    Raise InputError if an opaque function fails, the attitude is missing, or the tolerance or work
-    limit can't be met.
+    It ends with ``overflow`` before omega grows without bound or the torque is singular, and is
+    ``unchecked`` if the series of a recorded torque does not reach the end. Raise InputError if an
+    opaque function fails, the attitude is missing, or tolerance or work limit can't be met.
     """
     run = _StateRun(scene, times[-1], name, effort, most)
     nothing = np.empty((0, len(run.start)))
@@ -135,7 +128,7 @@ def _agrees(found: _Rows, rows: Array, tolerance: float) -> bool:
 
 
 def _check_attitude(scene: Scene) -> None:
-    """Raise InputError if a compiled torque is NaN at time 0 for want of the attitude alone."""
+    """Raise InputError if a compiled torque is NaN for want of the attitude alone."""
     torque = scene.torque
     assert isinstance(torque, StateTorque)
     function = torque.function
@@ -161,11 +154,7 @@ def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
 
 
 def _refined(run: "_StateRun", times: Sequence[float], tolerance: float, scale: float) -> _Rows:
-    """Return the results of an integration whose estimated error is at most `tolerance`.
-
-    `scale` is the largest |omega| (rad/s), estimated. Raise InputError if no local tolerance
-    suffices.
-    """
+    """Return results whose estimated error is at most `tolerance`, or raise InputError."""
     local = max(tolerance / _FIRST[run.name], _RATIO * FINEST_STEP)
     before, ratio = run.rows(times, local, scale), _RATIO
     while True:
@@ -198,7 +187,7 @@ def _allowed(error: float) -> str:
 
 
 def _difference(before: _Rows, after: _Rows) -> float:
-    """Return the largest difference at common times, omega relative, attitude as an angle (rad)."""
+    """Return the largest difference, relative or as an angle (rad)."""
     n = min(len(before.state), len(after.state))
     return float(_differences(before, after, n).max(initial=0.0))
 
@@ -227,8 +216,6 @@ def _agreeing(before: _Rows, after: _Rows, tolerance: float) -> _Rows:
 
 
 class _StateRun(Run):
-    """The integrations of one scene; time reached and largest |omega| are kept after each step."""
-
     def __init__(self, scene: Scene, end: float, name: str, effort: float, most: float) -> None:
         torque = scene.torque
         assert isinstance(torque, StateTorque)
@@ -262,7 +249,7 @@ class _StateRun(Run):
         self.spans = [Span(time, math.inf) for time in bounds_of(scene, end)]
 
     def _between_breaks(self, slopes: RightHandSide) -> RightHandSide:
-        """Return a right-hand side in which a table changes after a breakpoint, not at it."""
+        """Return a right-hand side in which a table changes just after a breakpoint."""
 
         def between(time: float, state: Sequence[float]) -> list[float]:
             low, high = self._between
@@ -273,7 +260,7 @@ class _StateRun(Run):
     def _guarded(self, slopes: RightHandSide, is_compiled: bool) -> RightHandSide:
         """Return a right-hand side that raises InputError if an opaque function fails.
 
-        It keeps the time of a NaN, which is no failure if SciPy passes it by shorter steps.
+        The time of a NaN is kept: it is no failure if SciPy passes it by shorter steps.
         """
 
         def guarded(time: float, state: Sequence[float]) -> list[float]:
@@ -298,7 +285,7 @@ class _StateRun(Run):
         return guarded
 
     def check_undefined(self) -> None:
-        """Raise InputError if an opaque function has returned NaN since the last step."""
+        """Raise InputError after a NaN of an opaque function since the last step."""
         if self._undefined is not None:
             raise TimedError(
                 "[torque]: the function returned NaN at t = {time} s; allowed: three finite "
@@ -307,7 +294,7 @@ class _StateRun(Run):
             )
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Record the time (s) and |omega|; raise NoNumberError if the steps are too short."""
+        """Raise NoNumberError if the steps are too short."""
         self._stuck = self._stuck + 1 if time == self._reached else 0
         if self._stuck > _MOST_STUCK:
             raise NoNumberError
@@ -319,16 +306,15 @@ class _StateRun(Run):
                 self._undefined = None
 
     def is_singular(self) -> bool:
-        """Return whether a rate at time 0 is not finite; SciPy's first step would never end."""
+        """Return whether a rate at 0 is not finite; SciPy's first step would never end."""
         self.evaluations += 1
         with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
             return not all(map(math.isfinite, self.slopes(0.0, self.start)))
 
     def expected_omega(self) -> float:
-        """Integrate with few digits, and return an estimate of the largest |omega| (rad/s).
+        """Return the largest |omega| (rad/s) with few digits.
 
-        Where that ends early, it is the initial |omega|, or what the initial torque causes; 0 at
-        rest.
+        Where that ends early, it is the initial one, or what the initial torque causes.
         """
         scale = max(map(abs, self.start[:3])) or self._pushed()
         for _ in range(_MOST_GUESSES):
@@ -341,7 +327,7 @@ class _StateRun(Run):
         return scale
 
     def _pushed(self) -> float:
-        """Return the |omega| (rad/s) that a body at rest would attain by its largest torque."""
+        """Return the |omega| (rad/s) to which its largest torque brings a body at rest."""
         times = np.linspace(0.0, self.end, _FEWEST_STEPS + 1).tolist()
         with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
             rates = [abs(rate) for time in times for rate in self.slopes(time, self.start)[:3]]
@@ -350,10 +336,7 @@ class _StateRun(Run):
         return omega if 0.0 < omega < math.inf else 1.0
 
     def rows(self, times: Sequence[float], local: float, scale: float) -> _Rows:
-        """Return the state at the first of `times` (s), by the local tolerance `local`.
-
-        It is relative to `scale` (rad/s) for omega.
-        """
+        """Return the states at the first of `times` (s); `local` is relative to `scale` (rad/s)."""
         self._integrations += 1
         sizes = [local * scale] * 3 + [local] * (len(self.start) - 3)
         longest = abs(self.end) / (_FEWEST_STEPS + _MORE_STEPS * self._integrations)
@@ -377,7 +360,6 @@ class _StateRun(Run):
         self, begin: float, state: Sequence[float], wanted: list[float], local: float,
         sizes: Sequence[float], longest: float, scale: float,
     ) -> Array:  # fmt: skip
-        """Return the states at the first of the `wanted` times (s), as many as SciPy computes."""
         while wanted:
             self._reached, self._stuck = begin, 0
             try:
@@ -419,6 +401,5 @@ class _StateRun(Run):
 
 
 def _interior(first: float, second: float) -> tuple[float, float]:
-    """Return the smallest and largest time between two times, without these."""
     inner = math.nextafter(first, second), math.nextafter(second, first)
     return min(inner), max(inner)

@@ -31,8 +31,7 @@ _LITTLE_WORK = 5e-3
 def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
     """Return whether amplified rounding errors exceed 0.3 times the tolerance.
 
-    They are the unit roundoff times `growth` times (1 + `noise`), the ratio of the rounding error
-    of the torque to that of omega. An unknown `growth` of None gives False.
+    They are the unit roundoff times `growth` times (1 + `noise`), as of `torque_noise`.
     """
     return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
 
@@ -46,11 +45,10 @@ def torque_noise(
 ) -> float:
     """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
 
-    The rounding error is relative to each term, not to their small sum. The ratio is that of the
-    omegas which the terms would cause alone until `t_end` (s), with their rounding in each of
-    `steps` steps, to `scale`, the largest |omega| (rad/s), by default the initial |omega| or that
-    by the whole torque. It is 0 if the terms do not nearly cancel, and under a torque that depends
-    on the state, whose terms are unknown.
+    It is relative to each term, not to their small sum: the ratio of the omegas which the terms
+    would cause alone until `t_end` (s), with rounding in each of `steps` steps, to `scale`, by
+    default the initial |omega| (rad/s) or that by the whole torque. It is 0 if terms do not nearly
+    cancel, or depend on the state and are unknown.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0
@@ -64,11 +62,9 @@ def torque_noise(
 def closed_form_estimate(
     scene: Scene, omega0: Triple, t_end: float, noise: float = 0.0
 ) -> tuple[float | None, float | None]:
-    """Return the estimated error of a closed form at `t_end` (s), and the error amplification.
+    """Return the estimated error of a closed form at `t_end` (s), and the amplification, or None.
 
-    The error is that of omega relative to the largest |omega| so far, with an attitude also that of
-    its angle (rad). `noise` is that of `torque_noise`. Both are None if the amplification is
-    unknown.
+    The error is relative to the largest |omega| so far, or the angle (rad) if larger.
     """
     growth: float | None = 1.0
     # A sphere does not amplify perturbations.
@@ -85,10 +81,9 @@ def closed_form_estimate(
 
 
 def motion_growth(scene: Scene, t_end: float) -> float | None:
-    """Return the error amplification of a motion from time 0 to `t_end` (s), or None if unknown.
+    """Return the error amplification of a motion to `t_end` (s), or None if unknown.
 
-    It is the largest norm of the derivatives of the last omega with respect to an earlier one, from
-    the closed form, else from a Taylor series with few digits.
+    It is from the closed form, else from a Taylor series with few digits.
     """
     if isinstance(scene.torque, StateTorque):
         return _recorded_growth(scene, t_end)

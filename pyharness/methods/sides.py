@@ -22,10 +22,9 @@ def in_reverse(found: Trajectory) -> Trajectory:
 
 
 def joined(before: Trajectory, after: Trajectory) -> Trajectory:
-    """Return a backward and a forward integration from time 0 as one trajectory.
+    """Return a backward, in ascending order, and a forward trajectory from time 0 as one.
 
-    `before` is in ascending order of time. Steps and evaluations are added; error and amplification
-    are the larger, and the ending is the worse, an overflow the worst.
+    Steps and evaluations are added; of error, amplification and ending the worse holds.
     """
     both = before, after
     rows: dict[str, Any] = {

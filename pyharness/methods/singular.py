@@ -18,20 +18,17 @@ _UNBOUNDED = 1e6
 
 
 class SingularError(TimedError):
-    """The exception for a time at which no step of a series is short enough.
-
-    `what` is the undefined operation; None if omega or the torque becomes infinite.
-    """
+    """The exception for a time at which no step is short enough, as `what` is undefined."""
 
     def __init__(self, what: str | None, time: float) -> None:
-        """Store the message with `what` and `time` (s)."""
+        """Store `what`, None for infinity, and `time` (s)."""
         where = "at t = {time} s"
         message = f"omega or its torque becomes infinite {where}; allowed: an earlier time"
         super().__init__(f"the torque is not defined {where}: {what}" if what else message, time)
         self.what = what
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and the arguments that recreate the error, so that it can be pickled."""
+        """Return the class and the arguments for `pickle`."""
         return type(self), (self.what, self.time)
 
 
@@ -40,8 +37,8 @@ def undefined_operation(
 ) -> str | None:
     """Return what is not defined at the end of an integration, and what to write instead.
 
-    The three are inputs of the tape where the integration begins, where its last step began, and at
-    the end. The result is None if omega or a quotient becomes infinite.
+    The three are inputs of the tape at the beginning, where the last step began, and at the end.
+    None if omega or a quotient becomes infinite.
     """
     first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))
     if last > _UNBOUNDED * (first or 1.0):

@@ -1,7 +1,7 @@
 """The function `solve`, which computes the trajectory of a scene at given times by any method.
 
-It integrates from time 0 in each direction, and rescales time, so that products of two components
-of omega neither overflow nor underflow.
+It integrates from 0 in each direction, and rescales time, so that products of two components of
+omega neither overflow nor underflow.
 """
 
 import itertools
@@ -200,15 +200,13 @@ def solve(
 def _more_rows(
     scene: Scene, method: str, effort: float, attitude: bool, times: Array, tolerance: float
 ) -> Trajectory:
-    """Return a trajectory; a tolerance of 1 stands for a method with a fixed step."""
     return solve(scene, times, method, tolerance, effort=effort, attitude=attitude)
 
 
 def finest(method: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method of the registry can meet from 0 to `time` (s).
 
-    It is `Method.finest`, but for SciPy's methods more if many local errors, none below some 2e-14,
-    add up or are amplified. Raise InputError if to find it takes too many steps.
+    For SciPy's methods it grows with many local errors, none below some 2e-14, and amplification.
     """
     claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:
@@ -221,10 +219,7 @@ def finest(method: str, scene: Scene, time: float) -> float:
 def by_plan(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the trajectory at `times` (s) by the method that `plan` chooses, or by its fallback.
-
-    This is the method `auto`. The fallback is used if the first method raises InputError.
-    """
+    """Return the trajectory at `times` (s) by the method `auto`: the plan's, or its fallback."""
     chosen = plan(scene, "auto", tolerance, rows=True)
     method = METHODS[chosen.method]
     try:
@@ -243,7 +238,7 @@ def by_plan(
 def _integrate(
     chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float
 ) -> Trajectory:
-    """Return the trajectory at `times` (s), on one side of 0, solved in a suitable unit of time."""
+    """Return the trajectory, on one side of 0, solved in a suitable unit of time."""
     if not chosen.is_fixed_step and not is_ordinary(scene.omega):
         # The method does not use the step size, but in the new unit it might not be finite.
         scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
@@ -262,10 +257,7 @@ def _integrate(
 
 
 def _ascending(times: object) -> tuple[list[float], bool]:
-    """Return a user's times (s) in ascending order, and whether they were reversed.
-
-    Raise InputError unless they are finite, strictly monotonic, and at least one.
-    """
+    """Return times (s) in ascending order, and whether reversed, or raise InputError."""
     if _are_ascending_floats(times):
         return times.tolist(), False  # type: ignore[attr-defined]
     if not isinstance(times, Iterable) or getattr(times, "shape", None) == ():
@@ -292,7 +284,6 @@ def _ascending(times: object) -> tuple[list[float], bool]:
 
 
 def _are_ascending_floats(times: object) -> bool:
-    """Return whether times are an array, as dense output requests, that needs no further check."""
     return (
         isinstance(times, np.ndarray)
         and (times.dtype, times.ndim) == (np.float64, 1)

@@ -85,10 +85,7 @@ class Solver(LastCall, BoundKernel):
     # The base class binds a kernel to its data in C. A call goes from the interpreter into the
     # kernel without Python code in between, which would take as long as an easy solution.
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
-        """Create a solver and pack what all calls share; users call `prepare` instead.
-
-        `asked` is the name of the requested method, such as `auto`.
-        """
+        """Create a solver; users call `prepare` instead."""
         kernel = extension().solve_packed
         packed = packed_scene(chosen.scene, _code(chosen), tolerance, effort)
         packed_with_gil = None
@@ -120,10 +117,10 @@ class Solver(LastCall, BoundKernel):
 
     @property
     def method(self) -> str:
-        """Return the name of the method that solved the scene in this thread's last call.
+        """Return the name of the method of the last call.
 
         It is `plan.method`, unless the kernel chose between `quick` and `taylor`, or used
-        `plan.fallback` because the closed form did not apply.
+        `plan.fallback`.
         """
         steps = self._counted()
         if not steps:
@@ -134,9 +131,9 @@ class Solver(LastCall, BoundKernel):
 
 
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
-    """Return `omega0` (rad/s) and `t_end` (s) as floats if the C function can't read their types.
+    """Return `omega0` (rad/s) and `t_end` (s) as floats if C can't read their types.
 
-    Raise InputError if they, or `out`, are of a wrong type or shape.
+    Raise InputError for a wrong type or shape.
     """
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     if out is not None and (found := no_buffer(out)):
@@ -160,7 +157,6 @@ def no_buffer(out: object) -> str:
 
 
 def _code(chosen: Plan) -> int:
-    """Return the integer of `pyharness.model.codes.Methods` for the chosen method."""
     if is_recorded(chosen.scene):
         return Methods.TAPE
     if chosen.closed_form == "sphere":

@@ -252,7 +252,6 @@ class Stepper:
         self._scene = scene
 
     def _singular(self) -> SingularError:
-        """Return the exception for a time at which no step is short enough."""
         before = [self._begin, *self._last.terms[0].tolist()]
         end = [self._time, *self._state.tolist()]
         what = undefined_operation(self._tape, self._origin, before, end)
@@ -265,7 +264,6 @@ class Stepper:
             self._last = Step(0.0, self._state[None], self._state, 0)
 
     def _scale(self) -> float:
-        """Return the omega to which errors are relative."""
         self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
         if self._largest > 0.0:
             return self._largest
@@ -287,7 +285,7 @@ class Stepper:
 def steps_to(
     scene: Scene, attitude: bool, end: float, tolerance: float, most: int = _MOST_STEPS
 ) -> Iterator[tuple[float, Stepper]]:
-    """Yield the time (s) at which each step from 0 to `end` begins, and the stepper after it.
+    """Yield the beginning (s) of each step from 0 to `end`, and the stepper after it.
 
     They end before a singularity, and after `most` steps.
     """
@@ -302,10 +300,7 @@ def steps_to(
 def step_lengths(
     scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
 ) -> dict[float, float]:
-    """Return the lengths (s) of the steps from 0 to `end`, by their ends.
-
-    Steps that end at one of the `bounds`, which may have cut them, are not included.
-    """
+    """Return the lengths (s) of the steps to `end`, by their ends, without those at `bounds`."""
     cuts = frozenset(bounds)
     return {
         stepper.time: abs(stepper.time - before)
@@ -331,10 +326,7 @@ def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
 
 
 def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
-    """Return the tape of the equations of motion.
-
-    Its unknowns are omega, the attitude if computed, and the held torque.
-    """
+    """Return the equations for omega, attitude if computed, and held torque as a tape."""
     n = 7 if attitude else 3
     recorder = Recorder(2 * MOST_OPERATIONS, n + 4)
     time, *unknowns = recorder.inputs()
@@ -360,12 +352,12 @@ def _three(name: str, values: object) -> tuple[float, ...]:
 
 
 def _fixed(values: Array) -> Array:
-    """Return a copy that can't be changed; a change would not change the motion."""
+    """Return a copy that can't be changed, as that would not change the motion."""
     found = values.copy()
     found.setflags(write=False)
     return found
 
 
 def _normalised(q: Array) -> Array:
-    """Return quaternions with norm 1, shape (4,) or (4, n); for no attitude, shape (0,)."""
+    """Return quaternions of norm 1, (4,) or (4, n), or an empty array."""
     return q / np.sqrt(np.sum(q * q, axis=0)) if len(q) else q

@@ -20,11 +20,9 @@ def taylor(
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) by Taylor series, repeated if inaccurate.
 
-    `steps` are those of the last integration, `evaluations` those of all, one series each. Under a
-    torque about the axes of space, two or more integrations with decreasing local tolerances differ
-    by the estimated error, and `growth` is unknown.
-
-    Raise InputError for an opaque torque, and if the work limit is exceeded.
+    `evaluations` are the series of all integrations. Under a torque about the axes of space, these
+    differ by the estimated error, and `growth` is unknown. Raise InputError for an opaque torque,
+    and if the work limit is exceeded.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     # The first column is the attitude at time 0. A column for each time follows.

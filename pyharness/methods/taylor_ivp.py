@@ -1,7 +1,7 @@
-"""Taylor series as a method of `scipy.integrate.solve_ivp`, for any ordinary differential equation.
+"""Taylor series as a method of `scipy.integrate.solve_ivp`, for any differential equation.
 
-The order is fixed, and the step is chosen from the last terms of the series (Jorba and Zou 2005,
-Experimental Mathematics 14, section 3).
+The order is fixed; the last terms decide the step (Jorba and Zou 2005, Experimental Mathematics 14,
+section 3).
 """
 
 import math
@@ -187,7 +187,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
 
 
 class _Series(DenseOutput):  # type: ignore[misc]
-    """The Taylor series of a step; a term includes its power of the step."""
+    """The Taylor series of a step; terms include powers of the step."""
 
     def __init__(self, t_old: float, t: float, terms: Array) -> None:
         super().__init__(t_old, t)
@@ -219,7 +219,6 @@ def recorded_equation(fun: Callable[..., Any], n: int) -> Tape:
 
 
 def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
-    """Return checked tolerances, each of shape (n,)."""
     found = []
     for name, value in (("rtol", rtol), ("atol", atol)):
         try:

@@ -15,8 +15,8 @@ LONGEST_TRIAL = 1e3
 class Step(NamedTuple):
     """A step that was taken, or tried: its length `h` is 0 if no step is short enough.
 
-    `terms` are those of the series, shape (order + 1, n), with powers of `h`; `state` is their sum.
-    `expansions` counts the series that were computed.
+    `terms`, shape (order + 1, n), include powers of `h`; `state` is their sum. `expansions` is the
+    number of series.
     """
 
     h: float
@@ -36,9 +36,8 @@ def taylor_step(
 ) -> Step:
     """Return a step of the equation y' = tape(t, y) from the time `t` and the state, shape (n,).
 
-    It is as long as `tolerances`, the largest errors of the components, allow; `relative` decides
-    the order. `trial` is a first guess, with the sign of the `longest` step, which ends at t +
-    longest, rounded.
+    `tolerances` are the largest errors of the components; `relative` decides the order; `trial` is
+    a guess, with the sign of the `longest` step, which ends at t + longest, rounded.
     """
     h, terms, end, order, expansions, status = extension().tape_step(
         tape, t, state, tolerances, relative, trial, longest, _N_TERMS

@@ -34,11 +34,12 @@ INSTRUMENTED = (
 
 @dataclass(frozen=True)
 class Check:
-    """A test by pytest's name, or `verify KIND`."""
+    """A test by pytest's name, or `verify KIND`; `make test` runs none that is a campaign."""
 
     name: str
     seconds: float
     functions: frozenset[str]
+    is_campaign: bool = False
 
 
 def command_of(kind: str) -> list[str]:
@@ -97,8 +98,8 @@ def _read(name: str) -> Iterable[Check]:
         return
     record = json.loads(path.read_text())
     functions = record["functions"]
-    for test, (seconds, entered) in record["tests"].items():
-        yield Check(test, seconds, frozenset(functions[i] for i in entered))
+    for test, (seconds, entered, is_campaign) in record["tests"].items():
+        yield Check(test, seconds, frozenset(functions[i] for i in entered), is_campaign)
 
 
 def _record(name: str, traced: Tree, plain: Tree, hooks: Path) -> tuple[str, str]:
@@ -119,17 +120,20 @@ def _record(name: str, traced: Tree, plain: Tree, hooks: Path) -> tuple[str, str
     if kind != name:
         found = {name: found["verify"]}
     # Tests that fail under the recording are tried again without it; skipped tests catch nothing.
-    failed = [test for test, (_, _, passed) in found.items() if not passed]
+    failed = [test for test, (_, _, passed, _) in found.items() if not passed]
     if failed and kind == name:
         _, said = plain.test([*PYTEST, "-v", *failed], OF_ONE_FILE)
         failed = [test for test in failed if f"{test} PASSED" not in said]
     for test in failed:
         del found[test]
-    functions = sorted({each for _, names, _ in found.values() for each in names})
+    functions = sorted({each for _, names, *_ in found.values() for each in names})
     index = {each: i for i, each in enumerate(functions)}
-    tests = {test: [s, [index[each] for each in names]] for test, (s, names, _) in found.items()}
+    tests = {
+        test: [seconds, [index[each] for each in names], is_campaign]
+        for test, (seconds, names, _, is_campaign) in found.items()
+    }
     record = {"digest": digest, "functions": functions, "tests": tests}
     _path(name).write_text(json.dumps(record))
     place.unlink()
-    said = f"{sum(s for s, _ in tests.values()):.1f} s, {len(tests)} tests"
+    said = f"{sum(s for s, *_ in tests.values()):.1f} s, {len(tests)} tests"
     return name, said + (f", not {', '.join(failed)}" if failed else "")

@@ -77,7 +77,7 @@ def _compiled_names() -> dict[int, str]:
 
 
 class Plugin:
-    """A plugin that writes {test: [seconds, names, passed]}."""
+    """A plugin that writes {test: [seconds, names, passed, is a campaign]}."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -93,7 +93,9 @@ class Plugin:
         yield
         names = self._recorder.end()
         seconds = round(time.perf_counter() - begin, 3)
-        self._tests[item.nodeid] = [seconds, names, item.nodeid not in self._failed]
+        is_campaign = item.get_closest_marker("campaign") is not None
+        passed = item.nodeid not in self._failed
+        self._tests[item.nodeid] = [seconds, names, passed, is_campaign]
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Remember a test that does not pass."""
@@ -119,7 +121,7 @@ def main() -> int:
     recorder.begin()
     code = run(sys.argv[1:])
     names = recorder.end()
-    one = {"verify": [round(time.perf_counter() - begin, 3), names, code == 0]}
+    one = {"verify": [round(time.perf_counter() - begin, 3), names, code == 0, True]}
     Path(os.environ["MUTATIONS_RECORD"]).write_text(json.dumps(one))
     return code
 

@@ -3,7 +3,7 @@
 import re
 import sys
 from collections.abc import Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 
 from tests.campaigns.mutations.reach import PYTEST, Check, command_of, files_of_tests
@@ -29,6 +29,7 @@ class Verdict:
     outcome: str
     by: str | None
     seconds: float = 0.0
+    is_fast: bool = False  # whether a test of `make test` caught it
 
 
 class NotCollected(Exception):
@@ -46,7 +47,7 @@ def attempt(mutation: Mutation, tree: Tree, unchanged: Tree, checks: list[Check]
             by = first_failure(tree, tier)
             if by and (by.name in _PASS or not first_failure(unchanged, [by])):
                 _PASS.add(by.name)
-                return Verdict(mutation, "caught", by.name)
+                return Verdict(mutation, "caught", by.name, is_fast=not by.is_campaign)
         return Verdict(mutation, "lives", None)
     except NotCollected:
         return Verdict(mutation, *_import(mutation, tree))
@@ -73,11 +74,15 @@ def put_in(mutation: Mutation, tree: Tree) -> str | None:
     return None
 
 
-def _import(mutation: Mutation, tree: Tree) -> tuple[str, str]:
+def _import(mutation: Mutation, tree: Tree) -> tuple[str, str, float, bool]:
     """Return the outcome if no test began: whether the mutation can be imported at all."""
     module = ".".join(PurePosixPath(mutation.file).with_suffix("").parts)
     code, _ = tree.run([sys.executable, "-c", f"import pyharness, {module}"], START)
-    return ("caught", "collection") if code == 0 else ("cannot be imported", "import")
+    return (
+        ("caught", "collection", 0.0, True)
+        if code == 0
+        else ("cannot be imported", "import", 0.0, False)
+    )
 
 
 def near(mutation: Mutation, checks: list[Check]) -> list[Check]:
@@ -118,13 +123,17 @@ def _tiers(mutation: Mutation, checks: list[Check]) -> list[list[Check]]:
     """Return lists of checks, each to be run if nothing failed in the lists before."""
     found = near(mutation, checks)
     kinds = sorted((e for e in found if e.name.startswith("verify")), key=lambda e: e.seconds)
-    tests = [each for each in found if not each.name.startswith("verify")]
+    tests = [each for each in found if not each.is_campaign]
     # A test run with few files begins soonest.
     own = _within([each for each in tests if _own(mutation) in each.name], OWN)
     first = _within(_without(tests, own), FIRST)
     # Start again from the quickest, so that most of them fit.
-    rest = sorted(_without(tests, [*own, *first]), key=lambda each: each.seconds)
-    return [own, first, _within(rest, SECOND), *([kind] for kind in _within(kinds, VERIFY))]
+    rest, campaigns = (
+        sorted(each, key=lambda each: each.seconds)
+        for each in (_without(tests, [*own, *first]), _without(found, [*tests, *kinds]))
+    )
+    more = _within(rest, SECOND), _within(campaigns, SECOND)
+    return [own, first, *more, *([kind] for kind in _within(kinds, VERIFY))]
 
 
 def _without(checks: list[Check], tried: list[Check]) -> list[Check]:
@@ -164,7 +173,7 @@ def first_failure(tree: Tree, checks: list[Check]) -> Check | None:
         # The check may be a file, or a test with all its parameters.
         wider = (name, name.partition("[")[0], name.partition("::")[0])
         if found := next((by_name[each] for each in wider if each in by_name), None):
-            return Check(name, found.seconds, found.functions)
+            return replace(found, name=name)
     if failed or code in (2, 3, 4):
         raise NotCollected
     # A test crashed, or never ended.

@@ -26,10 +26,10 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 
 
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
-    """Return user values as a float array, a single row as an array of one row.
+    """Return user values as a float array of rows, a single row as one, or raise InputError.
 
-    `shape` is that of a row, where a letter such as "k" stands for any length. `rule` has a test
-    that every number must pass, and a phrase that names those which do. Raise InputError otherwise.
+    In `shape`, that of a row, a letter such as "k" is any length. Each number must pass the test in
+    `rule`, which has a phrase for those that do.
     """
     if type(values) is float and not shape and rule is None:
         return np.array([values])
@@ -48,10 +48,7 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
 
 
 def numbers_of(where: str, values: object) -> Array:
-    """Return user values as a float64 array of the same, any, shape.
-
-    Raise InputError if one is not a real number; fractions, decimals and long integers are.
-    """
+    """Return real numbers, also fractions, decimals and long integers, as float64, any shape."""
     try:
         found = np.asarray(values)
     except Exception as error:  # rows of different lengths, or a user-defined class
@@ -118,10 +115,9 @@ def threads_of(threads: object) -> int:
 
 
 def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
-    """Return the user's output array if a compiled kernel can write to it.
+    """Return the user's output array if a kernel can write to it, or raise InputError.
 
-    Raise InputError unless it has `shape` and type character `kind`, as "d", and is writable,
-    contiguous and aligned.
+    It must have `shape`, type character `kind`, as "d", and be writable, contiguous and aligned.
     """
     right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype.char == kind
     if not (right and array.flags.c_contiguous and array.flags.writeable and array.flags.aligned):

@@ -1,8 +1,7 @@
 """Attitudes as unit quaternions from body to space, scalar first, with Hamilton's product.
 
-A vector with components v about the body axes has q v q* about those of space, with the quaternion
-q and its conjugate q*. The equation q' = q (0, omega)/2 is integrated; angles and matrices are only
-other forms.
+Components v about the body axes are q v q* about those of space, with the conjugate q*. The
+equation q' = q (0, omega)/2 is integrated. Each InputError begins with `where`.
 """
 
 import math
@@ -33,18 +32,15 @@ _ROUNDED = 2.0**-51  # deviation of a norm from 1 that normalisation cannot redu
 
 
 def scalar_first(values: object) -> Any:
-    """Return the quaternions, scalar first, of a SciPy `Rotation`, and anything else as it is.
-
-    SciPy is not imported: a `Rotation` has the method `as_quat`.
-    """
+    """Return the quaternions of a SciPy `Rotation`, not imported, and anything else as it is."""
     as_quat = getattr(values, "as_quat", None)
     return values if as_quat is None else np.asarray(as_quat())[..., [3, 0, 1, 2]]
 
 
 def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
-    """Return four numbers, or a SciPy `Rotation`, as a unit quaternion, and their norm.
+    """Return four numbers or a `Rotation` as a unit quaternion, and their norm.
 
-    Raise InputError, beginning with `where`, unless they are finite and not all 0.
+    Raise InputError unless they are finite and not all 0.
     """
     allowed = "allowed: four finite numbers, scalar first, not all 0"
     given = [finite(where, each) for each in number_list(where, scalar_first(values), allowed)]
@@ -63,10 +59,9 @@ def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
 
 
 def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
-    """Return the attitude after three successive rotations about body axes, from those of space.
+    """Return the attitude after three rotations about body axes, at first those of space.
 
-    `sequence` numbers the axes, as in "3-1-3". Raise InputError, beginning with `where`, for one
-    not in `SEQUENCES`, or angles that are not three finite numbers.
+    Raise InputError for a `sequence` not in `SEQUENCES`, as "3-1-3", or other than finite angles.
     """
     if not isinstance(sequence, str) or sequence not in SEQUENCES:
         name = sequence if isinstance(sequence, str) else kind_of(sequence)
@@ -105,9 +100,8 @@ def quaternion_rates(omega: Iterable[Any], q: Iterable[Any]) -> list[Any]:
 def angles(attitude: Array, sequence: str) -> Array:
     """Return n attitudes, (n, 4), as angles (degrees) of three successive rotations, (n, 3).
 
-    At a pole, where the first and last axes are parallel in space, only the sum or difference of
-    their angles is determined, and the last is set to 0. Arc tangents of half angles are accurate
-    even near a pole.
+    Where the first and last axes are parallel, only the sum or difference of their angles is
+    determined, and the last is 0. Arc tangents of half angles are accurate even near there.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":
@@ -140,10 +134,7 @@ def matrices(attitude: Array) -> Array:
 
 
 def angle_between(attitude: Array, other: Array) -> Array:
-    """Return the angle (rad) between each pair of attitudes, (n, 4), shape (n,).
-
-    It is 0 between a quaternion and its negative, the same attitude.
-    """
+    """Return the angle (rad) between each pair of attitudes, (n,); 0 for a negative quaternion."""
     a, b, c, d = attitude.T
     e, f, g, h = other.T
     vector = np.array([

@@ -77,9 +77,8 @@ def build() -> Build:
 class Installation:
     """The installation and the machine, for a bug report; None for what is missing.
 
-    `installer` has the word ``editable`` for an editable installation. `cores` may be used by this
-    process, and the kernels use `instructions`. `arithmetic` says what disturbs that of the
-    kernels, else ``as written``. `environment` has the variables of `INFLUENCES` that are set.
+    `arithmetic` says what disturbs that of the kernels, else ``as written``; `environment` has the
+    set variables of `INFLUENCES`.
     """
 
     folder: str
@@ -112,7 +111,7 @@ def _cores() -> int:
 
 
 def _installer() -> str:
-    """Return the program that installed the distribution, such as ``pip, editable``."""
+    """Return the installer, such as ``pip, editable``."""
     import json
     from importlib.metadata import PackageNotFoundError, distribution
 
@@ -126,7 +125,7 @@ def _installer() -> str:
 
 
 def _instructions() -> str | None:
-    """Return the best set of instructions that was built and that this processor has."""
+    """Return the best set of instructions of build and processor."""
     try:
         from pyharness._kernels import choose_instructions
     except ImportError:
@@ -136,7 +135,6 @@ def _instructions() -> str | None:
 
 
 def _arithmetic() -> str | None:
-    """Return what disturbs the arithmetic of the kernels, tested by a compiled function."""
     try:
         from pyharness._kernels import arithmetic_faults
     except ImportError:

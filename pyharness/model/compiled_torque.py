@@ -27,7 +27,7 @@ _PYTHON_API = 4
 class CompiledTorque:
     """A compiled function as the function of an opaque torque.
 
-    The addresses of function and user's data, or 0, are valid as long as `owner` exists.
+    Its addresses, or 0, are valid as long as `owner` exists.
     """
 
     address: int
@@ -74,5 +74,5 @@ def _numbers(values: Sequence[float]) -> Any:
 
 
 def _api(name: str, result: Any, *arguments: Any) -> Any:
-    """Return a function of Python's C interface, whose first argument is an object."""
+    """Return a function of Python's C interface."""
     return ctypes.PYFUNCTYPE(result, ctypes.py_object, *arguments)((name, ctypes.pythonapi))

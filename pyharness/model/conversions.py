@@ -28,8 +28,6 @@ _SHOWN = 3
 
 
 class _Quantity(NamedTuple):
-    """An array of a trajectory with its names: a vector for each row, or a number for each row."""
-
     name: str
     long_name: str
     unit: str
@@ -210,7 +208,6 @@ class Conversions(SciPyNames):
         save(cast("Trajectory", self), path)
 
     def _repr_html_(self) -> str:
-        """Return a short table of the trajectory as HTML, which notebooks show."""
         facts = {
             "ended": self.message,
             "rows": str(len(self.time)),
@@ -232,7 +229,6 @@ class Conversions(SciPyNames):
         return "\n".join([*lines, "</tbody></table>", *self._html_rows()])
 
     def _html_rows(self) -> list[str]:
-        """Return lines of HTML with a table of the first and the last rows."""
         count = len(self.time)
         if not count:
             return []
@@ -254,7 +250,6 @@ class Conversions(SciPyNames):
         return [*lines, "</tbody></table>"]
 
     def _quantities(self) -> list[_Quantity]:
-        """Return the quantities of the rows that have values, except the time."""
         about = "angular velocity about the body axes"
         names = tuple(f"omega{axis}" for axis in (1, 2, 3))
         found = [_Quantity("omega", about, "rad/s", names, self.omega)]

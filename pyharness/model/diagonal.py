@@ -1,9 +1,8 @@
 """Diagonalisation of symmetric 3 x 3 matrices in integers, with high relative accuracy.
 
-In binary64 every eigenvalue has an error of about 1e-16 times the largest, so that a small one has
-few digits. The elements are integer multiples of a power of 2; hence the absolute determinant of a
-regular matrix is at least the cube of this unit, and its smallest absolute eigenvalue has a lower
-bound, which determines how many bits the integers need.
+In binary64 a small eigenvalue has few digits. The elements are integer multiples of a power of 2;
+hence the absolute determinant of a regular matrix is at least the cube of this unit, and its
+smallest absolute eigenvalue has a lower bound, which determines how many bits are needed.
 """
 
 import math
@@ -66,9 +65,9 @@ def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
 
 
 def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: int) -> None:
-    """Make element p, q of `a` 0 by a Jacobi rotation of `a` and the eigenvectors in place.
+    """Make element p, q of `a` 0 by the smaller Jacobi rotation (Rutishauser 1966), in place.
 
-    It is by the smaller angle (Rutishauser 1966). `vectors` have the unit 2**-bits.
+    The eigenvectors have the unit 2**-bits.
     """
     r = 3 - p - q
     gap, twice = a[q][q] - a[p][p], 2 * a[p][q]
@@ -90,7 +89,7 @@ def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: 
 
 
 def _last_bit(x: float) -> int:
-    """Return the exponent e of the lowest nonzero bit, 2**e, of a finite number that is not 0."""
+    """Return the exponent of the lowest nonzero bit of a number."""
     numerator, denominator = x.as_integer_ratio()
     if denominator > 1:
         return 1 - denominator.bit_length()

@@ -15,7 +15,7 @@ class Dual:
         return Dual(value, [slope * each for each in self.slopes])
 
     def __add__(self, other: Any) -> "Dual":
-        """Return the sum with a number or a dual number."""
+        """Return the sum with any number."""
         second = dual(other, len(self.slopes))
         slopes = [x + y for x, y in zip(self.slopes, second.slopes, strict=True)]
         return Dual(self.value + second.value, slopes)
@@ -23,7 +23,7 @@ class Dual:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> "Dual":
-        """Return the difference from a number or dual number."""
+        """Return the difference from any number."""
         return self.__add__(-1.0 * other)
 
     def __rsub__(self, other: Any) -> "Dual":
@@ -31,7 +31,7 @@ class Dual:
         return self.__mul__(-1.0).__add__(other)
 
     def __mul__(self, other: Any) -> "Dual":
-        """Return the product with a number or a dual number."""
+        """Return the product with any number."""
         second = dual(other, len(self.slopes))
         slopes = [
             x * second.value + self.value * y
@@ -42,7 +42,7 @@ class Dual:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> "Dual":
-        """Return the quotient by a number or a dual number."""
+        """Return the quotient by any number."""
         second = dual(other, len(self.slopes))
         quotient = self.value / second.value
         slopes = [

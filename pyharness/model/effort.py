@@ -1,8 +1,4 @@
-"""Limits of the work of a computation, and the option `effort` that changes them.
-
-A method reaches its limit, for example in steps times torque waves, after some ten seconds. All
-limits are multiplied by `effort`.
-"""
+"""Limits of the work of a computation, reached after some ten seconds, times `effort`."""
 
 import math
 from collections.abc import Sequence
@@ -38,10 +34,7 @@ class Integrator(Protocol):
     def __call__(
         self, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, /
     ) -> Trajectory:
-        """Return the trajectory at `times` (s), of one sign and away from 0, or raise InputError.
-
-        `tolerance` is relative to the largest component of omega.
-        """
+        """Return the trajectory at `times` (s), of one sign and away from 0."""
 
 
 def checked_effort(effort: Number) -> float:
@@ -53,18 +46,15 @@ def checked_effort(effort: Number) -> float:
 
 
 def advice(instead: str, effort: float, needed: float | None = None) -> str:
-    """Return the end of a message about an exceeded work limit: what the user can do.
-
-    `instead` is another remedy, as "use fewer steps"; `needed` estimates the factor that suffices.
-    """
+    """Return the end of a message about an exceeded work limit: `instead`, or a larger effort."""
     factor = suggested(effort, needed)
     return f"{instead}, or allow more work: --effort {factor} (effort={factor} in Python)"
 
 
 def suggested(effort: float, needed: float | None = None) -> str:
-    """Return, as text, a factor on the work limit with which a computation should complete.
+    """Return a factor on the work limit with which a computation should complete, as text.
 
-    It is twice `needed`, at least the insufficient `effort`, or ten times that, to two digits.
+    It is twice `needed`, or ten times the insufficient `effort`.
     """
     factor = max(_SLACK * needed, effort) if needed else _UNFORESEEN * effort
     factor = min(1e300, factor)
@@ -81,10 +71,9 @@ def waves(scene: Scene) -> int:
 
 
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
-    """Raise InputError if the run of a program on one scene would exceed its work limit.
+    """Raise InputError if a program exceeds the work limit of an `implementation`, as "python".
 
-    The work is the number of steps, increased for each wave; `implementation`, as "python", selects
-    the limit.
+    The work is the number of steps, increased for each wave.
     """
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)
@@ -99,7 +88,7 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
 
 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
-    """Raise InputError if the run of a compiled program on many bodies would exceed the work limit.
+    """Raise InputError if a compiled program on many bodies exceeds the work limit.
 
     The work is `bodies` times steps times one plus the number of waves.
     """

@@ -35,19 +35,16 @@ class InputError(ValueError):
 
 
 class TimedError(InputError):
-    """An InputError whose message contains a time (s) of the integrated scene.
-
-    If that is the user's scene with rescaled time, `slower` converts the time.
-    """
+    """An InputError with a time (s), which `slower` converts from rescaled time."""
 
     def __init__(self, message: str, time: float) -> None:
-        """Store the message, with `time` (s) in place of the text ``{time}``."""
+        """Store the message, with `time` in place of ``{time}``."""
         super().__init__(message.replace("{time}", f"{time:.6g}"))
         self.time = time
         self._message = message
 
     def __reduce__(self) -> tuple[type["TimedError"], tuple[str, float]]:
-        """Return the class and the arguments with which multiprocessing pickles the error."""
+        """Return the class and the arguments for `pickle`."""
         return type(self), (self._message, self.time)
 
     def slower(self, factor: float) -> "TimedError":
@@ -80,7 +77,7 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def kind_of(value: object) -> str:
-    """Return the type of a value for a message, as "a list", alike for TOML, Python and NumPy."""
+    """Return the type of a value in words, as "a list", alike for TOML, Python and NumPy."""
     kinds = {
         "text": (str, bytes, bytearray), "true or false": (bool,), "a whole number": (int,),
         "a number": (float,), "a complex number": (complex,), "a list": (list, tuple),
@@ -101,9 +98,9 @@ def kind_of(value: object) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return the InputError for a name that is not allowed, with a similar one if there is any.
+    """Return the InputError for a name, with a similar one that is allowed.
 
-    `what` is the kind of name, as "case", and the message begins with `where`, as "--fix".
+    `what` is as "case", and the message begins with `where`, as "--fix".
     """
     import difflib
 

@@ -14,7 +14,6 @@ _LARGEST = Fraction(sys.float_info.max)
 
 
 def _product(first: Sequence[Fraction], second: Sequence[Fraction]) -> list[Fraction]:
-    """Return the exact product of two polynomials."""
     found = [Fraction(0)] * (len(first) + len(second))
     for i, a in enumerate(first):
         for j, b in enumerate(second):
@@ -43,8 +42,8 @@ def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
 def _first_zero(polynomial: Sequence[Fraction]) -> float:
     """Return the first zero of a polynomial after time 0, or infinity.
 
-    It is above 0 in an interval if all its coefficients in Bernstein's basis are (Farouki 2012,
-    Computer Aided Geometric Design 29). Other intervals are halved, in integers.
+    It is above 0 in an interval if its coefficients in Bernstein's basis are (Farouki 2012,
+    Computer Aided Geometric Design 29); others are halved.
     """
     if min(polynomial) >= 0:
         return math.inf
@@ -73,10 +72,9 @@ def _first_zero(polynomial: Sequence[Fraction]) -> float:
 
 
 def _bound(polynomial: Sequence[int]) -> int:
-    """Return the exponent of a power of two that no positive zero of a polynomial exceeds.
+    """Return the exponent of a power of two that no positive zero exceeds.
 
-    The bound is Kioustelidis' (1986, Journal of Computational and Applied Mathematics 16), rounded
-    up.
+    Kioustelidis 1986, Journal of Computational and Applied Mathematics 16, has the bound.
     """
     degree, last = len(polynomial) - 1, polynomial[-1]
     return 1 + max(
@@ -87,7 +85,7 @@ def _bound(polynomial: Sequence[int]) -> int:
 
 
 def _bernstein(polynomial: Sequence[int]) -> list[int]:
-    """Return the coefficients in Bernstein's basis from 0 to 1, times a common factor."""
+    """Return the coefficients in Bernstein's basis, times a common factor."""
     degree = len(polynomial) - 1
     factor = math.lcm(*(math.comb(degree, j) for j in range(degree + 1)))
     parts = [c * (factor // math.comb(degree, j)) for j, c in enumerate(polynomial)]
@@ -98,7 +96,7 @@ def _bernstein(polynomial: Sequence[int]) -> list[int]:
 
 
 def _halves(row: list[int]) -> tuple[list[int], list[int]]:
-    """Return the Bernstein coefficients of both halves, times 2**degree (de Casteljau)."""
+    """Return those of both halves, times 2**degree (de Casteljau)."""
     degree = len(row) - 1
     early, late = [row[0] << degree], [row[-1] << degree]
     for n in range(degree - 1, -1, -1):

@@ -1,7 +1,6 @@
 """Torques as text: three arithmetic expressions of time, omega and attitude, as in scene files.
 
-Only allowed nodes of the syntax tree are evaluated, with symbols, which record the operations. No
-text of a user is run as Python code.
+Only allowed nodes of the syntax tree are evaluated, with symbols; no text is run as Python code.
 """
 
 import ast
@@ -42,12 +41,11 @@ _SUM: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
 
 
 def parsed(expressions: object, constants: object) -> StateTorque | TorqueLaw:
-    """Return the torque of three expressions, the components about the body axes.
+    """Return the torque of three expressions about the body axes, a torque law if possible.
 
-    They have t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3 from body to space, pi, and
-    the names in `constants`, and are in N m, or in 1/s2 for a body with coefficients. The result is
-    a torque law if they have the form of one. Raise InputError, with the place, for an invalid text
-    or constant.
+    They have t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, and `constants`, and are
+    in N m, or in 1/s2 for a body with coefficients. Raise InputError, with the place, for an
+    invalid one.
     """
     values = _checked_constants(constants)
     texts = _three_texts(expressions)
@@ -90,7 +88,6 @@ def _checked_constants(constants: object) -> dict[str, float]:
 
 
 def _three_texts(expressions: object) -> dict[str, str]:
-    """Return the expressions by place."""
     where = "[torque] expression"
     given = list(itertools.islice(number_list(where, expressions, _THREE), 4))
     if len(given) != 3:
@@ -115,7 +112,7 @@ def _three_texts(expressions: object) -> dict[str, str]:
 
 
 def _component(text: str, names: Mapping[str, Any], place: str) -> Any:
-    """Return the value of an expression, a symbol or a float; `names` are the values of names."""
+    """Return the value of an expression, a symbol or a float."""
     found: dict[ast.AST, Any] = {}
     # A node follows its parent in the list. A loop, unlike recursion, needs no depth of the stack.
     for node in reversed(_nodes(text, place)):
@@ -134,7 +131,6 @@ def _component(text: str, names: Mapping[str, Any], place: str) -> Any:
 
 
 def _tree(text: str, place: str) -> ast.expr:
-    """Return the syntax tree of an expression."""
     if not text:
         raise InputError(f"{place} is empty; write '0' for no torque about this axis")
     try:
@@ -154,7 +150,7 @@ def _tree(text: str, place: str) -> ast.expr:
 
 
 def _nodes(text: str, place: str) -> list[ast.expr]:
-    """Return the nodes of an expression, each after its parent; raise InputError for others."""
+    """Return the nodes, each after its parent, or raise InputError."""
     nodes, waiting = [], [(_tree(text, place), 1)]
     while waiting:
         node, depth = waiting.pop()
@@ -188,7 +184,7 @@ def _operands(node: ast.expr, text: str, place: str) -> list[ast.expr]:
 def _value(
     node: ast.expr, found: Mapping[ast.AST, Any], names: Mapping[str, Any], place: str
 ) -> Any:
-    """Return the value of a node, a symbol or a float; `found` has the values of its operands."""
+    """Return the value of a node from those of its operands in `found`."""
     try:
         match node:
             case ast.Constant(value):

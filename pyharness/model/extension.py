@@ -30,7 +30,6 @@ def extension() -> ModuleType:
 
 
 def _why_missing() -> str:
-    """Return why the extension is missing, and what to do."""
     from importlib.metadata import PackageNotFoundError, distribution
 
     here = Path(__file__).parents[1]

@@ -52,11 +52,7 @@ class PrincipalFrame:
 
 
 def checked_inertia(where: str, values: object) -> Matrix:
-    """Return a user's inertia matrix (kg m2) as rows, made exactly symmetric.
-
-    Raise InputError, beginning with `where`, unless it is symmetric up to rounding, with positive
-    moments.
-    """
+    """Return a user's inertia matrix (kg m2), made exactly symmetric, or raise InputError."""
     matrix = symmetric_matrix(where, values)
     least = min(principal_frame(matrix).exact_moments)
     if not least > 0:
@@ -68,7 +64,7 @@ def checked_inertia(where: str, values: object) -> Matrix:
 
 
 def symmetric_matrix(where: str, values: object) -> Matrix:
-    """Return a user's symmetric matrix as rows, or raise InputError; moments are not checked."""
+    """Return a user's symmetric matrix, or raise InputError; moments are not checked."""
     allowed = "allowed: three rows of three finite numbers, kg m2"
     rows = list(number_list(where, values, allowed))
     if any(isinstance(converted(row), float) for row in rows):
@@ -91,11 +87,7 @@ def symmetric_matrix(where: str, values: object) -> Matrix:
 
 @lru_cache(maxsize=_KEPT)
 def principal_frame(inertia: Matrix) -> PrincipalFrame:
-    """Return the principal moments and axes of an inertia matrix (kg m2), which are cached.
-
-    Moments are not sorted; each is accurate to its last digit, even if much smaller than the
-    others.
-    """
+    """Return the principal moments, each accurate to its last digit and unsorted, and axes."""
     found = diagonalised(inertia)
     order: list[int] = []
     # To each body axis, the nearest of the remaining eigenvectors is assigned.
@@ -127,7 +119,7 @@ def _turned(axis: Exact) -> Exact:
 
 
 def _determinant(axes: list[Exact]) -> float:
-    """Return the determinant of three orthonormal axes, 1 or -1 up to rounding errors."""
+    """Return the determinant, 1 or -1 up to rounding errors."""
     (a, b, c), (d, e, f), (g, h, k) = ([float(x) for x in axis] for axis in axes)
     return a * (e * k - f * h) - b * (d * k - f * g) + c * (d * h - e * g)
 

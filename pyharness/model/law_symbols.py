@@ -1,8 +1,4 @@
-"""Torque laws in symbols: the value of a law, its integral over time, and its derivative.
-
-A law is any vector in the form of a `TorqueLaw`, also a magnetic field. Times and attitudes may be
-symbols.
-"""
+"""Torque laws, or fields, in symbols: the value, its integral over time, and its derivative."""
 
 from typing import Any
 
@@ -51,7 +47,7 @@ def law_derivative(law: TorqueLaw) -> TorqueLaw:
 def to_body(vector: Any, attitude: Any) -> Array:
     """Return a vector about the axes of space in components about the body axes.
 
-    The rotation matrix is written out, because terms of one torque then share its products.
+    The matrix is written out, because terms of one torque then share its products.
     """
     u, v, w = vector
     a, x, y, z = attitude

@@ -83,10 +83,7 @@ class Listing:
 
     @property
     def label(self) -> str:
-        """The kind of listing: `corrected` if nothing is active, `original`, or `custom`.
-
-        Readings do not matter to `original`, but the defects and conjectures of `switches` do.
-        """
+        """The kind: `corrected` if nothing is active, `original` by `switches`, or `custom`."""
         if not self.active:
             return "corrected"
         return (

@@ -162,7 +162,6 @@ class Mechanics:
         return work
 
     def _momentum(self, omega: Array) -> Array:
-        """Return the product of the inertia (kg m2) and each row of `omega` (rad/s)."""
         moments = self._checked_moments()
         if isinstance(moments, Changing):
             return moments.momentum(self.time, omega)

@@ -51,11 +51,10 @@ def check_writable(path: str, option: str) -> None:
 
 
 def write_files(contents: dict[str, bytes], option: str) -> None:
-    """Write several files, by path, either all or none.
+    """Write several files, either all or none, or raise InputError, which names `option`.
 
-    They are written under temporary names and then renamed; after any failure or Ctrl-C the
-    previous files are restored. Devices and pipes are written first, and never replaced. Raise
-    InputError, which names `option`, if a file can't be written.
+    They have temporary names and are then renamed; after any failure or Ctrl-C the previous files
+    are restored. Devices and pipes are written first, and never replaced.
     """
     path = ""
     try:
@@ -116,7 +115,7 @@ class DeferredInterrupt:
 
 
 class _File:
-    """A file `target` with the temporary paths of its `new` content and its `old` copy."""
+    """A file with paths of its `new` content and its `old` copy."""
 
     def __init__(self, path: str) -> None:
         self.path = path
@@ -164,5 +163,4 @@ def _remove(names: list[str]) -> None:
 
 
 def _is_special(path: str) -> bool:
-    """Return whether a path exists and is no ordinary file."""
     return Path(path).exists() and not Path(path).is_file()

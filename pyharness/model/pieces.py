@@ -25,8 +25,7 @@ def share(
 ) -> None:
     """Call `work` for each of `pieces`, ranges of bodies, in at most `threads` threads.
 
-    After an exception in a thread, as by Ctrl-C, the integer `given_up` is set to 1; the kernels
-    poll it, and end early in all threads.
+    After an exception, as by Ctrl-C, the integer `given_up` is 1, and kernels, which poll it, end.
     """
     if threads == 1 or len(pieces) < 2:
         # The work is done in the calling thread, because only the main thread receives signals.
@@ -48,10 +47,7 @@ def share(
 
 
 def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, threads: int) -> None:
-    """Divide n bodies into pieces of nearly the same size, and call `work` for each in threads.
-
-    Its arguments are a slice, and the integer of `share`.
-    """
+    """Call `work` for pieces of nearly the same size, with the integer of `share`, in threads."""
     if not n:
         return
     given_up = np.zeros(1, dtype=np.int32)

@@ -13,11 +13,10 @@ _PIECE = 1 << 20
 
 
 def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) -> bytes:
-    """Return the content of a file or pipe, such as ``/dev/stdin``, that a user named.
+    """Return the content of a file or pipe that a user named.
 
     Raise InputError, beginning with `where`, for what can't be read, a folder, a device, more than
-    `limit` bytes, or a pipe without data for `PATIENCE` (10) seconds. The message names `what` is
-    expected, as "a TOML file".
+    `limit` bytes, or a pipe without data for `PATIENCE` (10) seconds; `what` is expected.
     """
     try:
         content = _read(os.fspath(path), limit)
@@ -30,7 +29,7 @@ def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) 
 
 
 def _read(path: str, limit: int) -> bytes | None:
-    """Return the content of a file, or None if it has more than `limit` bytes."""
+    """Return the content of a file, or None above `limit` bytes."""
     # Without O_NONBLOCK, opening a pipe waits for a writer.
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
     try:
@@ -56,7 +55,7 @@ def _read(path: str, limit: int) -> bytes | None:
 
 
 def _is_quiet(handle: int) -> bool:
-    """Return whether a device is a terminal or the null device, which alone may be read."""
+    """Return whether a device is a terminal or null, which may be read."""
     return os.isatty(handle) or os.fstat(handle).st_rdev == os.stat(os.devnull).st_rdev
 
 

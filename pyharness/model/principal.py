@@ -18,9 +18,8 @@ from pyharness.model.waves import exact_law
 class PrincipalScene(Scene):
     """A scene about the principal axes, with moments in double-double precision.
 
-    The coefficients of Euler's equations contain differences of moments, of which rounding errors
-    would be a large part if two are nearly equal. `moments_low` is the exact moments minus
-    `moments` (kg m2).
+    Otherwise rounding errors would be a large part of the coefficients A, B, C of nearly equal
+    moments. `moments_low` is the exact moments minus `moments` (kg m2).
     """
 
     moments_low: Triple = (0.0, 0.0, 0.0)

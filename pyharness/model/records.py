@@ -15,7 +15,7 @@ from pyharness.model.trajectory import Trajectory
 def scene_record(scene: Scene) -> dict[str, Any]:
     """Return a scene for JSON, with the keys of a scene file and "case".
 
-    A "torque" that no scene file can describe has the number of operations, or "opaque".
+    A function as "torque" has its number of operations, or "opaque".
     """
     body, values = body_of(scene)
     return {
@@ -52,7 +52,6 @@ def _torque(torque: TorqueLaw | StateTorque) -> dict[str, Any]:
 
 
 def _value(value: Any) -> Any:
-    """Return a value of a ready term for JSON."""
     if isinstance(value, TorqueLaw):
         return _law(value)
     return list(map(_value, value)) if isinstance(value, tuple) else value
@@ -83,10 +82,7 @@ def listing_record(listing: Listing) -> dict[str, Any]:
 
 
 def ending_record(trajectory: Trajectory) -> dict[str, Any]:
-    """Return how a run ended for JSON: "steps", "evaluations", "stop" and "ended".
-
-    "stop" has the step, the variable and the Lipschitz quotient (1/s), or is None.
-    """
+    """Return "steps", "evaluations", "ended" and "stop" (or None) of a run for JSON."""
     stop = trajectory.stop
     return {
         "steps": trajectory.steps,

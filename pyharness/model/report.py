@@ -1,7 +1,6 @@
 """Reports: the results of a verb as data, which `pyharness.views` renders.
 
-The types are named tuples, because every start of the program creates them; a dataclass takes as
-long as five.
+Every start creates the types; a dataclass takes as long as five of these named tuples.
 """
 
 import math

@@ -140,7 +140,7 @@ class Scene:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the fields, and convert real numbers to floats, or raise InputError."""
+        """Check the fields, or raise InputError."""
         if not isinstance(self.name, str):
             raise InputError(f"name is {kind_of(self.name)}; it must be text")
         self._set("name", printable(" ".join(self.name.split()))[:_LONGEST_NAME].rstrip())
@@ -192,7 +192,7 @@ class Scene:
         warn_of_impossible(self)
 
     def __repr__(self) -> str:
-        """Return the fields as the arguments of a call; `changing` only if it is not None."""
+        """Return the fields as the arguments of a call."""
         names = [each.name for each in fields(self) if each.repr]
         shown = [x for x in names if x != "changing" or self.changing is not None]
         return f"Scene({', '.join(f'{x}={getattr(self, x)!r}' for x in shown)})"
@@ -219,10 +219,9 @@ class Scene:
 
     @property
     def euler_coefficients(self) -> Triple:
-        """The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
+        """The coefficients A = (I2 - I3)/I1, B, C of Euler's equations (13-15 of the thesis).
 
-        A is (I2 - I3)/I1; B and C follow by cyclic permutation. Raise InputError for a full inertia
-        matrix, or one that changes with time.
+        Raise InputError for a full inertia matrix, or one that changes with time.
         """
         if self.coefficients is not None:
             return self.coefficients
@@ -233,7 +232,7 @@ class Scene:
 
     @property
     def exact_moments(self) -> "Exact | None":
-        """The principal moments (kg m2) as exact fractions; None for a body with coefficients.
+        """The principal moments (kg m2) as exact fractions; None for coefficients.
 
         Raise InputError for a full inertia matrix, or one that changes with time.
         """
@@ -256,8 +255,7 @@ class Scene:
     def is_impossible(self) -> bool:
         """Whether no rigid body has the moments of inertia at time 0.
 
-        The largest then exceeds the sum of the other two by more than rounding (2**-50 of it).
-        Coefficients are always possible.
+        The largest exceeds the sum of the others by more than rounding (2**-50 of it).
         """
         moments, inertia = self.moments, self.inertia
         if isinstance(self.changing, ChangingMoments):
@@ -272,9 +270,9 @@ class Scene:
 
     @property
     def law(self) -> TorqueLaw:
-        """The torque law; read in place of `torque` by code that can treat no other scene.
+        """The torque law, for code that can treat no other scene.
 
-        Raise InputError if the torque depends on the state, or the inertia changes with time.
+        Raise InputError if the torque depends on the state, or the inertia changes.
         """
         if self.changing is not None:
             raise InputError(CHANGING)
@@ -301,10 +299,7 @@ class Scene:
         return first / self.moments[0], second / self.moments[1], third / self.moments[2]
 
     def right_hand_side(self) -> Callable[[float, Sequence[float]], list[float]]:
-        """Return the right-hand side f(t, omega) of Euler's equations (16-18 of the thesis).
-
-        Its arguments are in s and rad/s, its three floats in rad/s2.
-        """
+        """Return f(t, omega) (rad/s2) of Euler's equations (16-18 of the thesis)."""
         a, b, c = self.euler_coefficients
         if self.body_torque.varies:
 
@@ -326,7 +321,7 @@ class Scene:
 def most_steps() -> int:
     """Return the largest number of steps whose results fit in half of this machine's memory.
 
-    It is at most 400 million: the compiled programs count in 32 bits.
+    Compiled programs count in 32 bits, to 400 million.
     """
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return min(memory // 2 // _BYTES_PER_STEP, _COUNTABLE_STEPS)
@@ -347,11 +342,7 @@ def checked_scene(
     any_state: bool = False,
     changing: bool = False,
 ) -> Scene:
-    """Return the argument `scene`; raise InputError unless it is a Scene that the caller accepts.
-
-    The flags accept full inertia matrices, torques about the axes of space, torques of the state,
-    and changing inertia.
-    """
+    """Return the argument `scene`; raise InputError unless it is a Scene of an accepted kind."""
     if isinstance(scene, Scene):
         if scene.changing is not None and not changing:
             raise InputError(CHANGING)

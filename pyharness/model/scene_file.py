@@ -94,10 +94,10 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
 
 
 def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
-    """Return a scene as the text of a scene file, from which `read_scene` restores it bit for bit.
+    """Return the text of a scene file, from which `read_scene` restores a scene bit for bit.
 
-    Masses, forces and case are not written. `comments` are lines at the beginning. Raise InputError
-    for a torque that is an opaque or recorded function, and above 1 000 000 bytes.
+    Masses, forces and case are not written. Raise InputError for an opaque or recorded torque, and
+    above 1 000 000 bytes.
     """
     import json
 
@@ -122,7 +122,6 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
 
 
 def _torque_lines(scene: Scene) -> list[str]:
-    """Return the lines of a scene file with the tables of a scene's torque."""
     torque = scene.torque
     if isinstance(torque, TorqueLaw):
         return ["[torque]", *_law_lines(torque)]
@@ -155,7 +154,7 @@ def _torque_lines(scene: Scene) -> list[str]:
 
 
 def _term_lines(term: tuple[tuple[str, Any], ...], changing: Changing | None) -> list[str]:
-    """Return the lines of a ready term, without an inertia that changes as that of the body."""
+    """Return the lines of a ready term, whose inertia may only change as the body's."""
     if any(isinstance(value, Changing) and value != changing for _, value in term):
         raise InputError(
             f"[torque]: a term {term[0][1]} whose inertia changes otherwise than that of the body "
@@ -165,7 +164,6 @@ def _term_lines(term: tuple[tuple[str, Any], ...], changing: Changing | None) ->
 
 
 def _has_form(torque: TorqueLaw | StateTorque) -> bool:
-    """Return whether a scene file can describe a torque."""
     return isinstance(torque, TorqueLaw) or bool(torque.expression or torque.terms)
 
 
@@ -180,7 +178,7 @@ def _law_lines(law: TorqueLaw) -> list[str]:
 
 
 def _toml(value: Any) -> str:
-    """Return a value of a ready term as TOML; a torque law is a table without its frame."""
+    """Return a value of a ready term as TOML."""
     if isinstance(value, TorqueLaw):
         lines = _law_lines(value)
         return f"{{ {', '.join(line for line in lines if not line.startswith('frame'))} }}"
@@ -192,10 +190,7 @@ def _toml(value: Any) -> str:
 
 
 def body_of(scene: Scene) -> tuple[str, list[Any]]:
-    """Return the key, "moments", "coefficients" or "inertia", and the list of a scene file's body.
-
-    A changing inertia has a list for each moment, or a list of matrices.
-    """
+    """Return the key, "moments", "coefficients" or "inertia", and the list of a file's body."""
     if scene.inertia is not None:
         return "inertia", [list(row) for row in scene.inertia]
     if isinstance(scene.changing, ChangingMoments):
@@ -225,10 +220,7 @@ def _waves(where: str, entries: object) -> list[tuple[Any, Any]]:
 
 
 def check_written_schema(data: dict[str, Any], kind: str) -> None:
-    """Raise InputError if a user's file of a `kind`, as "scene file", has an unsupported schema.
-
-    A missing number stands for the supported one.
-    """
+    """Raise InputError if a user's file has an unsupported schema; it may have none."""
     given = data.get("schema", SCHEMAS[kind])
     check_schema("top level", kind, given, "write it in that form, or take a version that reads it")
 

@@ -46,7 +46,7 @@ def _polynomials(coefficients: Sequence[Sequence[float]]) -> str:
 
 
 def _polynomial(coefficients: Sequence[float]) -> str:
-    """Return a polynomial of time as text, as in "40 + 0.5 t - 0.01 t^2"."""
+    """Return a polynomial as text, as in "40 + 0.5 t - 0.01 t^2"."""
     text = ""
     for power, coefficient in enumerate(coefficients):
         if coefficient:
@@ -57,7 +57,6 @@ def _polynomial(coefficients: Sequence[float]) -> str:
 
 
 def _torque(scene: Scene, unit: str) -> str:
-    """Return a phrase that describes the torque of a scene, in `unit`."""
     if isinstance(scene.torque, StateTorque):
         return _state_torque(scene.torque, unit)
     return "no torque" if scene.torque.is_zero else f"N = {_law_phrase(scene.torque, unit)}"

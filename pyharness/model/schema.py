@@ -22,10 +22,9 @@ The number is increased if an old version would misread a new file, or a new ver
 
 
 def check_schema(where: str, kind: str, found: object, remedy: str) -> None:
-    """Raise InputError if a file's schema number is not the one that this version reads.
+    """Raise InputError if `found` is not the schema number of a `kind` that this version reads.
 
-    The message begins with `where`, as "scene file 'a.toml'", and ends with `remedy`. `kind` is a
-    key of `SCHEMAS`, and `found` the number in the file, or None.
+    The message is between `where`, as "scene file 'a.toml'", and `remedy`.
     """
     known = SCHEMAS[kind]
     if type(found) is int and found == known:

@@ -41,10 +41,7 @@ class SciPyNames:
 
     @property
     def y(self) -> Array:
-        """The state, one column for each time.
-
-        It is a view of `omega` (rad/s), shape (3, n), or with the quaternion a new array, (7, n).
-        """
+        """The state, a column for each time: omega (rad/s), (3, n), or with quaternion, (7, n)."""
         if self.attitude is None:
             return self.omega.T
         return np.concatenate([self.omega.T, self.attitude.T])

@@ -26,7 +26,6 @@ def short_repr(result: Any) -> str:
 
 
 def _short(value: Any) -> str:
-    """Return the value of a field on one line."""
     if isinstance(value, np.ndarray):
         return f"<{value.dtype} {value.shape}>"
     if isinstance(value, (tuple, list)) and value and is_dataclass(value[0]):

@@ -83,7 +83,7 @@ class StateTorque:
         )
 
     def at(self, time: float, omega: Sequence[float], attitude: Sequence[float]) -> Triple:
-        """Return the torque at `time` (s), omega (rad/s) and attitude; NaN where it is singular.
+        """Return the torque at `time` (s), omega (rad/s) and attitude; NaN where singular.
 
         Raise InputError if an opaque function does not return three numbers.
         """
@@ -96,10 +96,7 @@ class StateTorque:
         return first, second, third
 
     def __add__(self, other: "StateTorque | TorqueLaw | Function | int") -> "StateTorque":
-        """Return the sum with a torque, a torque law, a function, or 0, so that ``sum`` works.
-
-        Raise InputError if one of the two is opaque.
-        """
+        """Return the sum with a torque, law, function, or 0 (for ``sum``), none opaque."""
         if type(other) is int and other == 0:
             return self
         if isinstance(other, (StateTorque, TorqueLaw)):
@@ -135,7 +132,7 @@ def replayed(function: Function) -> StateTorque:
 
 
 def _tape_of(function: Function, names: Sequence[str] = ()) -> Tape:
-    """Return a function of (t, omega, attitude) as a tape; keyword arguments are further inputs."""
+    """Return a function as a tape, keyword arguments as further inputs."""
     return _recorded_with(Recorder(n_inputs=N_INPUTS + len(names)), function, names)
 
 
@@ -259,10 +256,7 @@ def checked_torque(value: object) -> TorqueLaw | StateTorque:
 
 
 def law_of(torque: StateTorque) -> TorqueLaw | None:
-    """Return the torque law that equals a recorded torque, or None.
-
-    It is a sum of a constant, a linear term and waves, for which methods are faster.
-    """
+    """Return the torque law that equals a recorded torque, or None; methods for it are faster."""
     tape = torque.tape
     if tape is None or tape.inputs - {TIME}:
         return None
@@ -292,10 +286,7 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
 
 
 def _with_parameters(torque: StateTorque, function: Function, called: Function) -> StateTorque:
-    """Return a torque with the numbers among its function's keyword arguments as parameters.
-
-    One with which the function does what can't be recorded is none.
-    """
+    """Return a torque with its function's keyword numbers, if recorded, as parameters."""
     pairs = {
         each.name: converted(each.default)
         for each in signature(function).parameters.values()
@@ -326,7 +317,7 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
 
 
 def _parts(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, ...]":
-    """Return the summands of a torque; a law that is 0 has none."""
+    """Return the summands of a torque; a zero law has none."""
     if isinstance(torque, TorqueLaw):
         return () if torque.is_zero else (torque,)
     return torque.parts or (torque,)
@@ -335,7 +326,7 @@ def _parts(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, .
 def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
     """Return the sum of torques, of which at least one depends on the state.
 
-    It is recorded in the order of a scene file, so that reading its text gives the same tape.
+    The order is that of a scene file, so that its text has the same tape.
     """
     torques = [each for each in parts if isinstance(each, StateTorque)]
     torques.sort(key=lambda each: bool(each.expression))
@@ -402,6 +393,6 @@ def _called(
 
 
 def _old(attitude: Any, axes: Array) -> list[Any]:
-    """Return the attitude of the old axes from the new one, in symbols."""
+    """Return the attitude of the old axes in symbols."""
     w, x, y, z = quaternion_of_axes(axes)
     return list(product(tuple(attitude), (w, -x, -y, -z)))

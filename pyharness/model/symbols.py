@@ -1,8 +1,7 @@
 """Symbols, with which a function is called once so that its arithmetic is recorded on a tape.
 
-A symbol is a linear combination of the slots of a tape. Sums, and products with numbers, only
-change its coefficients. Another operation is recorded the first time; the same on the same slots
-returns the same slot.
+A symbol is a linear combination of the slots of a tape. Sums, and products with numbers, change its
+coefficients. Any other operation has one slot, however often it is repeated.
 """
 
 import math
@@ -42,10 +41,7 @@ class Recorder:
         place: str = "[torque]",
         instead: str = "opaque(function), which SciPy's methods solve",
     ) -> None:
-        """Begin an empty tape of `n_inputs` numbers and at most `most` operations.
-
-        Messages begin with `place`, and say what to use `instead` of what can't be recorded.
-        """
+        """Begin an empty tape; messages begin with `place` and say what to use `instead`."""
         self.place = place
         self._most, self._n_inputs, self._instead = most, n_inputs, instead
         self._operations: list[Operation] = []
@@ -128,14 +124,14 @@ class Symbol:
         return Linear(self._constant, tuple(sorted(self._terms.items())))
 
     def _slot(self) -> tuple[int, float]:
-        """Return a slot and a factor, whose product is the value of this symbol."""
+        """Return a slot and a factor, whose product is this symbol."""
         if len(self._terms) == 1 and not self._constant:
             ((slot, factor),) = self._terms.items()
             return slot, factor
         return self.recorder.slot(Operation("linear", (), self.linear())), 1.0
 
     def _other(self, value: Any) -> "Symbol | None":
-        """Return the other operand of an operator as a symbol, or None if it is no number."""
+        """Return the other operand as a symbol, or None if it is no number."""
         if isinstance(value, Symbol):
             if value.recorder is not self.recorder:
                 raise self.recorder.impure()
@@ -152,7 +148,7 @@ class Symbol:
         return Symbol(self.recorder, factor * self._constant, terms)
 
     def __add__(self, value: Any) -> "Symbol":
-        """Return the sum with a symbol or a real number."""
+        """Return the sum with any real number."""
         other = self._other(value)
         if other is None:
             return NotImplemented
@@ -174,7 +170,7 @@ class Symbol:
         return self
 
     def __sub__(self, value: Any) -> "Symbol":
-        """Return the difference from a symbol or a real number."""
+        """Return the difference from any real number."""
         other = self._other(value)
         if other is None:
             return NotImplemented
@@ -186,7 +182,7 @@ class Symbol:
         return (-self).__add__(value)
 
     def __mul__(self, value: Any) -> "Symbol":
-        """Record and return the product with a symbol or a real number."""
+        """Record and return the product with any real number."""
         other = self._other(value)
         if other is None:
             return NotImplemented
@@ -201,7 +197,7 @@ class Symbol:
     __rmul__ = __mul__
 
     def __truediv__(self, value: Any) -> "Symbol":
-        """Record and return the quotient; raise InputError for a division by the constant 0."""
+        """Record and return the quotient; raise InputError for the constant 0."""
         other = self._other(value)
         if other is None:
             return NotImplemented
@@ -222,14 +218,14 @@ class Symbol:
         return Symbol(self.recorder, 0.0, {slot: factor / divisor})
 
     def __rtruediv__(self, value: Any) -> "Symbol":
-        """Record and return a real number divided by the symbol."""
+        """Record and return a number divided by the symbol."""
         other = self._other(value)
         if other is None:
             return NotImplemented
         return other / self
 
     def __pow__(self, power: Any) -> "Symbol":
-        """Record and return an integer power, or the square root as the power 0.5."""
+        """Record and return an integer power, or the power 0.5."""
         exponent = converted(power) if not isinstance(power, Symbol) else None
         if not isinstance(exponent, float):
             raise self.recorder.refusal("a power that is not a number")

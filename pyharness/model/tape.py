@@ -1,7 +1,7 @@
 """The tape: a function of time, omega and attitude, recorded as a list of arithmetic operations.
 
-It is recorded once, with symbols (`pyharness.model.symbols`), and evaluated in every arithmetic:
-floats, decimal numbers, Taylor series, or symbols again.
+It is recorded with symbols (`pyharness.model.symbols`), and evaluated in every arithmetic: floats,
+decimal numbers, Taylor series, or symbols again.
 """
 
 import math
@@ -33,8 +33,8 @@ class Linear(NamedTuple):
 class Table(NamedTuple):
     """A function of time that consists of cubic polynomials.
 
-    `breaks` are the times (s), ascending, at which pieces begin. Piece k is c0 + c1 s + c2 s^2 + c3
-    s^3 with s the time minus breaks[k]; the first also holds before its break, the last for ever.
+    Piece k, c0 + c1 s + c2 s^2 + c3 s^3 with s the time (s) minus breaks[k], holds from this break
+    to the next; the first also before, the last for ever.
     """
 
     breaks: tuple[float, ...]
@@ -42,11 +42,7 @@ class Table(NamedTuple):
 
 
 class Operation(NamedTuple):
-    """An operation of a tape.
-
-    Its kind is "product", "quotient", "sqrt", "exp", "tanh", "sine" or "cosine" of one or two
-    slots, or "linear" or "table".
-    """
+    """An operation of a tape: "linear", "table", or another kind on one or two slots."""
 
     kind: str
     operands: tuple[int, ...]
@@ -170,10 +166,10 @@ _UNSEEN = 2.0**-150
 
 
 def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
-    """Return the outputs of a tape in floats.
+    """Return the outputs of a tape in floats; division by 0 raises ZeroDivisionError.
 
-    A large exponential that makes an output NaN or infinite, as in sinh(x)/cosh(x), is replaced by
-    another, unless the outputs depend on which. Division by zero raises ZeroDivisionError.
+    A large exponential that spoils an output, as in sinh(x)/cosh(x), is replaced by another, unless
+    the outputs depend on which.
     """
     found = evaluate(tape, inputs, FLOATS)
     if all(map(math.isfinite, found)) or all(each.kind != "exp" for each in tape.operations):

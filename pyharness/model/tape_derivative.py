@@ -18,7 +18,7 @@ _MORE, _FEWER = 100, 10
 def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
     """Return a tape with its outputs, then the derivatives of each by the inputs in `slots`.
 
-    Forward differentiation is exact. A table has the derivative of the piece that holds.
+    Forward differentiation is exact.
     """
     recorder = Recorder(_MORE * MOST_OPERATIONS)
     inputs = [
@@ -33,7 +33,7 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
 def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
     """Return a tape of the derivatives of each output by m parameters, then of the outputs.
 
-    The parameters, with these `values`, are the last inputs of `tape`; the others remain.
+    Parameters, with these `values`, are the last inputs of `tape` alone.
     """
     count = len(values)
     instead = "fewer parameters"

@@ -1,8 +1,7 @@
 """Tapes as data for JSON, and tapes from such data.
 
-A dictionary has the operations and outputs. A linear combination is a list of its constant and its
-pairs of slot and coefficient; an operation of its kind, and its operands, linear combination, or
-breaks and pieces of a table.
+A linear combination is a list of its constant and pairs of slot and coefficient; an operation of
+its kind, and its operands, linear combination, or breaks and pieces.
 """
 
 import math
@@ -55,7 +54,7 @@ def tape_of(record: Any) -> Tape:
 
 
 def _operation(record: Any, slots: int) -> Operation:
-    """Return the operation that data describe; it reads only slots below `slots`."""
+    """Return the operation that data describe, with slots below `slots`."""
     kind, *rest = record
     if kind == "linear":
         (linear,) = rest

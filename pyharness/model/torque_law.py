@@ -78,7 +78,7 @@ class TorqueLaw:
             raise unknown("frame", self.frame, FRAMES, "[torque] frame")
 
     def __add__(self, other: "TorqueLaw | int") -> "TorqueLaw":
-        """Return the sum with another law about the same axes, or with 0, so that ``sum`` works.
+        """Return the sum with another law, or with 0 (for ``sum``).
 
         Raise InputError if the axes differ, or if a sum overflows.
         """

@@ -1,7 +1,7 @@
 """Writing of trajectories to files. `pyharness.dynamics.trajectory_reader` reads them.
 
-A file is an archive of `numpy.savez`: the array `header` is JSON with the other attributes and the
-schema number, `scene` the text of a scene file, and `sha256` the digest of all other arrays.
+Of the arrays of `numpy.savez`, `header` is JSON with other attributes and the schema number,
+`scene` the text of a scene file, and `sha256` a digest of all others.
 """
 
 import hashlib
@@ -135,7 +135,6 @@ def add_entry(digest: Any, name: str, data: bytes | memoryview) -> None:
 
 
 def _moments_record(moments: Any) -> Any:
-    """Return the moments of a trajectory for JSON: None, a list, or a dictionary of polynomials."""
     if isinstance(moments, ChangingMoments):
         return {moments.place: moments.polynomials}
     if isinstance(moments, ChangingInertia):
@@ -145,7 +144,7 @@ def _moments_record(moments: Any) -> Any:
 
 
 def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
-    """Return the values of a scene that no scene file has, for JSON, and the text of its file."""
+    """Return for JSON what no scene file has, and the text of that."""
     record: dict[str, Any] = {
         "masses": scene.masses,
         "forces": scene.forces,

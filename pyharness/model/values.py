@@ -59,11 +59,7 @@ def is_no_number(value: object) -> bool:
 
 
 def parsed_float(text: str) -> float:
-    """Return the number that `text` is, or raise ValueError.
-
-    Underscores and foreign digits, which float() allows, are refused: other programs do not read
-    them.
-    """
+    """Return the number that `text` is, or raise ValueError, also for float()'s underscores."""
     return float(_plain(text))
 
 
@@ -113,10 +109,7 @@ def _not_finite(where: str, value: float) -> InputError:
 
 
 def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
-    """Return an iterator over a user's ordered collection, whose elements are not checked.
-
-    Raise InputError for text, a set, a mapping or a single value; it ends with `allowed`.
-    """
+    """Return an iterator over a user's ordered collection, or raise InputError."""
     if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):
         try:
             return iter(values)  # type: ignore[call-overload, no-any-return]

@@ -1,10 +1,8 @@
 """Exact sums of the waves of a torque law that have the same frequency.
 
-A wave is a sine or cosine term. A solver divides each amplitude by a moment and rounds: if two
-opposite amplitudes differ by a relative 1e-10, only six digits of their sum would be correct. Added
-exactly before the division, all are. Fewer waves also take less work.
-
-Merged laws have at most one sine and one cosine per frequency, and none of frequency 0.
+A solver divides amplitudes by a moment and rounds: of two opposite ones that differ by a relative
+1e-10, only six digits of the sum would be correct. Added exactly before, all are. Merged laws have
+at most one sine and one cosine per frequency, none of frequency 0.
 """
 
 import math
@@ -64,9 +62,9 @@ class ExactLaw:
 
 
 def merged(law: TorqueLaw) -> TorqueLaw:
-    """Return a merged torque law, the argument itself if there is nothing to merge or remove.
+    """Return a merged torque law, the argument itself if nothing changes.
 
-    Sines of opposite frequencies are subtracted; a cosine of frequency 0 is added to the constant.
+    A cosine of frequency 0 is added to the constant.
     """
     return exact_law(law).rounded() if is_mergeable(law) else law
 
@@ -99,7 +97,7 @@ def exact_law(law: TorqueLaw) -> ExactLaw:
 
 
 def _summed(waves: Iterable[Wave], even: bool) -> list[ExactWave]:
-    """Return the nonzero sums of cosines, if `even`, or sines of equal or opposite frequency."""
+    """Return the nonzero sums of waves, cosines if `even`, by absolute frequency."""
     found: dict[float, tuple[float, Exact]] = {}
     for amplitude, frequency in waves:
         exact = _exact(amplitude)
@@ -139,10 +137,10 @@ def with_merged_waves(scene: Scene) -> Scene:
 
 
 def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Array, Array, Array]:
-    """Return the constants, sines and cosines of m torque laws, merged in each law.
+    """Return the constants, sines and cosines of m torque laws, merged in each finite law.
 
     Shapes are (m, 3), (m, k, 4) and (m, l, 4), or one row for all; a wave is three amplitudes and a
-    frequency (rad/s). Laws are filled up with zeros. A law that is not finite is unchanged.
+    frequency (rad/s). Laws are filled up with zeros.
     """
     concerned = _mergeable_rows(sines, cosines)
     if not concerned.any():
@@ -175,7 +173,7 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
 
 
 def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
-    """Return which of m torque laws `merged` changes, shape (m,), or (1,) if all share one row."""
+    """Return which of m torque laws `merged` changes, (m,), or (1,) for shared rows."""
     found = np.zeros(1, bool)
     for waves in (sines, cosines):
         if waves.size:
@@ -198,9 +196,9 @@ def _waves_of(rows: Array) -> list[Wave]:
 
 
 def _without_empty(waves: Array) -> Array:
-    """Return the waves, shape (m, k, 4), without positions k at which no law has a wave.
+    """Return the waves, (m, k, 4), without k for which all laws have none.
 
-    A frequency that is not finite is kept, so that the solver rejects only its law.
+    A frequency that is not finite is kept: the solver rejects its law.
     """
     is_one = waves[..., :3].any(axis=-1) | ~np.isfinite(waves[..., 3])
     return np.ascontiguousarray(waves[:, is_one.any(axis=0)])

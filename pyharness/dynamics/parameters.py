@@ -29,8 +29,6 @@ _ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 class _Body(NamedTuple):
-    """The inertia of a scene."""
-
     moments: Triple | None
     coefficients: Triple | None
     inertia: tuple[Triple, ...] | None
@@ -41,9 +39,8 @@ class _Body(NamedTuple):
 class VariedEquations:
     """The equations of motion of a scene, and how they depend on parameters.
 
-    The outputs of `tape` are partial derivatives of the rates by parameters, then the rates.
-    `forcings`, shape (n, m), has for n rates and m columns the numbers of these derivatives, from
-    1, or 0 for none. `columns` are those of each name.
+    `tape` has partial derivatives of the rates, then the rates. `forcings`, shape (n, m), numbers
+    those of n rates and m columns from 1, or 0 for none. `columns` are those of each name.
     """
 
     tape: Tape
@@ -104,7 +101,7 @@ def _equations(
 ) -> VariedEquations:
     """Return the equations for pairs of names and values, in the order of columns.
 
-    A name without values is of the initial state, with three columns.
+    Names of the initial state have no values, but three columns.
     """
     n = 7 if attitude else 3
     flat = [each for _, listed in values for each in listed]
@@ -140,7 +137,7 @@ def _equations(
 
 
 def _parts(torque: StateTorque | TorqueLaw) -> Sequence[StateTorque | TorqueLaw]:
-    """Return the summands of a torque; one that has names for its numbers is preferred to a law."""
+    """Return the summands of a torque, with names for their numbers if possible."""
     parts = (torque,) if isinstance(torque, TorqueLaw) else torque.parts or (torque,)
     return [getattr(part, "named", None) or part for part in parts]
 
@@ -159,7 +156,7 @@ def _parameters_of(part: StateTorque | TorqueLaw) -> dict[str, list[float]]:
 def _torque(
     part: TorqueLaw | StateTorque, time: Any, omega: Any, q: Any, given: Mapping[str, list[Any]]
 ) -> Any:
-    """Return a summand of the torque in symbols, with symbols for the parameters in `given`."""
+    """Return a summand of the torque with symbols for `given` parameters."""
     if isinstance(part, TorqueLaw):
         law: Any = SimpleNamespace(in_space=part.frame == "space")
         for name in ("constant", "rate"):
@@ -188,7 +185,7 @@ def _torque(
 def _rates(
     body: _Body, time: Any, omega: Any, torque: Any, given: Mapping[str, list[Any]]
 ) -> Sequence[Any]:
-    """Return the derivative of omega in symbols, with symbols for the parameters in `given`."""
+    """Return the derivative of omega with symbols for `given` parameters."""
     if body.changing is not None:
         return rates_of_changing(body.changing, time, omega, torque)
     x, y, z = omega

@@ -1,7 +1,6 @@
 """A recorded torque in rescaled time, in which omega is near 1 rad/s.
 
-Each slot is multiplied by a power of two of its own, so that intermediate results, as a square of
-omega, neither overflow nor underflow.
+Each slot has its own power of two as factor, so that none overflows or underflows.
 """
 
 import math
@@ -18,8 +17,7 @@ MULTIPLE = 16
 def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
     """Return the tape of a torque in the unit of time 2**exponent s, without rounding.
 
-    Its outputs are those of `tape` times 2**(2 * exponent). It is None if a number would not be
-    representable.
+    Its outputs are multiplied by 2**(2 * exponent). None if a number is not representable.
     """
     scaling = _Scaling(exponent)
     try:
@@ -35,7 +33,7 @@ class _Scaling:
     """A tape while it is converted: slot n becomes slot `places[n]`, times 2**`exponents[n]`."""
 
     def __init__(self, exponent: int) -> None:
-        """Begin with the inputs, for the unit of time 2**exponent s."""
+        """Begin with the unit of time 2**exponent s."""
         self.operations: list[Operation] = []
         self._unit = exponent
         self._places = list(range(N_INPUTS))
@@ -47,7 +45,7 @@ class _Scaling:
         self._linear: dict[int, Linear] = {TIME: Linear(0.0, ((TIME, 1.0),))}
 
     def add(self, operation: Operation) -> None:
-        """Convert the next operation; raise ArithmeticError if a number is out of range."""
+        """Convert the next operation, or raise ArithmeticError."""
         kind, operands, linear, table = operation
         exponents = [self._exponents[slot] for slot in operands]
         if linear is not None:
@@ -70,10 +68,7 @@ class _Scaling:
         self._exponents.append(exponent)
 
     def combined(self, linear: Linear, exponent: int) -> Linear:
-        """Return a linear combination of the new slots, times 2**exponent.
-
-        Raise ArithmeticError if a number is out of range.
-        """
+        """Return a combination of the new slots, times 2**exponent, or raise ArithmeticError."""
         terms = tuple(
             (self._places[slot], _scaled(factor, exponent - self._exponents[slot]))
             for slot, factor in linear.terms
@@ -89,7 +84,7 @@ class _Scaling:
         return 0 if linear.constant or not own else min(own, key=abs)
 
     def _unscaled(self, slot: int) -> int:
-        """Return the new slot with the value of `slot` itself, an angle or an exponent."""
+        """Return the new slot of an angle or exponent, with its value."""
         if self._exponents[slot] == 0:
             return self._places[slot]
         # The kernel recognises an angle proportional to time by its combination.
@@ -106,7 +101,7 @@ class _Scaling:
 
 
 def _scaled(value: float, exponent: int) -> float:
-    """Return value * 2**exponent; raise ArithmeticError if it is not representable."""
+    """Return value * 2**exponent, or raise ArithmeticError."""
     found = math.ldexp(value, exponent)
     if math.ldexp(found, -exponent) != value:
         raise ArithmeticError("the product underflows")

@@ -97,10 +97,7 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
 
 
 def _body(table: dict[str, Any]) -> dict[str, Any]:
-    """Return the table [body], with an inertia that changes as a value.
-
-    Lists in place of three moments, or matrices in place of rows, are polynomials.
-    """
+    """Return the table [body]; lists for moments, or matrices for rows, are polynomials."""
     moments, inertia = table.get("moments"), table.get("inertia")
     if isinstance(moments, list) and _has_lists(moments):
         return {**table, "moments": ChangingMoments(moments)}
@@ -125,7 +122,6 @@ def _attitude(initial: dict[str, Any]) -> Any:
 
 
 def _torque(table: dict[str, Any], body: dict[str, Any]) -> TorqueLaw | StateTorque:
-    """Return the torque of a scene file from its tables [torque] and [body]."""
     check_keys(table, SCENE_TABLES["torque"], "[torque]")
     given = {key: value for key, value in table.items() if key != "terms"}
     first = _expressions(given) if any(key in given for key in _TEXTS) else law_of_table(given)

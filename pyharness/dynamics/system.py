@@ -20,8 +20,7 @@ from pyharness.model.values import Triple
 def system_of(scene: Scene, attitude: bool) -> Tape:
     """Return the equations of motion of a scene with recorded torque and principal axes as a tape.
 
-    Outputs are the derivatives of omega (equations 16-18 of the thesis) and, if `attitude`, of the
-    quaternion, q' = q (0, omega)/2.
+    They are 16-18 of the thesis and, if `attitude`, q' = q (0, omega)/2.
     """
     assert isinstance(scene.torque, StateTorque)
     assert scene.torque.tape is not None
@@ -47,8 +46,8 @@ def is_recorded(scene: Scene) -> bool:
 def with_constant_body(scene: Scene) -> Scene:
     """Return a scene with the same solution whose inertia does not change with time.
 
-    Instead of an inertia that changes it has A = B = C = 0, and the derivative of omega as torque:
-    I omega' = N - I' omega - omega x (I omega), with inertia I and torque N.
+    It has A = B = C = 0, and for inertia I and torque N as its torque omega', where I omega' = N -
+    I' omega - omega x (I omega).
     """
     changing, torque = scene.changing, scene.torque
     if changing is None:
@@ -98,9 +97,9 @@ def _dot(first: Any, second: Any) -> Any:
 
 
 def _solved(matrix: list[list[Any]], right: list[Any]) -> list[Any]:
-    """Return the solution of a symmetric positive definite system by L D L^T.
+    """Return the solution of a positive definite system by L D L^T.
 
-    Golub and Van Loan 2013, Matrix Computations, section 4.1, has it.
+    The source is Golub and Van Loan 2013, Matrix Computations, section 4.1.
     """
     (a, f, e), (_, b, d), (_, _, c) = matrix
     l21, l31 = f / a, e / a
@@ -116,10 +115,9 @@ def _solved(matrix: list[list[Any]], right: list[Any]) -> list[Any]:
 
 
 def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
-    """Return f(t, state) of a scene whose torque depends on the state, in floats.
+    """Return f(t, state) of a scene whose torque depends on the state, NaN where singular.
 
-    The state is omega (rad/s), and the quaternion if the scene has one. A rate is NaN where the
-    torque is singular.
+    The state is omega (rad/s), and the quaternion if there is one.
     """
     torque = scene.torque
     assert isinstance(torque, StateTorque)

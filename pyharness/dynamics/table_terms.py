@@ -205,7 +205,7 @@ def _other_number(where: str, what: str, given: int, wanted: int) -> InputError:
 
 
 def _before(first: float, second: float) -> float:
-    """Return a time before the first one, so far that its constant piece is not the shortest."""
+    """Return a time before the first, for a constant piece as long as the next."""
     return min(2.0 * first - second, math.nextafter(first, -math.inf))
 
 
@@ -236,7 +236,7 @@ def _cubic(times: list[float], values: list[float]) -> Table:
 
 
 def _between(times: list[float], values: list[float], pieces: Sequence[_Cubic]) -> Table:
-    """Return the table with `pieces` between the times, and constants before and after."""
+    """Return the table with `pieces`, and constants before and after."""
     if not all(map(math.isfinite, itertools.chain.from_iterable(pieces))):
         raise InputError(
             "[torque] table: a slope or a coefficient overflows; allowed: smaller values, or times "
@@ -254,7 +254,6 @@ _PIECES: dict[str, Callable[[list[float], list[float]], Table]] = {
 
 
 def _torque(axes: Sequence[Table]) -> Function:
-    """Return the function whose components are tables of the time."""
     reduced = [_reduced(each) for each in axes]
 
     def torque(time: Any, omega: Any, attitude: Any) -> list[Any]:
@@ -268,7 +267,7 @@ def _torque(axes: Sequence[Table]) -> Function:
 
 
 def _reduced(each: Table) -> Table:
-    """Return a table without the breaks between two pieces with the same constant."""
+    """Return a table without breaks between equal constants."""
     kept: list[tuple[float, _Cubic]] = []
     for time, piece in zip(each.breaks, each.pieces, strict=True):
         # Equal pieces are constants, because the table is continuous where pieces are not constant.

@@ -36,11 +36,7 @@ _LAW = ("constant", "rate", "sines", "cosines")
 
 
 def read_terms(tables: object, body: dict[str, Any]) -> list[StateTorque]:
-    """Return the ready terms from the tables [[torque.terms]].
-
-    `body` is the table [body]. Raise InputError, with the number of the table from 1, if it is
-    invalid.
-    """
+    """Return the ready terms from the tables [[torque.terms]], or raise InputError."""
     if not isinstance(tables, list):
         raise InputError(
             f"[torque] terms is {kind_of(tables)}; it must be a list of tables [[torque.terms]]"
@@ -79,7 +75,6 @@ def _term(table: object, where: str, body: dict[str, Any]) -> StateTorque:
 
 
 def _inertia(body: dict[str, Any], where: str) -> Any:
-    """Return the moments or the inertia matrix in the table [body] of a scene file."""
     for key in ("moments", "inertia"):
         if key in body:
             if not isinstance(body[key], Changing):
@@ -92,10 +87,7 @@ def _inertia(body: dict[str, Any], where: str) -> Any:
 
 
 def _argument(where: str, value: object, key: str, frame: str | None) -> object:
-    """Return the argument of a term for the value of a key.
-
-    A table becomes a torque law about the axes `frame`; None for no law.
-    """
+    """Return a term's argument; a table becomes a law about the axes `frame`, if not None."""
     if key == "per_axis":
         return boolean(where, value)
     if frame is None:
@@ -118,6 +110,6 @@ def _one_of(names: tuple[str, ...]) -> str:
 
 
 def _placed(error: InputError, where: str) -> InputError:
-    """Return an error of a term's function or of a torque law, with the place of the term."""
+    """Return an error with the place of the term."""
     message = str(error).removeprefix("[torque]").lstrip(": ")
     return InputError(f"{where}, {message}")

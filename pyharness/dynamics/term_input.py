@@ -19,15 +19,14 @@ from pyharness.model.values import converted, finite, number_list, three
 def ready_term(kind: str, function: Function, **arguments: Any) -> StateTorque:
     """Return a recorded function of (t, omega, attitude) as a ready term.
 
-    Scene files have its kind and its checked arguments: arrays, lists, laws, numbers, texts or
-    truth values.
+    Scene files have its kind and its checked arguments.
     """
     pairs = ((key, _file_value(value)) for key, value in arguments.items())
     return replace(replayed(function), terms=((("kind", kind), *pairs),))
 
 
 def _file_value(value: Any) -> Any:
-    """Return a checked argument of a term in the shortest form that a scene file has for it."""
+    """Return an argument in the shortest form of a scene file."""
     if isinstance(value, np.ndarray):
         if value.shape == (3, 3) and is_diagonal(value):
             value = np.diag(value)

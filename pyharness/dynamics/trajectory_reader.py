@@ -183,7 +183,6 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
 def _sensitivities(
     arrays: dict[str, Any], names: Any, rows: dict[str, Any]
 ) -> dict[str, Array] | None:
-    """Return the sensitivities by the name of the parameter, or None if there are none."""
     if names is None and SENSITIVITIES not in arrays:
         return None
     array, counts = arrays[SENSITIVITIES], [_count(count) for _, count in names]
@@ -197,7 +196,6 @@ def _sensitivities(
 def _events(
     arrays: dict[str, Any], rows: Array, width: int
 ) -> tuple[list[Array] | None, list[Array] | None]:
-    """Return the times of the events of each function, and the states there, or None twice."""
     if not any(name in arrays for name in EVENTS):
         return None, None
     counts, times, states = (arrays[name] for name in EVENTS)

@@ -19,10 +19,7 @@ if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
 
 
 def start() -> None:
-    """Run the command line, and end this process with the exit status of the command.
-
-    After an interrupt (Ctrl-C) the process ends promptly, with exit status 130.
-    """
+    """Run the command line and end the process, promptly after Ctrl-C, with its status."""
     from pyharness.cli import interruption
     from pyharness.cli.main import main
 

@@ -1,7 +1,7 @@
-"""Third-party solvers of `bench` that numba compiles: Runge-Kutta methods and numbalsoda.
+"""Third-party solvers of `bench` that numba compiles: Runge-Kutta and numbalsoda.
 
-For speed, the source text of each right-hand side contains the numbers of its scene, as in code
-written by hand. The stages of the fixed-step methods are written out in the same way.
+For speed, the source of each right-hand side contains the numbers of its scene, and the stages are
+written out, as by hand.
 """
 
 from collections.abc import Sequence
@@ -23,12 +23,7 @@ RK4 = [[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6], [0
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Return a function that prepares timed runs of a fixed-step Runge-Kutta method on a scene.
-
-    The function takes the end time (s) and the number of steps, and returns an integration that is
-    ready to be timed. The method is compiled by numba. `method` is "rk4" for the classical method,
-    or "dop8" for the formula of order 8 of DOP853.
-    """
+    """Return a maker of classical "rk4", or of "dop8", order 8 of DOP853, by numba."""
     import numba
 
     formula: Formula = RK4
@@ -55,12 +50,7 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
 
 
 def numbalsoda(name: str, scene: Scene) -> Maker:
-    """Return a function that prepares timed runs of the package numbalsoda on a scene.
-
-    The function takes the end time (s) and the relative tolerance, and returns an integration that
-    is ready to be timed. `name` is the solver of numbalsoda, "dop853" or "lsoda". The right-hand
-    side is compiled by numba.
-    """
+    """Return a maker of numbalsoda's "dop853" or "lsoda"."""
     import numba
     import numbalsoda as package
 
@@ -95,7 +85,7 @@ def numbalsoda(name: str, scene: Scene) -> Maker:
 
 
 def compiled_function(source: str) -> Any:
-    """Return the Python function named `function` that the source text `source` defines."""
+    """Return the Python function `function` that a source text defines."""
     names: dict[str, Any] = {}
     exec(compile(source, "<bench>", "exec"), {"sin": np.sin, "cos": np.cos}, names)
     return names["function"]
@@ -104,12 +94,10 @@ def compiled_function(source: str) -> Any:
 def rates(
     scene: Scene, time: str, state: Sequence[str], coefficients: Sequence[float] = ()
 ) -> list[str]:
-    """Return the right-hand side of each unknown of a scene, as expressions in Python source.
+    """Return the right-hand side of each unknown as Python source.
 
-    `time` is the name of the time, or an expression for it, in the source. `state` has the names of
-    the unknowns in the source. The first three are components of omega. If there are seven names,
-    the other four are components of the attitude quaternion q, with q' = q (0, omega)/2.
-    `coefficients` are A, B and C of Euler's equations, by default those of the scene.
+    `time` and `state` are names in the source. Three unknowns are omega; four more are the
+    quaternion q, with q' = q (0, omega)/2. A, B, C are by default the scene's.
     """
     x, y, z, *attitude = state
     moments = scene.moments or (1.0, 1.0, 1.0)
@@ -142,33 +130,22 @@ def rates(
 
 
 def state_names(scene: Scene) -> str:
-    """Return the names of a scene's unknowns, one letter for each, as a single string.
-
-    It is "xyz" for omega, or "xyzabcd" for omega and the attitude quaternion of a scene that has an
-    attitude.
-    """
+    """Return "xyz" for omega, or "xyzabcd" with an attitude."""
     return "xyz" if scene.attitude is None else "xyzabcd"
 
 
 def end_of(state: Array, evaluations: int | None = None) -> End:
-    """Return the unknowns `state` at the end time as an `End`, the common form of solvers' results.
-
-    The unknowns are three components of omega and, if it was computed, the attitude quaternion.
-    `evaluations` is the number of evaluations of the right-hand side in the call of the solver, if
-    it was counted.
-    """
+    """Return the unknowns at the end time, and the count of evaluations, as an `End`."""
     found = plain(state)
     attitude = found[3:] if len(found) > 3 else None
     return End(found[:3], evaluations=evaluations, attitude=attitude)
 
 
 def steps_source(scene: Scene, formula: Formula) -> str:
-    """Return the Python source of a function that integrates a scene by a Runge-Kutta method.
+    """Return the Python source of a Runge-Kutta integration without loops.
 
-    `formula` has the stage coefficients, the weights and the nodes of the method. The arguments of
-    the function are the initial omega, the end time (s), the number of equal steps, and an array
-    for the result. The function writes omega at the end time into this array. In the source, all
-    stages and components are written out without loops.
+    Its function takes the initial omega, the end time (s), the number of steps, and the array for
+    omega at the end.
     """
     stages, weights, nodes = formula
     lines = [
@@ -196,9 +173,9 @@ def _increment(factors: Sequence[float], name: str) -> str:
 
 
 def _callback_source(scene: Scene, counted: bool) -> str:
-    """Return the Python source of a scene's right-hand side, as the package numbalsoda calls it.
+    """Return the right-hand side as numbalsoda calls it.
 
-    If `counted`, the function counts its calls in the first element of its parameter `p`.
+    If `counted`, it counts its calls in the first element of `p`.
     """
     names = state_names(scene)
     lines = ["def function(t, u, du, p):"]

@@ -1,4 +1,4 @@
-"""Contenders (solvers to compare) of `bench`: their interface, our methods, and the programs."""
+"""Contenders of `bench`: their interface, our methods, and the programs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -28,11 +28,7 @@ Maker = Callable[[float, float], Ready]
 
 @dataclass(frozen=True)
 class Contender:
-    """A solver that takes part in a benchmark, either one of our own or a third-party solver.
-
-    Its setting, a tolerance or a number of steps, determines run time and accuracy. A closed form
-    has no setting.
-    """
+    """A solver in a benchmark; a closed form has no setting."""
 
     name: str
     setting: str  # quantity that is varied: "tolerance", "steps" or "none"
@@ -40,17 +36,13 @@ class Contender:
 
     @property
     def is_installed(self) -> bool:
-        """Return whether the package that the contender needs is installed."""
+        """Return whether the contender's package is installed."""
         return not self.package or find_spec(self.package) is not None
 
 
 @dataclass(frozen=True)
 class SceneContender(Contender):
-    """A contender (solver in a benchmark) that integrates one scene from time 0 to a given time.
-
-    Its result is omega, the angular velocity at this time. Some contenders also compute the
-    attitude.
-    """
+    """A contender that integrates omega of one scene, and perhaps the attitude."""
 
     # Function that returns a `Maker` for a scene. It makes all preparations, including compilation.
     prepare: Callable[[Scene], Maker]
@@ -61,10 +53,7 @@ class SceneContender(Contender):
 
 
 def own() -> list[SceneContender]:
-    """Return contenders (benchmarked solvers) for our methods and for the programs of the thesis.
-
-    Each program is a contender in two versions, the original and the corrected program.
-    """
+    """Return our methods, and the programs, original and corrected."""
     both = partial(SceneContender, attitude=True)
     found = [
         both("auto", "tolerance", partial(_prepared, "auto"), TOLERANCES),
@@ -85,11 +74,9 @@ def own() -> list[SceneContender]:
 
 
 def refuse_rounding(solver: str, setting: float) -> None:
-    """Raise InputError if a tolerance is below 100 eps, the smallest that SciPy and LSODA accept.
+    """Raise InputError if a tolerance is below 100 eps, eps = 2**-52.
 
-    `setting` is the relative tolerance, and eps is 2**-52. `solver` is the name of the solver in
-    the message. With a smaller tolerance, SciPy would warn and use 100 eps, and LSODA would reject
-    it as illegal.
+    SciPy would warn and use 100 eps; LSODA would reject it.
     """
     limit = 100 * 2.0**-52
     if setting < limit:

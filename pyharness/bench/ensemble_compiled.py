@@ -1,4 +1,8 @@
-"""Solvers of `bench --ensemble` that numba or JAX compiles at their first call."""
+"""Solvers of `bench --ensemble` that numba or JAX compiles at their first call.
+
+Each returns a function for omega at the end time `HORIZON` (rad/s), shape (n, 3). JAX chooses its
+threads itself.
+"""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -14,11 +18,7 @@ LANES = 64  # bodies in a block
 
 
 def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int) -> None:
-    """Call `solve` for blocks of bodies, one after another or distributed over threads.
-
-    `solve` is called with a slice of the indices of the `n` bodies. `threads` is the number of
-    threads, and `block` the number of bodies in a block.
-    """
+    """Call `solve` for slices of `block` bodies, in order or distributed over threads."""
     pieces = [slice(first, min(n, first + block)) for first in range(0, n, block)]
     if threads == 1:
         for piece in pieces:
@@ -31,12 +31,10 @@ def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int)
 def numba_rk4(
     in_blocks: bool, load: EnsembleLoad, setting: float, threads: int
 ) -> Callable[[], Array]:
-    """Return a function that integrates all bodies of a load by RK4, compiled by numba.
+    """Return RK4 by numba.
 
-    A load is a set of bodies with their initial omegas and torques. If `in_blocks`, each step of
-    RK4 is a loop over the bodies of a block, a group of bodies. Otherwise one body is integrated
-    after another. `setting` is the number of steps, and `threads` the number of threads. The
-    function returns omega of the bodies at the end time `HORIZON` (rad/s), shape (n, 3).
+    If `in_blocks`, each step is a loop over the bodies of a block; else bodies are integrated one
+    by one.
     """
     blocks, bodies = _numba_kernels()
     kernel = blocks if in_blocks else bodies
@@ -124,13 +122,7 @@ def _numba_kernels() -> tuple[Any, Any]:
 
 
 def jax_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that integrates all bodies of a load by RK4, compiled by JAX.
-
-    A load is a set of bodies with their initial omegas and torques. Each component of omega is an
-    array with a value for each body. `setting` is the number of steps. JAX chooses its threads
-    itself, so that `threads` has no effect. The function returns omega of the bodies at the end
-    time `HORIZON` (rad/s), shape (n, 3).
-    """
+    """Return RK4 by JAX, with an array over the bodies for each component."""
     compiled, jnp = _jax_steps()
     steps = round(setting)
     given = [tuple(jnp.array(each) for each in rows.T) for rows in (load.omega0, load.acceleration)]
@@ -164,13 +156,7 @@ def _jax_steps() -> tuple[Any, Any]:
 
 
 def diffrax_vmap(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that integrates all bodies of a load by diffrax's method Dopri8.
-
-    A load is a set of bodies with their initial omegas and torques. The step size is chosen
-    separately for each body. `setting` is the relative and the absolute tolerance. JAX chooses its
-    threads itself, so that `threads` has no effect. The function returns omega of the bodies at the
-    end time `HORIZON` (rad/s), shape (n, 3).
-    """
+    """Return diffrax's Dopri8, with steps of its own for each body."""
     compiled, jnp = _diffrax_solve()
     given = jnp.array(load.omega0), jnp.array(load.acceleration), setting
     return lambda: np.asarray(compiled(*given))
@@ -198,7 +184,7 @@ def _diffrax_solve() -> tuple[Any, Any]:
 
 
 def _jax() -> tuple[Any, Any]:
-    """Return the module JAX, set to compute in binary64, and its array module `jax.numpy`."""
+    """Return JAX, set to binary64, and `jax.numpy`."""
     import jax
     import jax.numpy as jnp
 

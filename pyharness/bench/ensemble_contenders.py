@@ -1,4 +1,4 @@
-"""The problem that all solvers of `bench --ensemble` solve, and our own of these solvers."""
+"""The problem of `bench --ensemble`, and our own solvers of it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -23,19 +23,15 @@ _HARDEST = 1.0  # largest torque about an axis over the moment about this axis, 
 
 
 def coefficients() -> list[float]:
-    """Return the coefficients A, B and C of Euler's equations for the benchmark's bodies.
-
-    The bodies have the moments of inertia `MOMENTS`.
-    """
+    """Return A, B and C of the bodies with the moments `MOMENTS`."""
     return [float(each) for each in exact_coefficients(Scene("", (0.0, 0.0, 0.0), MOMENTS))]
 
 
 @dataclass(frozen=True, eq=False)
 class EnsembleLoad:
-    """A benchmark problem (load) of many bodies, each with its own initial omega and torque.
+    """Many bodies with the moments `MOMENTS`, each with its omega and constant torque.
 
-    All bodies have the moments of inertia `MOMENTS`. The torques are constant, or None if the
-    bodies have no torque.
+    The torques are None for torque-free bodies.
     """
 
     name: str
@@ -51,11 +47,7 @@ class EnsembleLoad:
 
     @property
     def scene(self) -> Scene:
-        """Return a scene with the moments that all bodies share, at rest and without torque.
-
-        Solvers take the moments from this scene, and the bodies' initial omegas and torques
-        separately.
-        """
+        """Return a scene with the shared moments, at rest and without torque."""
         return Scene(self.name, (0.0, 0.0, 0.0), MOMENTS)
 
     @property
@@ -65,14 +57,14 @@ class EnsembleLoad:
 
     @property
     def acceleration(self) -> Array:
-        """Return each body's torque divided by its moments of inertia, shape (n, 3), in rad/s2."""
+        """Return torques over moments, shape (n, 3), in rad/s2."""
         if self.torque is None:
             return np.zeros_like(self.omega0)
         found: Array = self.torque / np.array(MOMENTS)
         return found
 
     def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
-        """Return a load (a set of bodies) with only those bodies whose indices are in `rows`."""
+        """Return the load of the bodies in `rows`."""
         names = ("omega0", "torque", "attitude0")
         given = {name: getattr(self, name) for name in names}
         own: dict[str, Any] = {
@@ -82,11 +74,9 @@ class EnsembleLoad:
         return replace(self, **own)
 
     def ends(self) -> Array:
-        """Return reference values of omega for all bodies at the end time, in rad/s, shape (n, 3).
+        """Return omega at the end (rad/s), shape (n, 3), by `solve` with tolerance 1e-15.
 
-        The end time is `HORIZON`. Our function `solve` computes the values for one body after
-        another, with the tolerance 1e-15. If attitudes are requested, they are returned instead of
-        omega, as quaternions, shape (n, 4).
+        Quaternions, shape (n, 4), if attitudes are requested.
         """
         found = np.empty_like(self.omega0 if self.attitude0 is None else self.attitude0)
         for i, start in enumerate(self.omega0.tolist()):
@@ -110,10 +100,7 @@ EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 
 @dataclass(frozen=True)
 class EnsembleContender(Contender):
-    """A contender (solver) in the benchmark of the command `bench --ensemble`.
-
-    It computes omega of many bodies at the end time `HORIZON`.
-    """
+    """A contender for omega of many bodies at `HORIZON`."""
 
     prepare: EnsembleMaker  # the first call of the function that it returns may compile code
     # Numbers of threads to measure with; 0 means as many as the package uses.
@@ -125,16 +112,12 @@ class EnsembleContender(Contender):
 
     @property
     def ways(self) -> Mapping[str, EnsembleMaker]:
-        """Return all ways to prepare the solver, by their notes; a single way has none."""
+        """Return all ways to prepare the solver by note; a single way has none."""
         return self.variants or {"": self.prepare}
 
 
 def draw(seed: str, n: int) -> list[EnsembleLoad]:
-    """Return two loads of n random bodies, the first without torque and the second with torques.
-
-    A load is a set of bodies to be solved in a benchmark. The bodies have the same initial omegas
-    in both loads. The text `seed` determines the random numbers.
-    """
+    """Return two loads of n random bodies with the same omegas: without and with torques."""
     source = text_generator(f"ensemble/{seed}")
     omega0 = source.uniform(-_FASTEST, _FASTEST, (n, 3))
     torque = source.uniform(-_HARDEST, _HARDEST, (n, 3)) * np.array(MOMENTS)
@@ -145,10 +128,7 @@ def draw(seed: str, n: int) -> list[EnsembleLoad]:
 
 
 def with_attitudes(loads: list[EnsembleLoad], seed: str) -> list[EnsembleLoad]:
-    """Return loads with the same bodies, whose random attitudes are computed together with omega.
-
-    The text `seed` determines the random numbers.
-    """
+    """Return the loads with random attitudes."""
     source = text_generator(f"ensemble attitudes/{seed}")
     turned = source.standard_normal((loads[0].n, 4))
     turned /= np.linalg.norm(turned, axis=1, keepdims=True)
@@ -156,10 +136,7 @@ def with_attitudes(loads: list[EnsembleLoad], seed: str) -> list[EnsembleLoad]:
 
 
 def own_ensembles() -> list[EnsembleContender]:
-    """Return our own contenders (solvers) in the benchmark `bench --ensemble`.
-
-    They are the closed form, the Taylor method and RK4.
-    """
+    """Return our contenders: closed form, Taylor and RK4."""
     return [
         EnsembleContender(
             "closed-form", "none", _own("closed-form"), torque_free=True, attitude=True

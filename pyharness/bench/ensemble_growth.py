@@ -1,4 +1,4 @@
-"""Time per body against the number of bodies in a call, and the memory that a call needs."""
+"""Time per body against the number of bodies in a call, and memory of a call."""
 
 import subprocess
 import sys
@@ -26,7 +26,7 @@ _BATCH, _ROUNDS = 0.02, 5
 
 @dataclass(frozen=True)
 class Size:
-    """The run time per body of each of our methods, on one core, in a call for `bodies` bodies."""
+    """Our methods' run time per body, on one core, in a call for `bodies`."""
 
     bodies: int
     seconds: dict[str, float]  # s per body, by method
@@ -34,10 +34,7 @@ class Size:
 
 @dataclass(frozen=True)
 class Memory:
-    """The additional memory (bytes) that a process needed for one call of a method.
-
-    It is the growth of the process from its size before the call to its largest size.
-    """
+    """The growth (bytes) of a process, to its peak, by one call of a method."""
 
     method: str
     bodies: int
@@ -46,17 +43,15 @@ class Memory:
 
     @property
     def ratio(self) -> float | None:
-        """Return the peak memory divided by the memory of the call's arrays, or None if unknown."""
+        """Return the peak over the memory of the call's arrays, or None."""
         return None if self.peak is None else self.peak / self.arrays
 
 
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
-    """Measure the run time per body of our methods in calls with 1, 10, 100, ... bodies.
+    """Measure the run time per body with 1, 10, 100, ... up to `most` bodies.
 
-    `most` is the largest number of bodies, and `seed` determines the random bodies. The closed form
-    is measured without torque, once by the function `solve_many`, and once by a solver that
-    `prepare` sets up for the bodies' moments before the timing. The other methods are measured with
-    torque.
+    The closed form is measured without torque, by `solve_many` and by a solver prepared before; the
+    others with torque.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []
@@ -75,16 +70,15 @@ def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
 
 
 def _prepared(load: EnsembleLoad) -> Callable[[], object]:
-    """Return a function that solves all bodies of a load (a set of bodies) by the closed form."""
+    """Return a function that solves a load by a prepared closed form."""
     solver, out = prepare(load.scene, "closed-form"), np.empty_like(load.omega0)
     return lambda: solver.many(load.omega0, HORIZON, out=out)
 
 
 def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> list[Memory]:
-    """Measure the memory that a call with `bodies` bodies needs, for each of `methods`.
+    """Measure the memory of a call, for each of `methods`, by default all ours.
 
-    By default `methods` are all of our own methods. Each method runs in a separate process, because
-    the peak memory of a process never decreases.
+    Each runs in a process of its own, because peak memory never decreases.
     """
     found = []
     for method in own_ensembles() if methods is None else methods:
@@ -101,11 +95,7 @@ def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> l
 
 
 def needed(method: str, bodies: int) -> None:
-    """Print the memory that a call of `method` with `bodies` bodies needs in this process.
-
-    Two numbers of bytes are printed. The first is the size of the arrays that the call takes and
-    returns. The second is the peak memory of the process minus its memory before the call.
-    """
+    """Print the bytes of a call's arrays, and the peak memory minus that before the call."""
     own = next(each for each in own_ensembles() if each.name == method)
     load = draw("memory", 512)[0 if own.torque_free else 1]
     own.prepare(load, SETTINGS[method], 1)()
@@ -122,10 +112,7 @@ def needed(method: str, bodies: int) -> None:
 
 
 def _resident(name: str) -> int:
-    """Return the memory (bytes) that Linux reports for this process under `name`; 0 elsewhere.
-
-    `name` is ``VmRSS`` for the present memory, or ``VmHWM`` for the peak memory.
-    """
+    """Return Linux's ``VmRSS`` (present) or ``VmHWM`` (peak) in bytes; 0 elsewhere."""
     try:
         with open("/proc/self/status", encoding="ascii") as file:
             for line in file:

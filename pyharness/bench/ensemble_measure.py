@@ -1,10 +1,8 @@
-"""Measurement of ensembles: bodies per second at a target error, and steps of RK4 per second.
+"""Measurement of ensembles: bodies per second at a target error, and RK4 steps per second.
 
-Each contender (solver) uses the coarsest setting whose error on a sample of bodies is at most the
-target. The number of bodies in a call is chosen so that the call takes a fraction of a second. In
-each of several rounds, all contenders are called in turn. The shortest time of a call counts,
-because other work of the machine can only lengthen it. Calls on one core are timed in processor
-time.
+Each contender uses the coarsest setting whose error on a sample is at most the target, for as many
+bodies as take a fraction of a second. All are called in turn in several rounds. The shortest time
+counts, because other work can only lengthen it. Calls on one core are timed in processor time.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -43,11 +41,7 @@ _MOST_STEPS = 1 << 14
 
 @dataclass(frozen=True)
 class Rate:
-    """The measured speed of one contender (solver) with one number of threads on one task.
-
-    The task is to solve the bodies of a load, a set of bodies. The error may be at most a target
-    error, or the number of RK4 steps is prescribed.
-    """
+    """The speed of one contender and number of threads on one task."""
 
     load: str
     target: float | None  # requested error; None where the steps were prescribed
@@ -61,21 +55,18 @@ class Rate:
 
     @property
     def bodies_a_second(self) -> float:
-        """Return the number of bodies integrated to the end time per second of run time."""
+        """Return the number of bodies integrated per second."""
         return self.bodies / self.seconds
 
     @property
     def rate(self) -> float:
-        """Return the speed in bodies per second.
-
-        If the steps were prescribed, return it in steps per second, summed over all bodies.
-        """
+        """Return bodies per second, or steps of all bodies per second if prescribed."""
         return self.bodies_a_second * (1 if self.target is not None else STEPS)
 
 
 @dataclass(frozen=True)
 class Rates:
-    """All speeds that a run of `bench --ensemble` measured, and the reasons for missing speeds."""
+    """All measured speeds, and the reasons for missing ones."""
 
     seed: str
     bodies: int
@@ -86,11 +77,9 @@ class Rates:
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """A benchmark task: to solve the bodies of a load (a set of bodies) within a target error.
+    """A load with a target error or, without one, `STEPS` steps of RK4.
 
-    Without a target error, the task is to solve the bodies in `STEPS` steps of RK4. The error is
-    measured on a sample, which consists of the first bodies of the load. Since all bodies are
-    random, the first bodies are a random sample.
+    The error is that of the first bodies, a random sample.
     """
 
     load: EnsembleLoad
@@ -100,19 +89,13 @@ class _Task:
 
     @property
     def place(self) -> str:
-        """Return a description of the task for messages, such as ``no torque, 1e-06``.
-
-        It has the name of the set of bodies, and the target error or the prescribed number of RK4
-        steps.
-        """
+        """Return a description for messages, such as ``no torque, 1e-06``."""
         return f"{self.load.name}, {f'{self.target:g}' if self.target else f'{STEPS} steps of RK4'}"
 
     def takes(self, each: EnsembleContender) -> bool:
-        """Return whether the contender (solver) `each` can do the task.
+        """Return whether a contender can do the task.
 
-        It must be able to solve bodies with the torques of the load, which is the task's set of
-        bodies, and to compute their attitudes if the load requests them. Without a target error, it
-        must also be an RK4 solver, whose setting is the number of steps.
+        It must take the load's torques and attitudes, and be an RK4 solver if steps are prescribed.
         """
         torque = self.load.torque is not None and each.torque_free
         if torque or (self.load.attitude0 is not None and not each.attitude):
@@ -120,12 +103,9 @@ class _Task:
         return self.target is not None or each.setting == "steps"
 
     def error(self, omega: Array) -> float:
-        """Return the largest relative error of `omega`, the computed result for a sample of bodies.
+        """Return the largest error, over each body's largest omega at start or end.
 
-        If the load requests attitudes, `omega` contains them, and the error is an angle (rad).
-
-        The error of a body is divided by the largest magnitude of a component of its omega, at the
-        start or at the end. If a component of `omega` is not finite, the result is infinite.
+        For attitudes it is an angle (rad). It is infinite if a component is not finite.
         """
         n = min(len(omega), len(self.ends))
         ends, starts = self.ends[:n], self.sample.omega0[:n]
@@ -137,12 +117,7 @@ class _Task:
         return float(np.where(np.isfinite(errors), errors, np.inf).max())
 
     def setting(self, each: EnsembleContender) -> float | None:
-        """Return the coarsest setting with which the contender (solver) reaches the target error.
-
-        A setting of the contender `each` is a tolerance or a number of steps. Return None if no
-        setting reaches the error. Without a target error, return the prescribed number of RK4
-        steps, `STEPS`.
-        """
+        """Return the coarsest setting that reaches the error, or None; `STEPS` if prescribed."""
         if self.target is None:
             return float(STEPS)
         for setting in _ladder(each, self.target):
@@ -162,11 +137,10 @@ def measure_ensembles(
     progress: Progress = no_progress,
     least: int = 64,
 ) -> Rates:
-    """Measure the speed of all contenders (solvers) on all loads, at all target errors.
+    """Measure the speed of all contenders on all loads, at all target errors.
 
-    A load is a set of bodies. On the last load, the contenders that run RK4 are also measured with
-    the fixed number of steps `STEPS`. `seed`, from which the loads were drawn, is only recorded in
-    the result. A call solves at least `least` bodies, if the load has as many.
+    On the last load, RK4 contenders also run `STEPS` steps. `seed` is only recorded. A call solves
+    at least `least` bodies, if there are as many.
     """
     found = Rates(seed, loads[0].n)
     tasks: list[_Task] = []
@@ -198,7 +172,7 @@ def measure_ensembles(
 
 
 def _fastest(rows: Iterable[Rate]) -> Iterable[Rate]:
-    """Return the fastest variant of each solver, in the order of the rows."""
+    """Return the fastest variant of each solver, in order."""
     found: dict[tuple[object, ...], Rate] = {}
     for row in rows:
         place = (row.load, row.target, row.method, row.threads)
@@ -226,12 +200,9 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
 def _enough(
     prepare: EnsembleMaker, load: EnsembleLoad, setting: float, threads: int, least: int
 ) -> tuple[EnsembleLoad, Callable[[], Array]]:
-    """Return a load with the first bodies of `load`, and a function that solves these bodies.
+    """Return the first bodies that suffice for timing, and the function that solves them.
 
-    A load is a set of bodies. The number of bodies is chosen so that a call of the function takes
-    long enough to be timed. If `load` has too few bodies, all of them are used. `prepare` makes the
-    function. `setting` is the tolerance or the number of steps, `threads` the number of threads,
-    and `least` the smallest number of bodies.
+    At least `least`, if `load` has as many.
     """
     n, before = min(load.n, least), 0.0
     while True:
@@ -245,8 +216,5 @@ def _enough(
 
 
 def clock_of(threads: int) -> Clock:
-    """Return the clock function that times a call with this number of threads.
-
-    It is the processor time for one thread, and the wall-clock time otherwise.
-    """
+    """Return the processor time for one thread, else the wall clock."""
     return process_time if threads == 1 else perf_counter

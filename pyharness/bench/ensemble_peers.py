@@ -1,4 +1,7 @@
-"""Third-party solvers of `bench --ensemble`: NumPy, SciPy and heyoka, and a list of all."""
+"""Third-party solvers of `bench --ensemble`: NumPy, SciPy and heyoka, and a list of all.
+
+Each returns a function for omega at the end time (rad/s), shape (n, 3).
+"""
 
 from collections.abc import Callable
 from functools import cache, partial
@@ -26,7 +29,7 @@ _BLOCK = 4096  # bodies whose arrays fit into the cache
 
 
 def ensemble_peers() -> list[EnsembleContender]:
-    """Return all third-party solvers in the benchmark `bench --ensemble`, installed or not."""
+    """Return all third-party solvers, installed or not."""
     one = EnsembleContender
     blocks, alone = partial(compiled.numba_rk4, True), partial(compiled.numba_rk4, False)
     batches, ensembles = (
@@ -56,13 +59,9 @@ def ensemble_peers() -> list[EnsembleContender]:
 def heyoka_batch(
     load: EnsembleLoad, setting: float, threads: int, size: int = BATCHES[0]
 ) -> Callable[[], Array]:
-    """Return a function that integrates all bodies of a load with one heyoka batch integrator.
+    """Return an integration by one heyoka batch integrator, for `size` bodies at a time.
 
-    A load is a set of bodies with their initial omegas and torques. For each batch of bodies in
-    turn, the function sets the state and the torque of the integrator. It returns omega of the
-    bodies at the end time of the load (rad/s), shape (n, 3), or the attitudes, shape (n, 4), of a
-    load that requests them. `setting` is the tolerance, `size` the number of bodies in a batch, and
-    `threads` has no effect.
+    It returns attitudes, shape (n, 4), if the load requests them. `threads` has no effect.
     """
     of_state = isinstance(load.scene.torque, StateTorque)
     scene = load.scene if of_state else None
@@ -122,9 +121,7 @@ def _integrator(
 ) -> Any:  # fmt: skip
     """Return a batch integrator of `size` bodies, compiled for a tolerance.
 
-    The bodies are those of the benchmark, with a constant torque if `with_torque`, and with an
-    attitude if `with_attitude`. If `scene` is not None, they are those of a scene whose torque
-    depends on the state.
+    Of the benchmark's bodies, or of `scene`, whose torque depends on the state.
     """
     import heyoka
 
@@ -144,20 +141,14 @@ def _integrator(
 
 
 def _batches(rows: Array, size: int) -> Array:
-    """Return the array `rows`, with k numbers for each body, divided into batches of bodies."""
+    """Return `rows`, k numbers for each body, divided into batches."""
     lacking = -len(rows) % size
     filled = np.concatenate([rows, np.repeat(rows[-1:], lacking, axis=0)])
     return np.ascontiguousarray(filled.reshape(-1, size, rows.shape[1]).transpose(0, 2, 1))
 
 
 def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that integrates all bodies of a load by RK4 with NumPy arrays.
-
-    A load is a set of bodies with their initial omegas and torques. An array has one row for each
-    component of omega, and a block of bodies as columns. `setting` is the number of steps, and
-    `threads` the number of threads. The function returns omega of the bodies at the end time
-    `HORIZON` (rad/s), shape (n, 3).
-    """
+    """Return RK4 with NumPy arrays: a row per component, a column per body of a block."""
     a, b, c = coefficients()
     starts, torques = load.omega0.T.copy(), load.acceleration.T.copy()
     found = np.empty_like(load.omega0)
@@ -197,11 +188,9 @@ def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[],
 
 
 def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return a function that runs SciPy's `solve_ivp` for one body of a load after another.
+    """Return SciPy's `solve_ivp` for one body after another.
 
-    A load is a set of bodies with their initial omegas and torques. The right-hand side computes
-    with floats, not with arrays. `setting` is the relative tolerance, and `threads` has no effect.
-    The function returns omega of the bodies at the end time `HORIZON` (rad/s), shape (n, 3).
+    The right-hand side computes with floats. `threads` has no effect.
     """
     from scipy.integrate import solve_ivp
 

@@ -1,4 +1,4 @@
-"""The report of `bench --ensemble`: bodies per second, time against their number, memory."""
+"""The report of `bench --ensemble`."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -27,11 +27,7 @@ _STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
 
 @dataclass(frozen=True)
 class Ensembles:
-    """The results of one run of `bench --ensemble`.
-
-    They are the measured speeds of all solvers, our run times for different numbers of bodies, and
-    the memory that our methods need.
-    """
+    """Speeds of all solvers, our times by number of bodies, and memory."""
 
     rates: Rates
     sizes: Sequence[Size]
@@ -39,11 +35,9 @@ class Ensembles:
 
 
 def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> Report:
-    """Return the report of `bench --ensemble`, which consists of tables and notes.
+    """Return tables of speeds, of time per body, and of memory.
 
-    `found` has the results. The tables show the speeds for each set of bodies and target error, the
-    time per body against the number of bodies, and the memory. `packages` are the packages whose
-    versions are listed. `command` is the command that produces the report again.
+    `packages` are those whose versions are listed, `command` repeats the report.
     """
     return measured_report(
         "## Ensembles",
@@ -59,12 +53,9 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
-    """Return the speed of our fastest method divided by the speed of the contender in `row`.
+    """Return our fastest method's speed over that of `row`, with as many threads, or None.
 
-    `rows` has the speeds of all contenders (solvers) on the same task. Both speeds are for the same
-    number of threads. A contender that chooses its threads itself is compared with our speed on the
-    largest number of threads. Return None if none of our methods was measured with that number of
-    threads.
+    A contender that chooses its threads is compared with our largest number.
     """
     ours = [each for each in rows if each.method in _STYLES]
     threads = row.threads or max((each.threads for each in ours), default=0)
@@ -171,7 +162,7 @@ def _record(found: Ensembles) -> dict[str, Any]:
 
 
 def size_picture(sizes: Sequence[Size]) -> Picture:
-    """Draw the time per body (ns) of each method against the number of bodies in a call."""
+    """Return time per body (ns) against the number of bodies."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.5, 4.5), dpi=110, layout="constrained")

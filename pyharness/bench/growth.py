@@ -1,8 +1,7 @@
 """Growth of errors with time: the Taylor method against the closed form, up to 1e5 s.
 
-The errors are compared with the conditioning of the problem. A relative change of the time t, or of
-any angular rate, by one rounding (2**-53) changes the solution by 2**-53 t |omega'|. This change
-does not depend on the method.
+A relative change of the time t, or of an angular rate, by 2**-53 changes the solution by 2**-53 t
+|omega'|, whatever the method. It is the scale of the errors.
 """
 
 from collections.abc import Sequence
@@ -22,11 +21,7 @@ _STARTS = 8
 
 @dataclass(frozen=True)
 class Growth:
-    """The error of the Taylor method at one time, and the change of omega if this time is rounded.
-
-    The change depends on the motion but not on the method. It is the scale with which the error is
-    compared.
-    """
+    """The Taylor method's error at one time, and the effect of rounding this time."""
 
     time: float  # s
     # Both are relative to the largest angular velocity. `error` is the largest difference between
@@ -40,10 +35,8 @@ class Growth:
 def growth(
     scene: Scene, horizons: Sequence[float] = HORIZONS, tolerance: float = 1e-15
 ) -> list[Growth]:
-    """Measure the error of the Taylor method at several times of a torque-free motion.
+    """Return the Taylor method's error against the closed form at `horizons` (s).
 
-    `horizons` are the times (s). The result has a `Growth` for each of them. The error is the
-    difference from the closed form. `tolerance` is the relative tolerance of the Taylor method.
     Raise InputError if the scene has no closed form.
     """
     if closed_form(scene) is None:

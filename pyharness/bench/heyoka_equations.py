@@ -17,12 +17,10 @@ Formula = Callable[..., Sequence[Any]]
 
 
 def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple[Any, Any]]:
-    """Return pairs of an unknown and its derivative, for the integrators of heyoka.
+    """Return pairs of an unknown and its derivative: omega, and the scene's attitude.
 
-    The unknowns are omega and, if the scene has an attitude, the quaternion. A torque that depends
-    on the state is evaluated from its tape in the arithmetic of heyoka. If `formula` is not None,
-    the torque is computed by this function instead, independently of the tape. Raise InputError for
-    an opaque torque or a table, which heyoka can't evaluate.
+    A torque that depends on the state is evaluated from its tape, or by `formula` if that is given.
+    Raise InputError for an opaque torque or a table.
     """
     import heyoka
 
@@ -76,7 +74,7 @@ def _by_tape(scene: Scene, state: Sequence[Any]) -> list[Any]:
 
 
 def heyoka_functions() -> Functions[Any]:
-    """Return the functions with which a tape is evaluated in the arithmetic of heyoka."""
+    """Return the functions of a tape in heyoka's arithmetic."""
     import heyoka
 
     def table(_: Table, time: Any) -> Any:

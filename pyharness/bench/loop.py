@@ -1,4 +1,4 @@
-"""The loop of all measurements: the calls of a task are prepared and then timed in turn."""
+"""The loop of all measurements: calls of a task are prepared, then timed in turn."""
 
 import statistics
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,7 +13,7 @@ Say = Callable[[str], None]  # receives the current part of a task
 
 
 class Task(Protocol):
-    """A task of a benchmark, such as a scene and an end time, with its name in messages."""
+    """A task, such as a workload, with its name in messages."""
 
     @property
     def place(self) -> str: ...  # noqa: D102
@@ -24,7 +24,7 @@ _Task = TypeVar("_Task", bound=Task)
 
 @dataclass(frozen=True)
 class Call(Generic[_Row]):
-    """A call of a solver that is to be timed, and the row of the results that records its time."""
+    """A call to be timed, and the row that records its time."""
 
     run: Callable[[], object] | None  # None if the call failed and is not timed
     clock: Clock
@@ -40,10 +40,9 @@ def timed(
     statistic: Callable[[Sequence[float]], float] = statistics.median,
     slow: float = SLOW,
 ) -> Iterator[_Row]:
-    """Yield the rows of the results: for each task, `calls` prepares the calls, which are timed.
+    """Yield the rows of the calls that `calls` prepares for each task.
 
-    `progress` is called with a message before each part of the work. The last four parameters are
-    those of `pyharness.compare.timing.seconds`.
+    The last four parameters are those of `pyharness.compare.timing.seconds`.
     """
     for number, task in enumerate(tasks):
 

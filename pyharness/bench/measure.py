@@ -1,10 +1,8 @@
-"""Measurement of run time against error, for our and third-party solvers, in one process.
+"""Run time against error, for our and third-party solvers, in one process.
 
-Every contender (solver) is called with a series of settings, from coarse to fine. Each call
-integrates omega from time 0 to T, and also the attitude if the scene has one. All calls are first
-prepared, made once, and compared with the reference solution. They are then timed in rounds. In
-each round, a batch of each call is timed in turn, so that other work of the machine affects all
-calls alike. The median over the rounds counts.
+Every contender has settings from coarse to fine. All calls are prepared, made once, and compared
+with the reference. Then, in each round, a batch of each is timed in turn, so that other work
+affects all alike; the median counts.
 """
 
 import math
@@ -52,7 +50,7 @@ _BATCH = 1e-3  # s; calls faster than this are batched
 
 @dataclass(frozen=True)
 class Workload:
-    """A task of the benchmark: a scene, and the time T up to which its motion is integrated."""
+    """A scene, and the time to which its motion is integrated."""
 
     # For a case the label is its number, with an `L` if T = 100 s (`3L`), or with any other T that
     # is not 3 s. For a random scene it is the number of the scene, and for a torque term its name.
@@ -71,16 +69,15 @@ class Workload:
 
     @property
     def place(self) -> str:
-        """Return the name of this benchmark problem in messages, as ``case 5`` or ``scene 12``."""
+        """Return the name in messages, as ``case 5`` or ``scene 12``."""
         return f"{'scene' if self.kinds else 'case'} {self.label}"
 
     @property
     def group(self) -> str:
-        """Return the name of the group of problems over which ratios of run times are averaged.
+        """Return the name of the group over which ratios are averaged.
 
-        All problems of a group have the same end time. If an attitude is requested or this time is
-        3 s, scenes with and without a torque are in separate groups. Otherwise they are in the same
-        group.
+        Groups share the end time; with attitudes or at 3 s, scenes with and without torque are
+        apart.
         """
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"
@@ -89,10 +86,7 @@ class Workload:
 
 @dataclass(frozen=True)
 class Row:
-    """The run time and the error of one contender (solver) with one setting on one workload.
-
-    The setting is a tolerance or a number of steps. A workload is a scene with an end time.
-    """
+    """Run time and error of one contender and setting on one workload."""
 
     workload: Workload
     method: str  # name of the contender
@@ -110,11 +104,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Refusal:
-    """The reason why a contender (solver) has no result for a workload with some setting.
-
-    A workload is a scene with an end time, and `setting` a tolerance or a number of steps.
-    `setting` is None if the contender was not run with any setting, or if it has no setting.
-    """
+    """Why a contender has no result for a workload; `setting` may be None."""
 
     workload: Workload
     method: str  # name of the contender
@@ -124,7 +114,7 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Finding:
-    """The results of one run of the benchmark: times, errors, and reasons for missing results."""
+    """The results of a run: times, errors, and refusals."""
 
     workloads: list[Workload]
     rows: list[Row]
@@ -139,20 +129,18 @@ class Finding:
 
     @property
     def attitude(self) -> bool:
-        """Return whether the attitude was requested in addition to omega."""
+        """Return whether the attitude was requested."""
         return any(load.scene.attitude is not None for load in self.workloads)
 
 
 def workloads(
     case: int | None = None, horizon: float | None = None, attitude: bool = False
 ) -> list[Workload]:
-    """Return the workloads of a benchmark: cases of the thesis, each with an end time T.
+    """Return cases of Table 1, each to an end time T.
 
-    By default they are Cases 2 to 7 of Table 1 of the thesis to T = 3 s, and Cases 3 (a slightly
-    perturbed symmetric top) and 4 (an unsymmetric top without torque) to T = 100 s. With `attitude`
-    they are Cases 1 to 7 to T = 3 s, and all cases except 6 to T = 100 s. The body's axes then
-    initially coincide with the axes of space. `case` selects a single case, and `horizon` a single
-    end time T (s).
+    By default Cases 2 to 7 to 3 s, and 3 (nearly symmetric) and 4 (unsymmetric, torque-free) to 100
+    s. With `attitude` Cases 1 to 7 to 3 s, and all except 6 to 100 s, from the axes of space.
+    `case` and `horizon` (s) select one.
     """
     usual, long = (_TURNING_CASES, _LONG_TURNING_CASES) if attitude else (_CASES, _LONG_CASES)
     cases = usual if case is None else (case,)
@@ -173,10 +161,9 @@ def measure(
     progress: Progress = no_progress,
     clock: Clock | None = None,
 ) -> Finding:
-    """Run every contender (solver) on every workload in `loads`; return the times and errors.
+    """Return times and errors of every contender on every workload.
 
-    A workload is a scene with an end time. `progress` is called with a message before each part of
-    the work. `clock` is the clock (s) of all calls, by default the wall clock.
+    `clock` (s) is by default the wall clock.
     """
     clock = clock or perf_counter
     found = Finding(list(loads), [], [], {}, {})
@@ -223,11 +210,9 @@ def measure(
 
 
 def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return the error of a solver's result `end` against the reference solution `truth`.
+    """Return the relative error of omega, or the attitude's (rad) if larger; else None.
 
-    It is the error of omega, as `relative_error` returns it for the same `scale`. If `truth` has an
-    attitude, it is the error of omega or the angular error of the attitude (rad), whichever is
-    larger. Return None if the result is not finite, or if a required attitude is missing.
+    None if the result is not finite or a required attitude is missing.
     """
     error = relative_error(end.omega, truth, scale)
     if error is None or truth.attitude is None:
@@ -242,11 +227,9 @@ def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
 
 
 def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return the largest error of a computed omega, relative to the largest component of `truth`.
+    """Return the error of omega (rad/s) over the largest component of `truth`, or None.
 
-    `omega` has the shape (3,), in rad/s. `truth` is the reference solution at the same time. The
-    error is relative to `scale` (rad/s) if that is larger. Return None if the error is not finite,
-    or if the reference does not reach the time.
+    Over `scale` (rad/s) if that is larger. None if it is not finite, or the reference ends before.
     """
     if len(truth.omega) == 0:
         return None
@@ -261,11 +244,9 @@ def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float 
 
 
 def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[float]:
-    """Yield the settings of a contender (solver) for one scene, from coarse to fine.
+    """Yield a contender's settings, from coarse to fine.
 
-    The settings are the contender's tolerances or, for a fixed step, numbers of steps from time 0
-    to `horizon` (s). The numbers of steps grow by factors of 3/2 and 4/3 in turn, or by factors
-    of 2 for methods of order 2 or less.
+    Numbers of steps grow by 3/2 and 4/3 in turn, or by 2 for methods of order 2 or less.
     """
     if contender.settings:
         yield from contender.settings
@@ -287,13 +268,9 @@ def _first_calls(
     load: Workload, contender: SceneContender, make: Maker, truth: Reference,
     refused: list[Refusal], clock: Clock,
 ) -> tuple[list[tuple[Ready, Row]], float]:  # fmt: skip
-    """Prepare the calls of one contender for one workload, one for each setting, and try them.
+    """Return a contender's calls on a workload, each tried, and the time (s) to prepare them.
 
-    A contender is a solver. A workload is a scene with an end time, and a setting is a tolerance or
-    a number of steps. Return the calls, each with its result, and the total time (s) of preparing
-    them, without the time of the calls themselves. `make` prepares a call for an end time (s) and a
-    setting. `truth` is the reference solution. Settings that cannot be run are appended to
-    `refused`. `clock` is the clock (s) of the calls.
+    Settings that cannot be run are appended to `refused`.
     """
     entries: list[tuple[Ready, Row]] = []
     errors: list[float | None] = []
@@ -347,6 +324,6 @@ def _first_calls(
 
 
 def _at_rounding(errors: Sequence[float | None]) -> bool:
-    """Return whether rounding limits the errors of a contender (solver) with ever finer steps."""
+    """Return whether rounding limits the errors of finer settings."""
     known = [error for error in errors if error is not None]
     return len(known) > 3 and min(known[-3:]) >= min(known[:-3]) and min(known) < 1e-10

@@ -1,4 +1,4 @@
-"""Orekit's closed form of torque-free motion, `TorqueFree`, run by Java within this process."""
+"""Orekit's closed form of torque-free motion, `TorqueFree`, run by Java in this process."""
 
 from importlib import import_module
 from time import perf_counter
@@ -17,12 +17,10 @@ WARMING = 2.0
 
 
 def orekit(scene: Scene) -> Maker:
-    """Return a function that prepares timed runs of Orekit's `TorqueFree` on a scene.
+    """Return a maker of `TorqueFree`; the setting has no effect.
 
-    `TorqueFree` is a closed form. The function takes the end time (s) and a setting that has no
-    effect, and returns a computation that is ready to be timed. Each run computes the elliptic
-    integrals of the motion again. Raise InputError if the scene has a torque or no moments, or if
-    Java or Orekit fails.
+    Each run computes the elliptic integrals again. Raise InputError if the scene has a torque or no
+    moments, or if Java or Orekit fails.
     """
     if not scene.torque.is_zero or scene.moments is None:
         raise InputError("TorqueFree does not take this scene; allowed: moments, and no torque")
@@ -71,10 +69,9 @@ def _end(found: Any) -> End:
 
 
 def _machine() -> Any:
-    """Return the module JPype, after starting the Java virtual machine in this process if needed.
+    """Return JPype with a started Java machine, of which a process can have one.
 
-    JPype lets Python call Java. A process can start a Java virtual machine only once. Raise
-    InputError if Java or Orekit fails.
+    Raise InputError if Java or Orekit fails.
     """
     try:
         # JPype's type hints declare only some of its names.

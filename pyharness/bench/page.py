@@ -1,4 +1,4 @@
-"""The report of a benchmark: its tables and notes, the command that made it, and the machine."""
+"""The report of a benchmark: tables, notes, command and machine."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -19,13 +19,12 @@ def measured_report(
     packages: Iterable[str],
     command: str,
 ) -> Report:
-    """Return the report of a benchmark, made of titled tables and notes.
+    """Return the report of a benchmark.
 
-    `title` is the heading of the page, with its Markdown marks. `worth` is a text on how far the
-    numbers can be compared. `parts` are the tables, each with its title, and `notes` are lines of
-    text below them. `record` is a function that returns the JSON record, `data` the table with full
-    precision, and `pictures` has functions that draw the pictures, by name. `packages` are the
-    packages whose versions are listed. `command` is the command that produces the page again.
+    `title` is a Markdown heading, `worth` says how far numbers can be compared, `parts` are titled
+    tables, and `notes` lines below them. `record` returns the JSON, `data` is the table with full
+    precision, `pictures` are functions by name. `packages` are those whose versions are listed,
+    `command` repeats the report.
     """
     here, built = machine(packages), build()
     versions = [
@@ -59,11 +58,10 @@ def measured_report(
 
 
 def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) -> list[str]:
-    """Return a line of text for each reason why contenders (solvers) have no result.
+    """Return a line for each reason, from tuples (contender, reason, task).
 
-    `reasons` are tuples (contender, reason, task). The task may include the setting of the
-    contender, or be empty. A line names at most the first `most` tasks of a contender. Contenders
-    with the same reason and the same tasks share a line.
+    It names at most the first `most` tasks of a contender; those with the same reason and tasks
+    share a line.
     """
     places: dict[tuple[str, str], list[str]] = {}
     for who, why, where in reasons:

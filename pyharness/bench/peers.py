@@ -1,4 +1,4 @@
-"""Third-party integrators in `bench`, each used as its documentation recommends for speed."""
+"""Third-party integrators in `bench`, each as its documentation recommends for speed."""
 
 import warnings
 from collections.abc import Callable
@@ -21,7 +21,7 @@ _SOLVE_IVP = ("DOP853", "RK45", "LSODA", "Radau")
 
 
 def peers() -> list[SceneContender]:
-    """Return all third-party solvers of `bench` for single scenes, whether installed or not."""
+    """Return all third-party solvers of single scenes, installed or not."""
     # 2**-52 is the default tolerance of heyoka.
     finest = (*TOLERANCES, 2.0**-52)
 
@@ -55,11 +55,9 @@ def peers() -> list[SceneContender]:
 
 
 def heyoka_maker(scene: Scene, formula: Formula | None = None) -> Maker:
-    """Return a function that prepares timed runs of the package heyoka on a scene.
+    """Return a maker of heyoka, with one integrator for each tolerance.
 
-    The function takes the end time (s) and the tolerance, and compiles one integrator for each
-    tolerance. Each timed run first resets the integrator's time and state. `formula` is that of
-    `heyoka_equations`.
+    Each run first resets time and state. `formula` is that of `heyoka_equations`.
     """
     import heyoka
 
@@ -94,7 +92,7 @@ def heyoka_maker(scene: Scene, formula: Formula | None = None) -> Maker:
 
 
 def _right_hand_side(scene: Scene) -> RightHandSide:
-    """Return the right-hand side of a scene's equations of motion, for SciPy's integrators."""
+    """Return the equations of motion for SciPy's integrators."""
     if isinstance(scene.torque, StateTorque):
         return slopes_of(scene)
     slopes = scene.right_hand_side()
@@ -102,22 +100,13 @@ def _right_hand_side(scene: Scene) -> RightHandSide:
 
 
 def _absolute(scene: Scene) -> Any:
-    """Return the magnitudes of a scene's unknowns, by which the relative tolerance is multiplied.
-
-    The product is the absolute tolerance. The result is one number for the three components of
-    omega, or an array of seven numbers for omega and the quaternion of the attitude.
-    """
+    """Return the factor from relative to absolute tolerance: a number, or seven with attitude."""
     largest = max(map(abs, scene.omega)) or 1.0
     return largest if scene.attitude is None else np.array([largest] * 3 + [1.0] * 4)
 
 
 def _solve_ivp(name: str, scene: Scene) -> Maker:
-    """Return a function that prepares timed runs of SciPy's `solve_ivp` on a scene.
-
-    The function takes the end time (s) and the relative tolerance. `name` is the method of
-    `solve_ivp`. The runs have no dense output, and their right-hand side computes with Python
-    floats.
-    """
+    """Return a maker of `solve_ivp`, without dense output and with Python floats."""
     from scipy.integrate import solve_ivp
 
     slope, start, size = _right_hand_side(scene), state_of(scene), _absolute(scene)

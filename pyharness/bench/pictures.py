@@ -1,4 +1,4 @@
-"""The pictures of `bench`: error against run time and evaluations, and growth of errors."""
+"""The pictures of `bench`."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -29,11 +29,9 @@ _SLOPES = (2, 4, 8)
 
 
 def bench_picture(finding: Finding, data: Table) -> Picture:
-    """Draw the error of each solver against run time and against evaluations, for each workload.
+    """Return error against run time and evaluations, a row for each workload.
 
-    `finding` has the results of a benchmark. A workload is a scene with an end time, and has a row
-    of two plots: error against run time, and error against the number of evaluations of the
-    right-hand side. `data` is the table that is saved with the picture.
+    `data` is saved with the picture.
     """
     from matplotlib.figure import Figure
 
@@ -112,11 +110,7 @@ def _frame(axes: "Axes", load: Workload, label: str) -> None:
 
 
 def draw_slopes(axes: "Axes") -> None:
-    """Draw lines that show how fast the errors of methods of order 2, 4 and 8 decrease.
-
-    The plot `axes` shows error against the number of evaluations of the right-hand side. The lines
-    form a fan in the upper right corner of the plot, where no solver has its results.
-    """
+    """Draw the slopes of orders 2, 4 and 8, in the empty upper right corner."""
     low, high = axes.get_xlim()
     begin = high * (low / high) ** 0.3
     for order in _SLOPES:
@@ -133,12 +127,7 @@ def draw_slopes(axes: "Axes") -> None:
 
 
 def growth_picture(found: "Mapping[int, Sequence[Growth]]") -> Picture:
-    """Draw the Taylor method's error, and the effect of one rounding of the time, against time.
-
-    `found` has the measured errors by the number of the case of Table 1 of the thesis. Each case
-    has a plot. The effect is the change of omega if the time changes by a relative 2**-53. It does
-    not depend on the method.
-    """
+    """Return the Taylor method's error and the effect of one rounding against time, by case."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.5 * len(found), 4.0), dpi=110, layout="constrained")

@@ -1,8 +1,7 @@
-"""Random scenes of several kinds for `bench`; no method was tuned on them.
+"""Random scenes of several kinds; no method was tuned on them.
 
-A seed and a number determine a scene. Its motion is computed by a Taylor series in integer
-arithmetic, which is the second of our two reference solvers. Depending on the motion, the scene is
-accepted or drawn again.
+Seed and number determine a scene. It is accepted, or drawn again, by its motion from the second
+reference (`integer_series`).
 """
 
 import math
@@ -25,17 +24,11 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 
 
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
-    """Return the random benchmark problem that a seed and a number (from 1) determine.
+    """Return the workload of a seed and a number (from 1), which takes the torques in turn.
 
-    The problem is a `Workload`, a scene with an end time. Successive numbers take the kinds of
-    torque in turn. `kinds` of the workload are members of `KINDS`, such as ``no torque``. Its
-    solution `truth` comes from `integer_series`, one of our two reference solvers. A scene is drawn
-    again if its error amplification is `MOST_GROWTH` or more. It is also drawn again if the body
-    turns less than once or more than 300 times. Moments are in kg m2, omega in rad/s, torque in N
-    m, the end time in s.
-
-    With `attitude`, the same scene also has an attitude, which starts from the axes of space. The
-    workload then has no `truth`, because `integer_series` does not propagate the attitude.
+    It is drawn again if its error amplification is `MOST_GROWTH` or more, or if the body turns less
+    than once or more than 300 times. Units are kg m2, rad/s, N m and s. With `attitude` it starts
+    from the axes of space, and has no `truth`, as `integer_series` does not propagate it.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1

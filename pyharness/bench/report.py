@@ -1,4 +1,7 @@
-"""The reports of `bench`: time against error, time that the plan saves, growth of errors."""
+"""The reports of `bench`.
+
+A ratio is the run time of the baseline solver over that of another, at the same error.
+"""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -31,13 +34,10 @@ _DRIFT = (
 
 
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
-    """Return the report of a benchmark: a table for each workload, then mean ratios of run times.
+    """Return a table for each workload, mean ratios, and the machine.
 
-    `finding` has the results, and a workload is a scene with an end time. A ratio is the run time
-    of the baseline solver, with which all others are compared, divided by the run time of another
-    solver at the same error. For random scenes, the report shows the distributions of the ratios
-    instead of these tables. The report also describes the machine. `packages` are the packages
-    whose versions are listed. `command` is the command that produces the report again.
+    For random scenes there are distributions of the ratios instead. `packages` are those whose
+    versions are listed, `command` repeats the report.
     """
     drawn, data = _random(finding), _data(finding)
     return measured_report(
@@ -68,12 +68,7 @@ def _spread_data(finding: Finding) -> Table:
 
 
 def _spread_parts(finding: Finding) -> list[tuple[str, Table]]:
-    """Return a title and a table for every solver and target error of a run with random scenes.
-
-    A table has a row for each kind of scene. The row shows the distribution of ratios over the
-    scenes of this kind. A ratio is the run time of the baseline solver, with which all others are
-    compared, divided by the run time of the table's solver.
-    """
+    """Return a table of ratios by kind of scene, for every solver and error."""
     heads = ("mean", "smallest", "25 %", "median", "75 %")
     columns = [
         Column("kind", left=True),
@@ -103,11 +98,7 @@ def _data(finding: Finding) -> Table:
 
 
 def savings_report(found: Sequence[Saving]) -> Report:
-    """Return the report of the time saved by leaving out parts of a computation.
-
-    `found` has, for each part that can be left out, such as dense output, the run times with and
-    without it.
-    """
+    """Return the report of run times with and without parts of a computation."""
     time = digits(".3g", 1e6)
     columns = (
         *words("skipped where"), Column("us with it", time, unit="s", full=time),
@@ -120,10 +111,7 @@ def savings_report(found: Sequence[Saving]) -> Report:
 
 
 def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
-    """Return the report of the Taylor method's error against the time up to which it integrates.
-
-    `found` has the measured errors by the number of the case of Table 1 of the thesis.
-    """
+    """Return the report of the Taylor method's error against time, by case of Table 1."""
     time, error = digits(".3g"), digits(".2g")
     columns = (
         *words("case"), Column("time", time, unit="s", full=time),
@@ -181,7 +169,7 @@ def _settings_of(each: Row | Refusal) -> dict[str, Any]:
 
 
 def microseconds(seconds: float | None) -> str:
-    """Return a time `seconds` (s) as text in microseconds, such as 12.3; "-" if it is None."""
+    """Return a time (s) as microseconds, such as 12.3; "-" for None."""
     if seconds is None:
         return "-"
     value = seconds * 1e6
@@ -189,7 +177,7 @@ def microseconds(seconds: float | None) -> str:
 
 
 def ratio(value: float | None) -> str:
-    """Return a ratio as text with about three digits, such as 0.0123 or 12.3; "-" if it is None."""
+    """Return a ratio as about three digits; "-" for None."""
     if value is None:
         return "-"
     if value >= 99.95:
@@ -199,12 +187,7 @@ def ratio(value: float | None) -> str:
 
 
 def _parts(finding: Finding) -> list[tuple[str, Table]]:
-    """Return pairs of a title and a table, for every workload and every group of workloads.
-
-    A workload is a scene with an end time. Its table has each solver's run time for each target
-    error. The table of a group has geometric means, over its workloads, of the baseline solver's
-    time divided by each solver's.
-    """
+    """Return titled tables: run times of each workload, geometric means of each group."""
     targets = list(map(_power, TARGETS))
     columns = [Column("us per solve to", left=True)]
     for name in targets:
@@ -267,10 +250,7 @@ def _notes(finding: Finding) -> list[str]:
 
 
 def not_measured(finding: Finding) -> list[str]:
-    """Return a line of text for each reason why solvers have no result in `finding`.
-
-    A line also names the first workloads and settings without a result for this reason.
-    """
+    """Return a line for each reason of missing results, with the first of them."""
     # Reasons may end with an expected time or with the step at which a run ended, which differ from
     # case to case. These ends are removed, so that equal reasons share a line.
     came: list[tuple[Row | Refusal, str]] = [

@@ -1,6 +1,6 @@
-"""Time saved by leaving out the parts of a computation that its plan finds unnecessary.
+"""Time saved by leaving out what a plan finds unnecessary for a scene.
 
-A computation is timed with and without such a part, in interleaved batches of the same run.
+With and without it, the computation is timed in interleaved batches.
 """
 
 import subprocess
@@ -24,10 +24,7 @@ _SECONDS = 2e-3  # duration of a batch
 
 @dataclass(frozen=True)
 class Saving:
-    """The run times of one computation with and without a part that a plan can leave out.
-
-    A plan decides which parts of a computation, such as dense output, a scene needs.
-    """
+    """Run times with and without a part that a plan can leave out."""
 
     part: str  # the part that is left out, as the plan names it
     where: str  # the scene or program with which it is measured
@@ -36,17 +33,15 @@ class Saving:
 
     @property
     def ratio(self) -> float:
-        """Return the time with the part that can be left out, divided by the time without it."""
+        """Return the time with the part over that without."""
         return self.with_it / self.without
 
 
 def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
-    """Measure the time saved by each part of a computation that a plan can leave out.
+    """Return the saving of each part.
 
-    A plan decides which parts a scene needs. The parts are the integration (if there is a closed
-    form), the torque as a function of time, dense output, and the translational velocity. Further
-    parts are the imports of SciPy and of the reference solver. Solutions are computed up to `t_end`
-    (s) with the relative tolerance `tolerance`.
+    They are the integration (if there is a closed form), the torque as a function of time, dense
+    output, the velocity, and the imports of SciPy and of the reference.
     """
     constant = case_scene(5)
     times = [t_end * k / 100.0 for k in range(1, 101)]
@@ -93,9 +88,5 @@ def _python(code: str) -> None:
 def measured_saving(
     part: str, where: str, with_it: Callable[[], object], without: Callable[[], object]
 ) -> Saving:
-    """Measure the run times of two functions that differ in one part of a computation.
-
-    The function `with_it` does the part named `part`, and the function `without` does not. `where`
-    names the scene or program with which they are measured. The times are returned as a `Saving`.
-    """
+    """Return the run times of functions with and without a part."""
     return Saving(part, where, *seconds([with_it, without], _SECONDS, _BATCHES))

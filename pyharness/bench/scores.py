@@ -1,4 +1,4 @@
-"""Scores of solvers in a benchmark: times to reach errors, and ratios to a baseline's times."""
+"""Scores: times to reach errors, and ratios of the baseline's time to a contender's."""
 
 import math
 from collections.abc import Sequence
@@ -14,10 +14,7 @@ YARDSTICKS = ("heyoka", "solve_ivp-dop853")
 
 @dataclass(frozen=True)
 class Score:
-    """The times in which one contender (solver) reaches the target errors on one workload.
-
-    A workload is a scene with an end time.
-    """
+    """The times in which a contender reaches the target errors on a workload."""
 
     method: str  # name of the contender
     # For each target error, the time (s) of the fastest setting that reaches it; None if no setting
@@ -31,12 +28,7 @@ class Score:
 
 @dataclass(frozen=True)
 class Spread:
-    """The distribution of a contender's time ratios over the random scenes of one kind.
-
-    A contender is a solver in the benchmark. All contenders are compared with a baseline contender.
-    A ratio is the time of the baseline contender to reach the target error, divided by the time of
-    the contender itself.
-    """
+    """The distribution of a contender's ratios over random scenes of one kind."""
 
     method: str  # name of the contender
     kind: str  # kind of the scenes
@@ -49,21 +41,13 @@ class Spread:
 
 
 def yardstick(finding: Finding) -> str | None:
-    """Return the name of the contender (solver) whose times are the baseline of all ratios.
-
-    Return None if no contender was measured.
-    """
+    """Return the contender that is the baseline; None if none was measured."""
     names = list(dict.fromkeys(row.method for row in finding.rows))
     return next((name for name in (*YARDSTICKS, *names) if name in names), None)
 
 
 def scores(finding: Finding, load: Workload, targets: Sequence[float] = TARGETS) -> list[Score]:
-    """Return the scores of all contenders (solvers) on the workload `load`.
-
-    A workload is a scene with an end time. A score has the times in which a contender reaches the
-    errors `targets`. The score of the baseline contender is the first; the others are in the order
-    of measurement.
-    """
+    """Return the scores on a workload, the baseline first."""
     rows: dict[str, list[Row]] = {}
     for row in finding.rows:
         if row.workload == load:
@@ -81,10 +65,7 @@ def scores(finding: Finding, load: Workload, targets: Sequence[float] = TARGETS)
 
 
 def groups(finding: Finding) -> dict[str, list[Workload]]:
-    """Return the groups of workloads over which time ratios are averaged, by the name of the group.
-
-    A workload is a scene with an end time. The groups are ordered by this time, and then by name.
-    """
+    """Return the groups of workloads by name, ordered by end time and name."""
     found: dict[str, list[Workload]] = {}
     for load in finding.workloads:
         found.setdefault(load.group, []).append(load)
@@ -92,12 +73,9 @@ def groups(finding: Finding) -> dict[str, list[Workload]]:
 
 
 def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float | None]]:
-    """Return each contender's geometric means of its time ratios over the workloads `loads`.
+    """Return each contender's geometric mean ratios, one for each target error.
 
-    The result is a dictionary by the name of the contender (solver), with a mean for each target
-    error. A ratio is the baseline's time divided by the contender's. The mean is None if the
-    contender or the baseline does not reach the error on all workloads, which are scenes with end
-    times.
+    None if contender or baseline misses the error on a workload.
     """
     tables = [{each.method: each.ratios for each in scores(finding, load)} for load in loads]
     names = dict.fromkeys(name for table in tables for name in table)
@@ -111,11 +89,9 @@ def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float |
 
 
 def spreads(finding: Finding, kinds: Sequence[str]) -> list[Spread]:
-    """Return the distribution of each contender's time ratios, by target error and kind of scene.
+    """Return the distributions of ratios, by contender, error and kind.
 
-    A ratio is the time of the baseline contender (solver) divided by the contender's. `kinds` are
-    the kinds of random scenes. The distributions are ordered by contender, error and kind. The
-    baseline has no distribution, because all of its ratios are 1.
+    The baseline, whose ratios are 1, has none.
     """
     tables = {
         load.label: {each.method: each.ratios for each in scores(finding, load)}
@@ -157,7 +133,7 @@ def _ratio(by: float | None, seconds: float | None) -> float | None:
 
 
 def geometric_mean(ratios: Sequence[float | None]) -> float | None:
-    """Return the geometric mean of several ratios, or None if one of them is None."""
+    """Return the geometric mean, or None if a ratio is None."""
     known = [ratio for ratio in ratios if ratio is not None]
     if len(known) < len(ratios):
         return None

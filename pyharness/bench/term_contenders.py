@@ -1,4 +1,4 @@
-"""The solvers of `bench --terms`, for one body and for many bodies."""
+"""The solvers of `bench --terms`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,12 +19,12 @@ _TOLERANCES = (*(each for each in TOLERANCES if each < 1e-4), 2.0**-52)
 
 
 def term_methods() -> list[SceneContender]:
-    """Return our solver of single bodies: the prepared solver of `auto`."""
+    """Return our solver of single bodies: `auto`, prepared."""
     return [replace(each, settings=_TOLERANCES[:-1]) for each in own() if each.name == OURS]
 
 
 def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
-    """Return the third-party solvers of single bodies, heyoka and DOP853, installed or not.
+    """Return heyoka and DOP853, installed or not.
 
     heyoka computes the torque of a ready term by its formula, and an expression from its tape.
     """
@@ -41,6 +41,6 @@ def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
 
 
 def body_contenders() -> list[EnsembleContender]:
-    """Return the solvers of many bodies, ours and heyoka's batch integrator, each on one core."""
+    """Return our and heyoka's solver of many bodies, each on one core."""
     found = [*own_ensembles(), *ensemble_peers()]
     return [replace(each, threads=(1,)) for each in found if each.name in (MANY_OURS, MANY_HEYOKA)]

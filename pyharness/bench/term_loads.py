@@ -1,4 +1,4 @@
-"""The problems of `bench --terms`: torques that depend on the state, of one and of many bodies."""
+"""The problems of `bench --terms`: torques that depend on the state."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -40,10 +40,9 @@ _PUSH = (0.05, 0.02, 0.1)
 
 @dataclass(frozen=True)
 class TermScene:
-    """A scene with a torque that depends on the state.
+    """A scene of the `kind` READY or EXPRESSION.
 
-    `kind` is `READY` or `EXPRESSION`. `formula` computes the torque of a ready term independently
-    of the term; it is None for an expression.
+    `formula` computes a ready term's torque independently; None for an expression.
     """
 
     kind: str
@@ -53,7 +52,7 @@ class TermScene:
 
 @dataclass(frozen=True, eq=False)
 class TermBodies(EnsembleLoad):
-    """Many bodies with a torque that depends on the state, each with its own initial omega."""
+    """Many bodies with one such torque, each with its own initial omega."""
 
     body: Scene  # the body, its torque, and the initial attitude of all
 
@@ -68,10 +67,7 @@ class TermBodies(EnsembleLoad):
         return HORIZONS[0]
 
     def ends(self) -> Array:
-        """Return reference values of omega for all bodies at the end time, in rad/s, shape (n, 3).
-
-        Our function `solve` computes the values with the tolerance 1e-15.
-        """
+        """Return omega at the end (rad/s), shape (n, 3), by `solve` with tolerance 1e-15."""
         attitude = self.body.attitude is not None
         return np.array([
             solve(
@@ -82,10 +78,7 @@ class TermBodies(EnsembleLoad):
 
 
 def term_scenes() -> list[TermScene]:
-    """Return the scenes of the benchmark: nine ready terms, then the expressions.
-
-    A scene has an attitude if its torque depends on it.
-    """
+    """Return nine ready terms, then the expressions, with attitudes where needed."""
     turning = TorqueLaw(_FIELD, sines=[(_SWING, _FREQUENCY)], frame="space")
     ready: dict[str, tuple[Any, Formula]] = {
         "damping": (terms.damping(_D), _damping),
@@ -112,7 +105,7 @@ def _scene(name: str, torque: Any) -> Scene:
 
 
 def term_loads(scenes: Sequence[TermScene]) -> list[Workload]:
-    """Return the benchmark problems of single bodies: each scene to each end time."""
+    """Return the workloads: each scene to each end time."""
     return [
         Workload(
             each.scene.name, each.scene, time, (each.kind,), reference(each.scene, [time]),
@@ -124,7 +117,7 @@ def term_loads(scenes: Sequence[TermScene]) -> list[Workload]:
 
 
 def term_bodies(scenes: Sequence[TermScene], seed: str, n: int) -> list[TermBodies]:
-    """Return the benchmark problems of `n` bodies; the text `seed` determines their omegas."""
+    """Return the problems of `n` bodies; the text `seed` determines their omegas."""
     source = text_generator(f"terms/{seed}")
     omega0 = np.array(_OMEGA) + source.uniform(-_SPREAD, _SPREAD, (n, 3))
     return [TermBodies(each.scene.name, omega0, None, each.scene) for each in scenes]
@@ -196,7 +189,7 @@ def _cross(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
 
 
 def _about_body(vector: Sequence[Any], q: Sequence[Any]) -> list[Any]:
-    """Return R^T times a vector, with the rotation R from body to space as a matrix."""
+    """Return R^T times a vector, R from body to space."""
     a, b, c, d = q
     rows = [
         [1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)],

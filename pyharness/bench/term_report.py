@@ -1,4 +1,7 @@
-"""The report of `bench --terms`: run times and ratios for torques that depend on the state."""
+"""The report of `bench --terms`.
+
+A ratio is the run time of heyoka over ours at the same error.
+"""
 
 import statistics
 from collections import Counter
@@ -34,7 +37,7 @@ _SHORT = "{:.0e}"
 
 @dataclass(frozen=True)
 class Terms:
-    """The results of one run of `bench --terms`, for single bodies and for many bodies."""
+    """The results for single bodies and for many."""
 
     single: Finding
     many: Rates
@@ -42,7 +45,7 @@ class Terms:
 
 @dataclass(frozen=True)
 class Summary:
-    """The ratios of heyoka's to our run time over all scenes of a kind, at one target error."""
+    """The ratios over all scenes of a kind, at one target error."""
 
     kind: str  # `READY` or `EXPRESSION`
     bodies: int  # number of bodies in a call
@@ -53,11 +56,9 @@ class Summary:
 
 
 def term_report(found: Terms, packages: Iterable[str], command: str) -> Report:
-    """Return the report of `bench --terms`: tables of single bodies, of many, and mean ratios.
+    """Return tables of single bodies, of many, and mean ratios.
 
-    A ratio is the run time of heyoka divided by that of our solver at the same error. `packages`
-    are the packages whose versions are listed. `command` is the command that produces the report
-    again.
+    `packages` are those whose versions are listed, `command` repeats the report.
     """
     return measured_report(
         "# Torques that depend on the state",
@@ -73,10 +74,7 @@ def term_report(found: Terms, packages: Iterable[str], command: str) -> Report:
 
 
 def summaries(found: Terms) -> list[Summary]:
-    """Return the mean and the smallest ratio of run times, for each kind of scene and each error.
-
-    Return an empty list if heyoka was not measured.
-    """
+    """Return mean and smallest ratios by kind and error; none without heyoka."""
     result = []
     for kind in _TITLES:
         loads = [load for load in found.single.workloads if kind in load.kinds]
@@ -103,7 +101,7 @@ def _summary(
 
 
 def _ratios(finding: Finding, load: Workload) -> list[float | None]:
-    """Return heyoka's run time over ours at each target error; None where one is not known."""
+    """Return the ratio at each target error, or None."""
     times = {each.method: each.seconds for each in scores(finding, load, TARGETS)}
     nowhere = (None,) * len(TARGETS)
     pairs = zip(times.get(HEYOKA, nowhere), times.get(OURS, nowhere), strict=True)
@@ -116,7 +114,7 @@ def _body_row(rates: Rates, name: str, target: float, method: str) -> Rate | Non
 
 
 def _body_ratio(rates: Rates, name: str, target: float) -> float | None:
-    """Return our bodies per second over those of heyoka's batch integrator, or None."""
+    """Return our bodies per second over heyoka's, or None."""
     own, other = (_body_row(rates, name, target, each) for each in (MANY_OURS, MANY_HEYOKA))
     return own.rate / other.rate if own and other else None
 
@@ -126,7 +124,7 @@ def _rows(finding: Finding, load: Workload, method: str) -> list[Row]:
 
 
 def _over_dop853(finding: Finding, load: Workload) -> float | None:
-    """Return the run time of DOP853 over ours at the same tolerance, or None."""
+    """Return DOP853's run time over ours at the same tolerance, or None."""
     by, own = (
         next((row.seconds for row in _rows(finding, load, name)
               if row.setting == DOP853_TOLERANCE), None)
@@ -136,7 +134,7 @@ def _over_dop853(finding: Finding, load: Workload) -> float | None:
 
 
 def _preparing(finding: Finding, load: Workload, method: str) -> float | None:
-    """Return the time (s) to prepare a solver for the shortest end time of a scene, or None."""
+    """Return the time (s) to prepare for a scene's shortest end time, or None."""
     first = next(each for each in finding.workloads if each.label == load.label)
     times = [row.preparing for row in _rows(finding, first, method)]
     return (times[0] if method == OURS else statistics.median(times)) if times else None
@@ -245,7 +243,7 @@ def _notes(found: Terms) -> list[str]:
 
 
 def _batches(rates: Rates) -> str:
-    """Return how often each size of heyoka's batches was the fastest, as a sentence."""
+    """Return how often each batch size of heyoka was fastest, as a sentence."""
     counts = Counter(row.note for row in rates.rows if row.method == MANY_HEYOKA)
     told = ", ".join(f"{note} ({n} of {counts.total()})" for note, n in counts.most_common())
     return f" heyoka's fastest: {told}." if told else ""

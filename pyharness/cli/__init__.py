@@ -1,4 +1,4 @@
-"""The command line, and the functions that write its text to stdout and stderr."""
+"""The command line, and functions that write its text."""
 
 import sys
 from contextlib import suppress
@@ -12,26 +12,21 @@ _LAYOUT = "\n\t\f"
 
 
 def shown(text: str) -> str:
-    """Return a text with its control characters as escape sequences.
+    """Return a text with control characters, except line breaks, tabs and form feeds, escaped.
 
-    Line breaks, tabs and form feeds are kept. Names in a text may come from third-party files, and
-    their control characters could change the state of a terminal. All reports and messages are
-    therefore passed through this function.
+    Names from third-party files could otherwise change the state of a terminal.
     """
     return printable(text, _LAYOUT)
 
 
 def write_text(stream: TextIO, text: str) -> None:
-    """Write a text to a stream of this process.
-
-    A character that the stream's encoding lacks is written as an escape sequence.
-    """
+    """Write a text; characters that the encoding lacks are escaped."""
     encoding = stream.encoding or "utf-8"
     stream.write(shown(text).encode(encoding, "backslashreplace").decode(encoding))
 
 
 def say(text: str) -> None:
-    """Write a text to stderr; an error in writing, for example if stderr is closed, is ignored."""
+    """Write a text to stderr, ignoring errors such as a closed stream."""
     with suppress(OSError, ValueError):
         write_text(sys.stderr, text)
         sys.stderr.flush()

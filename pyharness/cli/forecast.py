@@ -1,7 +1,4 @@
-"""Limits of the number of random draws that a user may request, and forecasts of their run time.
-
-The number is checked, and a forecast is printed, before the first draw.
-"""
+"""Limits of random draws, and forecasts of their run time before the first one."""
 
 from typing import NamedTuple
 
@@ -12,11 +9,7 @@ _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
 
 class Cost(NamedTuple):
-    """The time and memory for one random draw, and the largest allowed number of draws.
-
-    A draw is, for example, a random scene. Time and memory were measured on one core of a processor
-    of 2026.
-    """
+    """Time and memory of a draw, on one core of 2026, and the most draws."""
 
     what: str  # plural noun for the draws, as in "random scenes"
     seconds: float  # per draw
@@ -32,11 +25,9 @@ SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 
 
 def check_count(option: str, count: int, least: int, cost: Cost) -> None:
-    """Raise InputError if a number of random draws is not allowed.
+    """Raise InputError if a number of draws is not allowed.
 
-    `option` is the name of the option that gave the number `count`. `least` is the smallest allowed
-    number, and `cost` has the largest. If the draws will take more than a minute, print a forecast
-    of their time and memory.
+    If they will take more than a minute, print a forecast.
     """
     from pyharness.ensembles.forecast import duration
 

@@ -1,4 +1,4 @@
-"""The checks of `verify --integrator`: the selection of the scenes, their report, the self-test."""
+"""The checks of `verify --integrator`: selection, report and self-test."""
 
 import argparse
 import re
@@ -18,22 +18,10 @@ _HIGHEST = 40.0
 
 
 def check_integrator(options: argparse.Namespace) -> int:
-    """Compare an integrator with true solutions, and print the results.
+    """Compare an integrator with true solutions; return 0 if all checks pass, else 1.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        The options of the command; `options.integrator` is the command that starts the integrator.
-
-    Returns
-    -------
-    int
-        The exit status: 0 if all checks passed, otherwise 1.
-
-    Raises
-    ------
-    InputError
-        If an option has no meaning with an integrator, or if no scene is selected.
+    `options.integrator` starts it. Raise InputError if an option has no meaning with it, or no
+    scene is selected.
     """
     shared.refuse(options, "--integrator", _REFUSED)
     command = options.integrator

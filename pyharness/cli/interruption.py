@@ -1,8 +1,8 @@
-"""The handling of Ctrl-C: at any time it ends a command with one line and exit status 130.
+"""Ctrl-C: at any time it ends a command with one line and exit status 130.
 
-Python can raise KeyboardInterrupt between any two instructions, and not all code propagates it. An
-import may replace it by another exception, and a finalizer or a callback may drop it. This module
-therefore records the signal itself, and raises KeyboardInterrupt again if it was dropped.
+KeyboardInterrupt can be raised between any two instructions; an import may replace it, and a
+finalizer or a callback may drop it. The signal is therefore recorded, and the exception raised
+again if dropped.
 """
 
 import atexit
@@ -27,10 +27,9 @@ LINE = "pyharness: interrupted\n"
 
 
 class _Interruption:
-    """The state of interruption of this process by Ctrl-C, and the handlers of its signals.
+    """The state of interruption, and the signal handlers.
 
-    `count` is the number of interrupts by the user. `is_reported` is true after the line that
-    reports the interrupt was printed.
+    `count` is the number of interrupts; `is_reported` whether their line was printed.
     """
 
     def __init__(self) -> None:
@@ -38,10 +37,7 @@ class _Interruption:
         self.is_reported = False
 
     def leave_at_once(self, *_: object) -> None:
-        """End the process at once with exit status 130, without cleanup; for use as signal handler.
-
-        The line that reports the interrupt is printed unless it was printed before.
-        """
+        """End the process with status 130, after its line, without cleanup."""
         try:
             if not self.is_reported:
                 os.write(2, LINE.encode())
@@ -49,11 +45,9 @@ class _Interruption:
             os._exit(CODE)
 
     def interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Raise KeyboardInterrupt; this function is the handler of SIGINT.
+        """Raise KeyboardInterrupt, and by a timer again if it is dropped.
 
-        A timer is started, which raises KeyboardInterrupt again if other code drops the exception.
-        The third interrupt ends the process at once. `number` and `frame` are the arguments of
-        every signal handler, and are not used.
+        The third interrupt ends the process.
         """
         self.count += 1
         if self.count >= _MOST:
@@ -74,15 +68,14 @@ _SHOW_WARNING = warnings.showwarning
 
 
 def came() -> bool:
-    """Return whether the user has interrupted this command by Ctrl-C."""
+    """Return whether the user has interrupted this command."""
     return _STATE.count > 0
 
 
 def leave_when_interrupted() -> bool:
-    """Make Ctrl-C end the process at once, and return True; return False if SIGINT is ignored.
+    """Make Ctrl-C end the process at once; return False if SIGINT is ignored.
 
-    The signal handler prints one line on stderr. It is used while no cleanup is needed, that is,
-    while modules are imported and after the results are written.
+    It is for times without cleanup: imports, and after the results are written.
     """
     # A shell starts a background process with SIGINT ignored; SIGINT then remains ignored.
     if not callable(signal.getsignal(signal.SIGINT)):
@@ -92,10 +85,7 @@ def leave_when_interrupted() -> bool:
 
 
 def run_interruptible(main: Callable[[], int]) -> int:
-    """Run a command, the function `main`, and return its exit status.
-
-    The exit status is 130 if the user interrupted the command.
-    """
+    """Run a command; return its exit status, 130 if interrupted."""
     hook, escaped, code = sys.unraisablehook, False, CODE
     try:
         sys.unraisablehook = _quiet_of(hook)
@@ -117,7 +107,7 @@ def run_interruptible(main: Callable[[], int]) -> int:
 
 
 def report() -> int:
-    """Print the line "pyharness: interrupted", unless it was printed; return exit status 130."""
+    """Print "pyharness: interrupted" once; return 130."""
     if not _STATE.is_reported:
         _STATE.is_reported = came()
         end_progress()
@@ -126,12 +116,10 @@ def report() -> int:
 
 
 def leave(code: int) -> None:
-    """Remove temporary files and end the process with the exit status `code`.
+    """Remove temporary files and end the process.
 
-    This function replaces Python's normal exit, which would wait for threads and free all memory
-    object by object. On Ctrl-C the normal exit would also drop the interrupt, or end the process by
-    the signal. After an interrupt this function ends child processes, and waits at most two seconds
-    for the cleanup.
+    Python's own exit would wait for threads, free all memory, and on Ctrl-C drop the interrupt or
+    end by the signal. After an interrupt child processes are ended, and cleanup has two seconds.
     """
     if code == CODE:
         # The interrupt was reported; messages of ending threads and finalizers are suppressed.
@@ -154,7 +142,7 @@ def leave(code: int) -> None:
 
 
 def _is_pending() -> bool:
-    """Return whether a KeyboardInterrupt is being handled at present, for example by a cleanup."""
+    """Return whether a KeyboardInterrupt is being handled."""
     error: BaseException | None = sys.exception()
     while error is not None:
         if isinstance(error, KeyboardInterrupt):
@@ -177,7 +165,7 @@ def _show_warning(
 
 
 def _quiet_of(hook: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return a hook for unraisable exceptions that suppresses KeyboardInterrupt after Ctrl-C."""
+    """Return a hook for unraisable exceptions, without KeyboardInterrupt after Ctrl-C."""
 
     def report_unraisable(unraisable: Any) -> None:
         if not (came() and issubclass(unraisable.exc_type, KeyboardInterrupt)):

@@ -1,4 +1,4 @@
-"""The entry point of the command line: find the verb, run it, and report errors in one line."""
+"""The entry point: find the verb, run it, report errors in one line."""
 
 import gc
 import os
@@ -45,12 +45,10 @@ VERBS = {verb: about for group in _GROUPS.values() for verb, about in group.item
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line and return its exit status.
+    """Run a command line, by default this process's, and return its exit status.
 
-    `arguments` are the arguments after the name of the command, by default those of this process.
-    The exit status is 0 for expected results and 1 for an unexpected result, such as a failed
-    check. It is 2 for wrong usage or input, 3 if the Fortran extension is not built, and 130 after
-    an interrupt.
+    0 is for expected results, 1 for an unexpected one such as a failed check, 2 for wrong usage or
+    input, 3 without the Fortran extension, 130 after an interrupt.
     """
     # Garbage collection during the imports takes 4 % of the time of a command and frees nothing.
     gc.set_threshold(100_000)
@@ -111,10 +109,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _complete() -> int:
-    """Print the completions of a partly typed command line for a shell that uses argcomplete.
-
-    Return the exit status, which is 1 if argcomplete is not installed.
-    """
+    """Print completions for argcomplete; return 1 if it is not installed."""
     from argparse import ArgumentParser
 
     try:

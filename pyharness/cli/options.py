@@ -1,4 +1,4 @@
-"""Options that several verbs (subcommands) share: their help texts, parsing and checks."""
+"""Options that several verbs share: help texts, parsing and checks."""
 
 import argparse
 import math
@@ -64,10 +64,10 @@ _BY_SUFFIX = {".md": "markdown", ".xml": "junit", ".json": "json"}
 
 
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict[str, str]:
-    """Return the options --format, --plot and --out as a dictionary with their help texts.
+    """Return --format, --plot and --out with their help texts.
 
-    `formats` are the allowed formats, the default first. `plot` says what the picture of --plot
-    shows, for the help text of --plot; if it is empty, the result has no option --plot.
+    The first of `formats` is the default; without `plot`, what the picture shows, there is no
+    --plot.
     """
     first, *others = formats
     form = {"--format F": f"Output format of the result: {first} (default), {', '.join(others)}."}
@@ -80,25 +80,19 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
 
 
 def chosen_effort(options: argparse.Namespace) -> float:
-    """Return the factor on the limits of a computation's work that --effort gives, by default 1."""
+    """Return --effort, the factor on work limits, by default 1."""
     return positive(options.effort, "--effort", 1.0)
 
 
 def chosen_tolerance(options: argparse.Namespace) -> float | None:
-    """Return the relative tolerance that --tolerance gives, or None if it is not given.
-
-    None stands for the default tolerance of the method.
-    """
+    """Return --tolerance; None for the method's default."""
     if options.tolerance is None:
         return None
     return positive(options.tolerance, "--tolerance", 1.0)
 
 
 def chosen_seed(options: argparse.Namespace) -> str | None:
-    """Return the seed of random draws that --seed gives, or None if it is not given.
-
-    Raise InputError if the seed has unprintable characters.
-    """
+    """Return --seed or None; raise InputError if it has unprintable characters."""
     if options.seed is not None and not options.seed.isprintable():
         raise InputError(
             "--seed: contains characters that can't be printed; allowed: printable characters"
@@ -108,20 +102,16 @@ def chosen_seed(options: argparse.Namespace) -> str | None:
 
 
 def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
-    """Raise InputError if an option is given and its value is not one of `allowed`.
-
-    `what` is the name of the option without its dashes, and `name` its value, None if not given.
-    """
+    """Raise InputError if the value of option `what` is given and not allowed."""
     if name is not None and name not in allowed:
         raise unknown(what, name, allowed, f"--{what}")
 
 
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
-    """Return the names in the value `text` of --only, which select checks; an empty list for None.
+    """Return the names in --only, kinds or beginnings of ids, as in ``cells/two-term``.
 
-    Each name is a kind of check, or the beginning of the id of a check, as in ``cells/two-term``.
-    The part of a name before the first slash is a kind. Raise InputError, which calls the kind by
-    the noun `what`, if the kind is not one of `allowed`.
+    A kind is the part before the first slash. Raise InputError, which calls it `what`, for an
+    unknown one.
     """
     only = names(text)
     for each in only:
@@ -137,13 +127,11 @@ def chosen_scene(
     any_state: bool = False,
     changing: bool = False,
 ) -> Scene:
-    """Return the scene that --case or --scene requests, as changed by further options.
+    """Return the scene of --case or --scene, with --omega0, --step-size and --steps.
 
-    The further options are --omega0, --step-size and --steps. Print a warning if no rigid body can
-    have the scene's moments of inertia, or if its attitude was normalised. Raise InputError for a
-    full inertia matrix unless `any_axes` is true, for a torque about the axes of space unless
-    `any_torque` is true, for a torque that depends on the state unless `any_state` is true, and for
-    an inertia that changes with time unless `changing` is true.
+    Warn of impossible moments and of a normalised attitude. Raise InputError for a full inertia
+    matrix, a torque about the axes of space or one that depends on the state, or a changing
+    inertia, unless allowed.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -170,7 +158,7 @@ def chosen_scene(
 
 
 def warn_of_attitude(scene: Scene) -> None:
-    """Print a warning if the attitude of a scene was not of norm 1, and therefore normalised."""
+    """Warn if the attitude was not of norm 1, and was normalised."""
     if abs(scene.attitude_length - 1.0) > NEAR_ONE:
         warn(f"the attitude has {_norm(scene.attitude_length)}; it was normalised")
 
@@ -182,17 +170,15 @@ def _norm(length: float) -> str:
 
 
 def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
-    """Return a tuple with the program that --program names, or by default all three programs."""
+    """Return the program of --program, or all three."""
     check_known("program", options.program, PROGRAMS)
     return PROGRAMS if options.program is None else (options.program,)
 
 
 def chosen_listing(options: argparse.Namespace) -> Listing:
-    """Return the listing (version) of the requested program that the options describe.
+    """Return the listing of --listing, --fix, --keep, --reading and --conjecture.
 
-    The options are --listing, --fix, --keep, --reading and --conjecture. A reading is an
-    interpretation of a doubtful card, and a conjecture an assumption about a missing card. Print a
-    warning for each of them that is requested, but has no effect.
+    Warn of readings and conjectures without effect.
     """
     chosen_programs(options)
     listing = subset(
@@ -208,11 +194,7 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
 
 
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
-    """Print a warning for each reading or conjecture that is requested, but used in no listing.
-
-    A reading is an interpretation of a doubtful card, and a conjecture an assumption about a
-    missing card. `listings` are the versions of the programs that the command runs.
-    """
+    """Warn of each requested reading or conjecture that no listing uses."""
     asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
     active = {name for listing in listings for name in listing.active}
     for name in sorted(asked - active - set(names(options.fix))):
@@ -220,11 +202,7 @@ def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> N
 
 
 def listing_text(listing: Listing) -> str:
-    """Return a line that describes a listing (version of a program): its label and its defects.
-
-    The label is original, corrected or custom. The line also has the names of the readings (of
-    doubtful cards) and conjectures (about missing cards) that the listing uses, if there are any.
-    """
+    """Return original, corrected or custom, with defects, readings and conjectures."""
     active = ", ".join(sorted(listing.defects)) or "no defects"
     more = {"readings": listing.readings, "conjectures": listing.conjectures}
     told = [f"; {what}: {', '.join(sorted(names))}" for what, names in more.items() if names]
@@ -232,10 +210,9 @@ def listing_text(listing: Listing) -> str:
 
 
 def chosen_lipschitz(options: argparse.Namespace) -> float:
-    """Return the constant of the Runge-Kutta program's stop test (1/s) that --lipschitz gives.
+    """Return the stop test's constant (1/s), by default that on the cards.
 
-    The default is the constant on the published cards. Raise InputError if --lipschitz or --no-stop
-    is given although the requested program has no stop test, or if both options are given.
+    Raise InputError if --lipschitz or --no-stop is given without a stop test, or both are.
     """
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
@@ -245,11 +222,9 @@ def chosen_lipschitz(options: argparse.Namespace) -> float:
 
 
 def refuse(options: argparse.Namespace, chosen: str, names: Sequence[str]) -> None:
-    """Raise InputError if one of the options `names` is given, which have no meaning with `chosen`.
+    """Raise InputError if an option in `names` has no meaning with `chosen`.
 
-    The names are without leading dashes, as in "no_stop". `chosen` is another option that was
-    given, as in "--program two-term", or a noun for the requested computation. The error message
-    shows it.
+    `names` are as in "no_stop"; `chosen` is as in "--program two-term", or a noun.
     """
     for name in names:
         if getattr(options, name):
@@ -257,20 +232,17 @@ def refuse(options: argparse.Namespace, chosen: str, names: Sequence[str]) -> No
 
 
 def names(text: str | None) -> list[str]:
-    """Return the names in a comma-separated list, as in a,b; the list is empty for None."""
+    """Return the names in a list such as a,b; empty for None."""
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 
 def numbers(text: str, option: str) -> list[float]:
-    """Return the numbers in a comma-separated list `text`, as in 1,2, which is an option's value.
-
-    Raise InputError, which names the option `option`, if an element is not a finite number.
-    """
+    """Return the finite numbers in a list such as 1,2; else raise InputError."""
     return [number(part, option) for part in text.split(",")]
 
 
 def number(text: str, option: str) -> float:
-    """Return the value `text` of an option as a finite number; raise InputError if it is none."""
+    """Return an option's finite number; else raise InputError."""
     try:
         value = parsed_float(text)
     except ValueError:
@@ -281,10 +253,7 @@ def number(text: str, option: str) -> float:
 
 
 def positive(text: str | None, option: str, default: float) -> float:
-    """Return the value `text` of an option as a number above 0, or `default` if it is None.
-
-    Raise InputError for any other value.
-    """
+    """Return an option's number above 0, or the default; else raise InputError."""
     if text is None:
         return default
     value = number(text, option)
@@ -294,7 +263,7 @@ def positive(text: str | None, option: str, default: float) -> float:
 
 
 def whole(text: str, option: str) -> int:
-    """Return the value `text` of an option as a whole number; raise InputError if it is none."""
+    """Return an option's whole number; else raise InputError."""
     try:
         return parsed_whole(text)
     except ValueError:
@@ -307,9 +276,9 @@ def warn(message: str) -> None:
 
 
 def also_files(options: argparse.Namespace) -> dict[str, str]:
-    """Return the files that --also names, each with its output format; empty without the option.
+    """Return the files of --also with their formats.
 
-    Raise InputError if the end of a name is no known format, or if a file is named twice.
+    Raise InputError for an unknown format, or a file named twice.
     """
     found: dict[str, str] = {}
     for path in names(getattr(options, "also", None)):
@@ -325,9 +294,9 @@ def also_files(options: argparse.Namespace) -> dict[str, str]:
 
 
 def check_outputs(options: argparse.Namespace) -> None:
-    """Raise InputError if a file that --out, --plot or --also names can't be written.
+    """Raise InputError if a file of --out, --plot or --also can't be written.
 
-    Commands call this function before any computation, so that no computation is lost.
+    It is called before any computation.
     """
     more = also_files(options)
     if more:
@@ -358,10 +327,9 @@ def show(
     options: argparse.Namespace,
     own: Mapping[str, Callable[[], str | bytes]] | None = None,
 ) -> None:
-    """Write a report in the format of --format, and also its picture if --plot is given.
+    """Write a report in the format of --format, and the picture of --plot.
 
-    `own` maps each format that only this report has, such as "tape5", to a function that returns
-    the report in this format. Without --out the report is written to stdout.
+    `own` maps formats of this report alone, such as "tape5", to functions that return it.
     """
     from pyharness.views.render import render
 
@@ -385,7 +353,7 @@ def show(
 
 
 def emit(content: str | bytes, out: str | None) -> None:
-    """Write `content`, a report or other result, to the file `out`; if `out` is None, to stdout."""
+    """Write `content` to the file `out`, or to stdout."""
     if out is not None:
         from pyharness.model.output_files import write_files
 

@@ -1,4 +1,7 @@
-"""Functions that write output folders, each either completely or not at all."""
+"""Functions that write output folders, completely or not at all.
+
+Messages name `option`, which gave the path. The checks come before any computation.
+"""
 
 import json
 import os
@@ -16,11 +19,7 @@ _LARGEST_MARK = 1 << 24  # bytes of the file that lists the files written by a v
 
 
 def check_apart(picture: str, out: str) -> None:
-    """Raise InputError if the file of --out is also a file that --plot writes.
-
-    `picture` is the path in --plot; the option also writes a CSV file in the same folder. `out` is
-    the path in --out.
-    """
+    """Raise InputError if --out is a file of --plot, the picture or its CSV."""
     for path, what in ((picture, "the picture"), (numbers_beside(picture), "its numbers")):
         if os.path.realpath(path) == os.path.realpath(out):
             raise InputError(
@@ -29,11 +28,7 @@ def check_apart(picture: str, out: str) -> None:
 
 
 def check_folder(path: str, names: Iterable[str], option: str) -> None:
-    """Raise InputError if the files `names` can't be written in the folder `path`.
-
-    The folder may be missing if it can be made. The error message names `option`, the option that
-    gave the path. Callers make this check before any computation.
-    """
+    """Raise InputError if the files can't be written in the folder, which may be missing."""
     folder = Path(path)
     if not path or "\0" in path or os.path.lexists(folder):
         if not path or "\0" in path or not folder.is_dir():
@@ -48,11 +43,10 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
 
 
 def _why_not_made(folder: Path) -> str:
-    """Return the reason why a folder can't be made, or an empty text if it can be made.
+    """Return why a folder can't be made, after a colon, or an empty text.
 
-    The reason begins with a colon. To find the reason, the folder is made and removed again,
-    because permissions alone do not show that a name is too long, or that a file system accepts no
-    folder.
+    It is made and removed: permissions do not show that a name is too long, or that a file system
+    accepts no folder.
     """
     if not folder.parent.is_dir():
         return ": there is no such folder"
@@ -65,11 +59,7 @@ def _why_not_made(folder: Path) -> str:
 
 
 def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
-    """Write files into a folder, either all or none; the folder is made if it is missing.
-
-    `path` is the folder, and `contents` has the content of each file by its name. Raise InputError,
-    which names `option`, the option that gave the path, if a file can't be written.
-    """
+    """Write all files, by name, into a folder, or raise InputError and write none."""
     folder = Path(path)
     files = {str(folder / name): content for name, content in contents.items()}
     with DeferredInterrupt():
@@ -87,12 +77,10 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 
 
 def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None:
-    """Raise InputError if `write_tree` may not replace the folder `path`.
+    """Raise InputError if `write_tree` may not replace the folder.
 
-    The folder may be new or empty. Otherwise it may contain only a JSON file with the name `mark`,
-    and the files that this JSON file lists under the key `files`. `kind` is the kind of the JSON
-    file, a key of `SCHEMAS`. The error message names `option`, the option that gave the path.
-    Callers make this check before any computation.
+    It may if it is new or empty, or has only the JSON file `mark`, of a kind in `SCHEMAS`, and the
+    files in its `files`.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
@@ -114,12 +102,7 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
 
 
 def _why_not_anew(folder: Path, mark: str, kind: str) -> str:
-    """Return the reason why a folder may not be replaced, or an empty text if it may be.
-
-    A folder may not be replaced if, for example, it has a file that no earlier run of the command
-    wrote. `mark` is the name of the JSON file that lists the files which an earlier run wrote, and
-    `kind` the kind of this file, a key of `SCHEMAS`.
-    """
+    """Return why a folder may not be replaced, or an empty text."""
     if Path.cwd().is_relative_to(folder):
         return "is the folder that you are in, or one above it"
     if not os.access(folder.parent, os.W_OK) or os.path.ismount(folder):
@@ -145,18 +128,16 @@ def _listed(mark: Path, kind: str) -> Iterable[str]:
 
 
 def _beside(folder: Path) -> tuple[Path, Path]:
-    """Return two temporary paths for the time when the folder `folder` is replaced."""
+    """Return two temporary paths for replacing a folder."""
     new, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{what}") for what in ("new", "old"))
     return new, old
 
 
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
-    """Replace the folder `path` by a folder that has only the files in `contents`.
+    """Replace a folder by one with only the files in `contents`, by path.
 
-    `contents` has the content of each file by its path in the folder. The files are written to a
-    temporary folder, which is then renamed. The previous folder is removed only after the renaming,
-    so that a failure does not change it. Raise InputError, which names `option`, the option that
-    gave the path, if a file can't be written.
+    A temporary folder is renamed, and the old one is removed after that: a failure, InputError,
+    does not change it.
     """
     folder = Path(os.path.realpath(path))
     new, old = _beside(folder)

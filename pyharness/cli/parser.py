@@ -1,4 +1,4 @@
-"""The parser of a verb's options, which prints grouped help and reports errors in one line."""
+"""The parser of a verb's options, with grouped help and errors in one line."""
 
 import argparse
 import re
@@ -16,10 +16,7 @@ _NARROWEST, _WIDEST = 80, 100  # columns
 
 
 class _Formatter(argparse.HelpFormatter):
-    """A help formatter that omits the options from the usage line, and keeps an example's lines.
-
-    The example is the text at the end of a help text.
-    """
+    """A help formatter without options in the usage, which keeps an example's lines."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         if text.startswith("example:"):
@@ -33,17 +30,10 @@ class _Formatter(argparse.HelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """The parser of one verb (subcommand), which reports an error in a single line.
-
-    If a name is unknown, the error message suggests the nearest known name.
-    """
+    """The parser of one verb, which suggests the nearest known name."""
 
     def __init__(self, verb: str, description: str = "") -> None:
-        """Declare the options of a subcommand, which are the dictionary OPTIONS of its module.
-
-        `verb` is the name of the subcommand, and `description` the line about it in the overview of
-        `pyharness help`.
-        """
+        """Declare the OPTIONS of a verb's module."""
         self._width = _WIDEST
         self.module = import_module(f"pyharness.cli.verbs.{verb}")
         super().__init__(
@@ -70,26 +60,22 @@ class Parser(argparse.ArgumentParser):
         groups["output"].add_argument("-h", "--help", action="help", help="Print this help.")
 
     def format_help(self) -> str:
-        """Return the help text in the terminal's width, but at least 80 and at most 100 columns."""
+        """Return the help in the terminal's width, from 80 to 100 columns."""
         from shutil import get_terminal_size
 
         self._width = min(max(get_terminal_size().columns, _NARROWEST), _WIDEST)
         return super().format_help()
 
     def error(self, message: str) -> NoReturn:
-        """Raise InputError with the message; argparse itself would also print the usage."""
+        """Raise InputError; argparse would also print the usage."""
         raise InputError(message)
 
     def option_names(self) -> list[str]:
-        """Return the names of all options of the subcommand, as in ``--case``."""
+        """Return the names of all options, as in ``--case``."""
         return [name for name in self._option_string_actions if name.startswith("--")]
 
     def read(self, verb: str, arguments: Sequence[str]) -> argparse.Namespace:
-        """Return the parsed options of a command line.
-
-        `arguments` are the arguments after the subcommand `verb`, whose name is in error messages.
-        Raise InputError if an option or the output format is unknown.
-        """
+        """Return the parsed options; raise InputError for an unknown option or format."""
         options, rest = self.parse_known_args(self._joined(arguments))
         if rest:
             raise unknown("option", rest[0], self.option_names(), verb)
@@ -101,9 +87,9 @@ class Parser(argparse.ArgumentParser):
         return options
 
     def _joined(self, arguments: Sequence[str]) -> list[str]:
-        """Return the arguments with each negative number joined to its option, as in --x=-1.
+        """Return the arguments with negative numbers joined, as in --x=-1.
 
-        Without this, argparse would take a negative number for an option.
+        Argparse would take them for options.
         """
         result: list[str] = []
         for argument in arguments:

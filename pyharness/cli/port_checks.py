@@ -1,4 +1,4 @@
-"""The checks of `verify --port`: the selection of the runs, their report, and the self-test."""
+"""The checks of `verify --port`: selection, report and self-test."""
 
 import argparse
 from collections.abc import Sequence
@@ -15,26 +15,9 @@ _REFUSED = ("only", "external", "update", "record")
 
 
 def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequence[int]) -> int:
-    """Compare a port with our Python programs, and print the results.
+    """Compare a port, started by `options.port`; return 0 if all checks pass, else 1.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        The options of the command; `options.port` is the command that starts the port.
-    programs : sequence of str
-        The requested programs.
-    cases : sequence of int
-        The numbers of the requested cases of Table 1.
-
-    Returns
-    -------
-    int
-        The exit status: 0 if all checks passed, otherwise 1.
-
-    Raises
-    ------
-    InputError
-        If an option has no meaning with a port, or if no run is requested.
+    Raise InputError if an option has no meaning with a port, or no run is requested.
     """
     shared.refuse(options, "--port", _REFUSED)
     cells, seed = requested_cells(
@@ -60,34 +43,12 @@ def requested_cells(
     draws: str | None,
     seed: str | None,
 ) -> tuple[list[Cell], str]:
-    """Return the runs that are requested from a port, and the seed of its random scenes.
+    """Return the runs, those of Table 1 first, and the seed of random scenes.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Leading parts of the names of runs, as in ``two-term/case-3`` or ``random/7``; empty for
-        all.
-    programs : sequence of str
-        The requested programs.
-    cases : sequence of int
-        The numbers of the requested cases of Table 1.
-    draws : str or None
-        The number of random scenes as text; None for no random scenes.
-    seed : str or None
-        The seed of the random scenes; None for the present year and week.
-
-    Returns
-    -------
-    list of Cell
-        The runs, first those of Table 1.
-    str
-        The seed, or an empty text if no scene is drawn.
-
-    Raises
-    ------
-    InputError
-        If no run is requested, if `draws` is no allowed number, or if a seed is given without
-        random scenes.
+    `names` are beginnings such as ``two-term/case-3`` or ``random/7``, empty for all; `draws` is
+    the number of random scenes as text. The seed is by default the present year and week, and empty
+    without draws. Raise InputError if no run is requested, `draws` is not allowed, or a seed has no
+    draws.
     """
     count = 0 if draws is None else shared.whole(draws, "--draws")
     check_count("--draws", count, 0, CHECKS)

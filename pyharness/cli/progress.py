@@ -1,4 +1,4 @@
-"""The progress bar of all verbs, which is shown if standard error is a terminal."""
+"""The progress bar, shown if standard error is a terminal."""
 
 import sys
 from contextlib import suppress
@@ -10,28 +10,24 @@ _bar: Any = None  # the progress bar on the terminal; None if there is none
 
 
 class _Terminal:
-    """Standard error as a stream that ignores errors in writing, as to a closed terminal."""
+    """Standard error without errors in writing."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(sys.stderr, name)
 
     def write(self, text: str) -> None:
-        """Write a text to standard error; a failure is ignored."""
+        """Write a text; a failure is ignored."""
         with suppress(OSError, ValueError):
             sys.stderr.write(text)
 
     def flush(self) -> None:
-        """Flush the buffered text to standard error; a failure is ignored."""
+        """Flush the text; a failure is ignored."""
         with suppress(OSError, ValueError):
             sys.stderr.flush()
 
 
 def progress(done: int, total: int, what: str) -> None:
-    """Show the progress of a computation on a terminal, with an estimate of the remaining time.
-
-    `done` is the number of completed parts, `total` the number of all parts, and `what` the name of
-    the current part.
-    """
+    """Show completed and all parts, the current one, and the remaining time."""
     global _bar
     if not sys.stderr.isatty():
         return
@@ -48,7 +44,7 @@ def progress(done: int, total: int, what: str) -> None:
 
 
 def end_progress() -> None:
-    """Remove the progress bar from the terminal, if there is one."""
+    """Remove the progress bar, if there is one."""
     global _bar
     if _bar is not None:
         bar, _bar = _bar, None

@@ -1,1 +1,1 @@
-"""The edition of the thesis and its programs as a static web site, built from data files."""
+"""The edition as a static web site, built from data files."""

@@ -1,4 +1,4 @@
-"""The data of the API page: the public names of the package with their docstrings."""
+"""The data of the API page: the public names with their docstrings."""
 
 import inspect
 import re
@@ -12,7 +12,7 @@ from pyharness.edition.markdown import inline
 
 
 class Item(NamedTuple):
-    """A parameter, attribute, result or exception of a docstring: name, type and description."""
+    """A parameter, attribute, result or exception of a docstring."""
 
     name: str
     type: str
@@ -20,11 +20,10 @@ class Item(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A public name on the API page: its signature, its docstring in parts, the methods of a class.
+    """A public name on the API page.
 
-    `anchor` is the anchor of the name in the page, and `kind` is "function", "class" or "property".
-    `summary` is the first line of the docstring, `text` has the further paragraphs, and `groups`
-    has the sections with their titles, such as Parameters.
+    `kind` is "function", "class" or "property". `summary` is the docstring's first line, `text` its
+    further paragraphs, and `groups` its sections by title.
     """
 
     name: str
@@ -38,7 +37,7 @@ class Entry(NamedTuple):
 
 
 def entries() -> list[Entry]:
-    """Return, for each public name of the package, an entry of the web site's API page."""
+    """Return the API page's entry for each public name."""
     return [_entry(name, getattr(pyharness, name)) for name in pyharness.__all__]
 
 

@@ -1,7 +1,6 @@
-"""The data of the page on which a body without torque tumbles, drawn from its closed form.
+"""The data of the page on which a torque-free body tumbles, by its closed form.
 
-The data include a picture of one motion and a short Python program with its output, for readers
-without JavaScript.
+For readers without JavaScript there are a picture, and a Python program with its output.
 """
 
 import contextlib
@@ -48,11 +47,10 @@ _STYLES = ("-", "--", "-.")
 
 @cache
 def context() -> dict[str, Any]:
-    """Return the values for the template of the page on which a body tumbles.
+    """Return the values for the page's template.
 
-    `data` is the object that the page's script reads as `window.bodyData`. `first` is the scene
-    that the page shows first, and `flip` the time between its flips (s). `program` is a Python
-    program, and `output` is the text that it prints.
+    `data` is the script's `window.bodyData`, `first` the first scene, and `flip` the time between
+    its flips (s).
     """
     first = _first()
     return {
@@ -68,10 +66,9 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the JSON values of the page's script: the bodies that it offers, and the latest time.
+    """Return the bodies that the page offers, and the latest time.
 
-    Each body has a name for the page's address, a title, moments (kg m2) and an initial omega
-    (rad/s). A body of the thesis also has the number of its case.
+    Moments are in kg m2, omegas in rad/s; a body of the thesis has the number of its case.
     """
     known = facts("bodies")
     cases = [
@@ -89,10 +86,9 @@ def data() -> dict[str, Any]:
 
 
 def moments_of_box(edges: list[float], mass: float) -> list[float]:
-    """Return the principal moments (kg m2) of a homogeneous box about axes along its edges.
+    """Return the moments (kg m2) of a homogeneous box by edges (m) and mass (kg).
 
-    `edges` are the lengths of the edges (m), and `mass` is in kg. The moments are computed from
-    the decimal numbers, so that they are as short as the decimal result.
+    They are computed from decimals, so that they are as short.
     """
     squares = [Fraction(str(edge)) ** 2 for edge in edges]
     twelfth = Fraction(str(mass)) / 12
@@ -100,7 +96,7 @@ def moments_of_box(edges: list[float], mass: float) -> list[float]:
 
 
 def files() -> dict[str, bytes]:
-    """Return the picture for readers without JavaScript, and its numbers, by file name."""
+    """Return the picture and its numbers by file name."""
     return saved(_picture(_first()), "body.svg")
 
 
@@ -119,7 +115,7 @@ def _output(program: str) -> str:
 
 
 def _picture(scene: Scene) -> Picture:
-    """Draw omega over time, the polhode and the herpolhode of a scene over three flips."""
+    """Return omega over time, polhode and herpolhode over three flips."""
     from matplotlib.figure import Figure
 
     assert scene.moments is not None
@@ -148,7 +144,7 @@ def _picture(scene: Scene) -> Picture:
 
 
 def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
-    """Draw the path of omega on the ellipsoid of equal energy, in the body's axes."""
+    """Draw the path of omega on the ellipsoid of equal energy, in body axes."""
     size = np.sqrt(moments @ np.square(found.omega[0]) / moments)
     u, v = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 33), np.linspace(0.0, np.pi, 17))
     ball = np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)
@@ -165,7 +161,7 @@ def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
 
 
 def _in_plane(found: Trajectory) -> Array:
-    """Return omega in space (rad/s), perpendicular to the angular momentum, shape (n, 2)."""
+    """Return omega in space (rad/s) perpendicular to the momentum, shape (n, 2)."""
     assert found.attitude is not None
     momentum = found.angular_momentum("space")[0]
     up = momentum / np.linalg.norm(momentum)

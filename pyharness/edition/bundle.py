@@ -1,9 +1,8 @@
 """Bundling of JavaScript (ES) modules into one classic script.
 
-Browsers do not import modules into a page that is opened from a file, but they run classic scripts.
-In the script, every module is a function that returns the exports of the module. A module comes
-after all modules that it imports. Only the forms of import and export that the project's modules
-use are supported; any other form is an error.
+Browsers do not import modules into a page opened from a file. In the script every module is a
+function that returns its exports, after the modules that it imports. Forms of import and export
+other than the project's are errors.
 """
 
 import re
@@ -21,11 +20,10 @@ _COMMENT = re.compile(r"^ *//.*\n", re.M)
 
 
 def bundle(entry: Path) -> str:
-    """Return one classic script with the JavaScript module in the file `entry` and all its imports.
+    """Return a classic script of the module in `entry` with all its imports.
 
-    The script runs inside a function, so that it defines no global names. Raise ValueError, with
-    file and line, for an unsupported form of import or export, and for an import of a missing file
-    or name. Also raise ValueError if modules import each other.
+    It defines no global names. Raise ValueError, with file and line, for an unsupported form, a
+    missing file or name, and circular imports.
     """
     exports: dict[Path, list[str]] = {}
     parts: list[str] = []
@@ -36,10 +34,9 @@ def bundle(entry: Path) -> str:
 def _add(
     path: Path, importing: tuple[Path, ...], exports: dict[Path, list[str]], parts: list[str]
 ) -> None:
-    """Append a JavaScript module, after the modules that it imports, to the script `parts`.
+    """Append a module to `parts`, after those that it imports.
 
-    `path` is the file of the module. `importing` is the chain of modules that import it. The names
-    that each appended module exports are stored in `exports`.
+    `importing` is the chain of modules that import it; `exports` stores the exported names.
     """
     text = path.read_text(encoding="utf-8")
     for found in _IMPORT.finditer(text):
@@ -74,7 +71,7 @@ def _add(
 
 
 def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
-    """Yield the exported and the local name of each name in a JavaScript import statement."""
+    """Yield the exported and the local name of each imported name."""
     for each in (found["names"] or "").split(","):
         name, _, alias = each.strip().partition(" as ")
         if name:
@@ -82,7 +79,7 @@ def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
 
 
 def _as_constant(found: re.Match[str], path: Path, modules: list[Path]) -> str:
-    """Return the declaration of constants that replaces a JavaScript import in the script."""
+    """Return the declaration of constants that replaces an import."""
     number = modules.index((path.parent / found["path"]).resolve())
     renamed = ", ".join(f"{name}: {here}" for name, here in _names(found))
     lines = "\n" * found[0].count("\n")

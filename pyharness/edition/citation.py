@@ -1,7 +1,4 @@
-"""The citation of the edition and of the thesis: as BibTeX, and as data for search engines.
-
-Both are made from `codemeta.json`, which describes the software in the format CodeMeta.
-"""
+"""The citation of edition and thesis, made from `codemeta.json`."""
 
 import json
 from functools import cache
@@ -20,19 +17,13 @@ _OF_SOURCE_CODE = (
 
 @cache
 def codemeta() -> dict[str, Any]:
-    """Return the content of `codemeta.json`, the description of the software.
-
-    The dictionary is cached, so callers must not change it.
-    """
+    """Return the content of `codemeta.json`; cached, so callers must not change it."""
     described: dict[str, Any] = json.loads(shipped("codemeta.json").read_text(encoding="utf-8"))
     return described
 
 
 def release_date() -> str:
-    """Return the date on which this version was published, or the year of its copyright.
-
-    The date is in `codemeta.json` only after an editor has published the version.
-    """
+    """Return the date of publication, once there is one, else the year of the copyright."""
     described = codemeta()
     return str(described.get("datePublished", described["copyrightYear"]))
 
@@ -62,15 +53,12 @@ def bibtex() -> str:
 
 
 def thesis_record() -> dict[str, Any]:
-    """Return the description of the thesis as a dictionary with the terms of schema.org."""
+    """Return the thesis in the terms of schema.org."""
     return {**codemeta()["referencePublication"], "@type": "Report"}
 
 
 def linked_data() -> dict[str, Any]:
-    """Return the description of the software and of its data as JSON-LD, by schema.org.
-
-    Search engines for software and for data sets read it from a page.
-    """
+    """Return software and data as JSON-LD (schema.org) for search engines."""
     described = codemeta()
     software = {name: described[name] for name in _OF_SOURCE_CODE if name in described}
     names = {name: described[name] for name in ("version", "license", "copyrightYear")}
@@ -97,12 +85,12 @@ def linked_data() -> dict[str, Any]:
 
 
 def data_name() -> str:
-    """Return the name of the edition's data, for catalogues of data sets."""
+    """Return the name of the data for catalogues."""
     return f"{facts('account')['edition']['name']}: data"
 
 
 def data_description() -> str:
-    """Return the description of the edition's data, for catalogues of data sets."""
+    """Return the description of the data for catalogues."""
     thesis = codemeta()["referencePublication"]
     return (
         f"The cards of the three FORTRAN programs in the thesis {thesis['name']} "

@@ -1,4 +1,4 @@
-"""The description of the data package by RO-Crate 1.1, a standard for research data."""
+"""The description of the data package by RO-Crate 1.1."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -20,11 +20,10 @@ MANIFEST = "manifest-sha256.txt"
 
 
 class Part(NamedTuple):
-    """A file of the data package, and its description.
+    """A file of the data package.
 
-    `path` is the path of the file in the package. `title` and `description` say what the file
-    contains, and `media_type` is its format, as in ``text/csv``. `content` is empty for the files
-    that describe the other files.
+    `path` is in the package, `media_type` as in ``text/csv``. `content` is empty for files that
+    describe the others.
     """
 
     path: str
@@ -48,10 +47,9 @@ KEPT = (
 
 
 def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
-    """Return the description of the data package by RO-Crate 1.1, as a dictionary for JSON.
+    """Return the RO-Crate of files other than `KEPT`, for JSON.
 
-    `parts` are the files of the package, without the files `KEPT`. RO-Crate requires that each
-    entity is an item of one list, to which other items refer by its identifier.
+    Entities are items of one list, and refer to each other by identifier.
     """
     described, thesis = codemeta(), thesis_record()
     files = [

@@ -1,7 +1,7 @@
-"""The edition as a package of plain data: cards, apparatus, verdicts, runs and printed pages.
+"""The edition as plain data: cards, apparatus, verdicts, runs and printed pages.
 
-The package is an RO-Crate (version 1.1), a folder that describes its files in one JSON file. The
-files have neither times nor paths of the machine, so that two runs write the same bytes.
+The package is an RO-Crate. Files have neither times nor paths of the machine, so that two runs
+write the same bytes.
 """
 
 from collections.abc import Iterator, Mapping
@@ -40,11 +40,9 @@ _COLUMNS = "card kind text scan entries port twin swhid"
 
 
 def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
-    """Compute the edition's data, and return all files of the data package.
+    """Return all files of the data package, content by path.
 
-    The result maps the path of each file to its content. `progress` is called before each of five
-    parts of the work. Its arguments are the number of completed parts, the number of all parts, and
-    the name of the part.
+    `progress` gets the number of completed parts, of all parts, and the name of the part.
     """
     parts = [*_parts(progress)]
     parts.append(_readme(parts))
@@ -127,7 +125,7 @@ def _parts(progress: Progress) -> Iterator[Part]:
 
 
 def _cards(program: str) -> bytes:
-    """Return the cards of a program as CSV, in the order of their numbers."""
+    """Return a program's cards as CSV, by number."""
     found = deck(program)
     rows = [
         [
@@ -147,7 +145,7 @@ def _caption(plan: FigurePlan) -> str:
 
 
 def _readme(parts: list[Part]) -> Part:
-    """Return the file of the package that people read first, which lists all other files."""
+    """Return the package's README, which lists all other files."""
     described = codemeta()
     rows = [
         *((each.path, each.title) for each in parts),
@@ -168,11 +166,11 @@ def _readme(parts: list[Part]) -> Part:
 
 
 def _manifest(content: Mapping[str, bytes]) -> bytes:
-    """Return the checksums of the files `content` in the form that `sha256sum -c` reads."""
+    """Return checksums in the form of `sha256sum -c`."""
     lines = (f"{sha256(content[path]).hexdigest()}  {path}\n" for path in sorted(content))
     return "".join(lines).encode()
 
 
 def _indented(record: dict[str, Any]) -> bytes:
-    """Return a dictionary as strict JSON, indented so that people can read it."""
+    """Return a dictionary as strict, indented JSON."""
     return json_text(record, indent=2).encode()

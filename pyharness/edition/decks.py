@@ -1,9 +1,7 @@
-"""The data of the pages that show the listings card by card, with the scan and the ports.
+"""The data of the pages that show the listings card by card, with scan and ports.
 
-A card has one line of a program. The port is the program in modern Fortran, and the twin is the
-program in Python. An entry of the critical apparatus explains, for example, a defect, or a
-difference between a card and the scan. A note is such an entry with a number, as a page of a deck
-shows it.
+The port is in modern Fortran, the twin in Python. A note is a numbered entry of the critical
+apparatus; an `entry` or `switch` is its identifier.
 """
 
 from collections.abc import Iterable, Sequence
@@ -32,10 +30,9 @@ _ORDER = (
 
 
 class Run(NamedTuple):
-    """A run of consecutive characters of a card, or of the line of the scan that shows the card.
+    """A run of characters of a card or its scanned line.
 
-    `entry` is the identifier of the record in our apparatus that explains why card and scan differ
-    in these characters. It is None if card and scan agree.
+    `entry` explains why card and scan differ in them; None if they agree.
     """
 
     text: str
@@ -43,10 +40,9 @@ class Run(NamedTuple):
 
 
 class Note(NamedTuple):
-    """A numbered entry of the critical apparatus, and the cards of a program that it is about.
+    """A numbered entry of the apparatus, and a program's cards that it is about.
 
-    The entries of a program are numbered from 1 in the order of their first cards. `cards` has the
-    numbers of the cards as text, as in ``860-910, 1040-1090``.
+    Numbers are from 1, by first card; `cards` is text, as in ``860-910, 1040-1090``.
     """
 
     number: int
@@ -60,11 +56,10 @@ class Note(NamedTuple):
 
 
 class PortLine(NamedTuple):
-    """A line of the Fortran port, and the defect or reading with which it is executed.
+    """A line of the Fortran port, and the defect or reading on which it depends.
 
-    `switch` is the identifier of the apparatus entry of the defect or reading; None if the line
-    does not depend on one. `active` is whether the line is executed with the defect or reading, or
-    with its correction.
+    `switch` is None if the line depends on none; `active` says whether the line is executed with it
+    or with its correction.
     """
 
     place: Place
@@ -75,10 +70,8 @@ class PortLine(NamedTuple):
 class Corrected(NamedTuple):
     """The corrected form of a card.
 
-    `text` is the card in the corrected program, and None if the correction deletes the card.
-    `changes` is whether the correction deletes or replaces the card. `inserted` are the number and
-    text of the cards that the correction inserts after the card. `defects` are the identifiers of
-    the defects that are corrected.
+    `text` is None if the correction deletes the card; `changes` if it deletes or replaces it.
+    `inserted` are number and text of the cards inserted after it.
     """
 
     text: str | None
@@ -88,17 +81,12 @@ class Corrected(NamedTuple):
 
 
 class CardView(NamedTuple):
-    """A card as a page shows it, with its line of the scan and its notes.
+    """A card as a page shows it.
 
-    A note explains, for example, a defect, or a difference between card and scan. `card` is the
-    text of the card. It is in brackets if the scan lacks the card. `scan` is its line in the scan,
-    with the blanks of the scan, or None. `corrected` is the card in the corrected program. `port`
-    and `twin` are the lines of the Fortran port and of the Python port that correspond to the card.
-    `notes` are the notes on the card, the most important kind first. `begins` are those whose range
-    of cards begins with this card; their `cards` is this range alone. `absent` is the reason why
-    the Fortran port has no statement for the card, or None. `otherwise` is the reason why the
-    port's statement is different, or None. `parallels` are the cards of the other programs with the
-    same text.
+    `card` is in brackets if the scan lacks it; `scan` has the scan's blanks, or is None. `notes`
+    have the most important kind first; `begins` are those whose range begins here, with this range
+    alone. `absent` and `otherwise` say why the port has no, or another, statement. `parallels` are
+    equal cards of other programs.
     """
 
     number: int
@@ -116,10 +104,9 @@ class CardView(NamedTuple):
 
 
 class Sheet(NamedTuple):
-    """A page of a printed program: its number from 1, its cards, and its place in the scan.
+    """A printed page: number from 1, cards, and place in the scan.
 
-    `moved` is the identifier of the apparatus entry that explains why the page has another place in
-    the scan. It is None for a page in its place.
+    `moved` explains another place; None for a page in its place.
     """
 
     number: int
@@ -128,9 +115,9 @@ class Sheet(NamedTuple):
 
 
 def sheets(program: str) -> list[Sheet]:
-    """Return the pages of a program, in the order of their cards.
+    """Return the pages of a program in the order of their cards.
 
-    A page begins with the lowest card of its page in the scan, and ends before the next page.
+    A page begins with the lowest card of its page in the scan.
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -147,18 +134,14 @@ def sheets(program: str) -> list[Sheet]:
 
 
 def notes(program: str) -> list[Note]:
-    """Return the notes on the cards of a program: its apparatus entries, numbered from 1."""
+    """Return a program's apparatus entries, numbered from 1."""
     having = [each for each in entries() if each["cards"].get(program)]
     having.sort(key=lambda each: numbers(each["cards"][program])[0])
     return [Note(n, each, each["cards"][program]) for n, each in enumerate(having, 1)]
 
 
 def card_views(program: str) -> list[CardView]:
-    """Return a view of each card of a program, in the order of the cards.
-
-    A view has the card, its line of the scan, its corrected form, the corresponding lines of the
-    ports, and its notes, as a page shows them. `program` is the name of the program.
-    """
+    """Return a view of each card, in order."""
     found, every = deck(program), notes(program)
     corrected, changed = corrected_cards(program), corrections(program)
     cards = list(found.cards.values())
@@ -208,12 +191,7 @@ def card_views(program: str) -> list[CardView]:
 
 
 def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
-    """Return the number of cards that have an apparatus entry of a kind, for each kind.
-
-    An apparatus entry records, for example, a defect or a doubtful reading of the card. `views` are
-    the cards as a page shows them. The kinds are in order of precedence; kinds without cards are
-    omitted.
-    """
+    """Return the number of cards with an entry of each kind, by precedence."""
     counts = dict.fromkeys(_ORDER, 0)
     for view in views:
         for kind in view.kinds:
@@ -222,7 +200,7 @@ def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
 
 
 def _card(card: Card) -> list[Run]:
-    """Return the text of a card as runs of characters; in brackets if the scan lacks the card."""
+    """Return a card's text as runs, in brackets if the scan lacks it."""
     if card.lost:
         statement = card.text.lstrip()
         # The bracket takes the place of a blank, so that the statement keeps its columns.
@@ -232,11 +210,7 @@ def _card(card: Card) -> list[Run]:
 
 
 def _scan(card: Card) -> list[Run] | None:
-    """Return the line of the scan that shows a card, as runs of characters.
-
-    The runs are the card number, a dash, and one or more runs for the text. Return None if the scan
-    lacks the card.
-    """
+    """Return the scanned line as runs: number, dash, text; None if the scan lacks the card."""
     if card.lost:
         return None
     number = Run(*card.printed) if card.printed else Run(str(card.number))
@@ -247,7 +221,7 @@ def _scan(card: Card) -> list[Run] | None:
 
 
 def _with_blanks(runs: Sequence[Run], line: str) -> list[Run]:
-    """Return runs of characters with the blanks of a line that has the same characters."""
+    """Return runs with the blanks of a line of the same characters."""
     found, at = [], 0
     for run in runs:
         begin, missing = at, len(run.text)

@@ -1,4 +1,7 @@
-"""The Markdown documents of the folder `docs` as pages of the web site."""
+"""The Markdown documents of `docs` as pages of the web site.
+
+`folder` is their folder, `name` a path in it.
+"""
 
 import posixpath
 from collections.abc import Iterator
@@ -27,9 +30,9 @@ _LINKED = (
 
 
 def documents_folder(given: str | None = None) -> Path:
-    """Return the folder of the documents: `given`, or by default the folder `docs` of the checkout.
+    """Return `given` or the checkout's `docs`; raise InputError without documents.
 
-    Raise InputError if the folder lacks the documents. An installed package does not include them.
+    An installed package does not include them.
     """
     folder = shipped("docs") if given is None else Path(given)
     missing = [name for name in _LINKED if not (folder / name).is_file()]
@@ -47,10 +50,7 @@ def documents_folder(given: str | None = None) -> Path:
 
 
 def documents(folder: Path) -> Iterator[tuple[str, Document]]:
-    """Yield the path in the web site and the rendered text of each document in a folder.
-
-    The documents are the Markdown files of the folder, except those for contributors.
-    """
+    """Yield path and rendered text of each document, except those for contributors."""
     for file in sorted(folder.rglob("*.md")):
         name = file.relative_to(folder).as_posix()
         if not _is_on_site(name):
@@ -60,15 +60,12 @@ def documents(folder: Path) -> Iterator[tuple[str, Document]]:
 
 
 def page_of(name: str) -> str:
-    """Return the path of a document in the web site, from `name`, its path in the folder `docs`."""
+    """Return the path of a document in the site."""
     return f"docs/{name.removesuffix('.md')}.html"
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Return the content of the pictures and tables of the documents, by their path in the site.
-
-    `folder` is the folder of the documents.
-    """
+    """Return the documents' pictures and tables by path in the site."""
     return {
         f"docs/{file.relative_to(folder).as_posix()}": file.read_bytes()
         for file in sorted(folder.rglob("*"))
@@ -77,17 +74,13 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def with_notebooks(folder: Path) -> list[Path]:
-    """Return the files of the documents that are notebooks too: pages with Python examples."""
+    """Return the documents with Python examples, which are notebooks too."""
     files = [path for name in _NOTEBOOKS for path in sorted((folder / name).glob("*.md"))]
     return [path for path in files if has_examples(path.read_text(encoding="utf-8"))]
 
 
 def notebooks(folder: Path) -> dict[str, bytes]:
-    """Return the notebooks of documents by their path in the web site.
-
-    `folder` is the folder of the documents. A notebook has the outputs and the pictures that its
-    document shows.
-    """
+    """Return the notebooks by path in the site, with outputs and pictures."""
     found = {}
     for path in with_notebooks(folder):
         beside = [file for file in path.parent.iterdir() if file.suffix in _PICTURES]
@@ -98,11 +91,7 @@ def notebooks(folder: Path) -> dict[str, bytes]:
 
 
 def _link(folder: Path, name: str, target: str) -> str | None:
-    """Return the link in the web site that replaces the link `target` of a document.
-
-    `name` is the path of the document in `folder`, the documents' folder. Return None if the web
-    site does not have the target.
-    """
+    """Return the site's link for a document's link, or None if the site lacks the target."""
     path, hash_, anchor = target.partition("#")
     if "://" in target or not path:
         return target

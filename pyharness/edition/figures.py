@@ -1,7 +1,7 @@
-"""Figures 6 to 12 of the thesis as pictures for the web site, drawn from computed curves.
+"""Figures 6 to 12 of the thesis for the web site, drawn from computed curves.
 
-A further picture shows Figure 7 with the limit of its original program: the function to which
-omega converges as the step size goes to 0.
+One more shows Figure 7 with the function to which omega of its original program converges as the
+step size goes to 0.
 """
 
 from collections.abc import Mapping
@@ -22,10 +22,9 @@ from pyharness.views.pictures import saved
 
 
 class Drawn(NamedTuple):
-    """A figure of the thesis, drawn with the original or with the corrected programs.
+    """A figure, drawn with original or corrected programs.
 
-    `finding` has the computed curves of the figure. `files` has the content of two files by name:
-    the picture (SVG) and the plotted numbers (CSV).
+    `finding` has the curves, `files` the SVG and the CSV by name.
     """
 
     finding: FigureFinding
@@ -33,10 +32,7 @@ class Drawn(NamedTuple):
 
 
 def drawn() -> dict[str, Drawn]:
-    """Compute and draw all figures of the thesis for the web site.
-
-    The result maps the name of a figure's files, without the suffix, to the drawn figure.
-    """
+    """Return all figures, by the names of their files without suffix."""
     return {
         each.plan.stem: Drawn(each, saved(figure_picture(each), f"{each.plan.stem}.svg"))
         for each in findings()
@@ -44,34 +40,30 @@ def drawn() -> dict[str, Drawn]:
 
 
 def together(figures: Mapping[str, Drawn]) -> dict[str, bytes]:
-    """Draw the original and the corrected Figure 7 of the thesis and its limit in one picture.
+    """Return original and corrected Figure 7 and its limit, as SVG and CSV.
 
-    The limit is the function to which the result of the original program converges as the step size
-    goes to 0. `figures` is the result of `drawn`. Return the content of two files by name: the
-    picture (SVG) and the plotted numbers (CSV).
+    `figures` is the result of `drawn`.
     """
     original, corrected = (figures[name].finding for name in ("figure-07", "figure-07-corrected"))
     return saved(together_picture(original, corrected), "figure-07-together.svg")
 
 
 class Printed(NamedTuple):
-    """A figure as the thesis has it, beside our drawings of it.
+    """A figure of the thesis, beside our drawings of it.
 
     Attributes
     ----------
     number : int
-        The number of the figure in the thesis.
-    caption : str
-        Its printed caption.
-    where : str
-        Its place in the thesis.
+        Its number in the thesis.
+    caption, where : str
+        Its printed caption, and its place.
     says : list of tuple of Markup and str
-        What the text of the thesis says of the figure, sentence by sentence, each with the anchor
-        of the sentence in the page of the thesis; the anchor is empty for sections I to IV.
+        Each sentence of the thesis about it, with the sentence's anchor; the anchor is empty for
+        sections I to IV.
     ours : Markup
-        What this edition has in place of a figure that it does not draw; empty if it draws it.
+        The replacement of a figure that is not drawn; else empty.
     drawn : dict of str to Drawn
-        Our drawings of the figure, by the names of their files without the suffix.
+        Our drawings by file name without suffix.
     """
 
     number: int
@@ -83,15 +75,12 @@ class Printed(NamedTuple):
 
     @property
     def anchor(self) -> str:
-        """Return the anchor of a figure that is not drawn; our drawings have their own anchors."""
+        """Return the anchor of a figure that is not drawn; drawings have their own."""
         return "" if self.drawn else f"figure-{self.number:02d}"
 
 
 def printed(figures: Mapping[str, Drawn]) -> list[Printed]:
-    """Return the figures of the thesis in their order, each with our drawings of it.
-
-    `figures` is the result of `drawn`.
-    """
+    """Return the thesis's figures in order, with those of `drawn`."""
     found = []
     for each in facts("figures")["printed"]:
         ours = {

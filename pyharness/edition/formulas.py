@@ -1,4 +1,4 @@
-"""The formulas of sections II to IV of the thesis, as MathML, with the cards that compute them."""
+"""The formulas of sections II to IV as MathML, with the cards that compute them."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -15,17 +15,17 @@ class Formula(NamedTuple):
     Attributes
     ----------
     number : str
-        The equation's number, as in ``34a``, or numbers, as in ``13-15``; empty if it has none.
+        As in ``34a`` or ``13-15``; empty if it has none.
     where : str
-        The section of the thesis.
+        The section.
     lines : list of Markup
-        The lines of the formula as MathML.
+        The lines as MathML.
     what : Markup
-        One sentence that says what the formula is, as HTML.
+        One sentence on it, as HTML.
     cards : dict of str to str
-        By program, the numbers of the cards that compute the formula; empty if no card does.
+        Numbers of the cards that compute it, by program.
     entry : str
-        The entry of the critical apparatus about the formula, or an empty text.
+        The entry of the apparatus about it, or empty.
     """
 
     number: str
@@ -37,14 +37,14 @@ class Formula(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Return the name of the formula, as in ``Equation 34a`` or ``Equations 13-15``."""
+        """Return ``Equation 34a`` or ``Equations 13-15``."""
         if not self.number:
             return f"Without a number, {self.where}"
         return f"Equation{'s' if '-' in self.number else ''} {self.number}, {self.where}"
 
 
 def formulas() -> dict[str, list[Formula]]:
-    """Return, by section of the thesis, its displayed formulas in their order."""
+    """Return the displayed formulas, in order, by section."""
     found: dict[str, list[Formula]] = {}
     for each in _formulas():
         found.setdefault(each.where.partition(".")[0], []).append(each)

@@ -1,6 +1,6 @@
-"""The data of the laboratory, the page that runs the programs of the thesis in the browser.
+"""The data of the laboratory, the page that runs the programs in the browser.
 
-The data include the results of one run, for readers without JavaScript.
+For readers without JavaScript there is one run.
 """
 
 import re
@@ -39,13 +39,11 @@ _SHOWN = 3
 
 @cache
 def context() -> dict[str, Any]:
-    """Return the values for the template of the page that runs the programs in the browser.
+    """Return the values for the page's template.
 
-    `data` is the object that the page's script reads as `window.laboratoryData`. `switches` has the
-    defects, readings (of doubtful cards) and conjectures (about missing cards) that a visitor can
-    switch on or off, each kind with a heading. `first` has the results of the run that `DEFAULTS`
-    specifies. `titles` has the names of the cases, and `programs` the names of the programs.
-    `experiments` has the guided experiments.
+    `data` is the script's `window.laboratoryData`. `switches` has defects, readings and conjectures
+    by heading. `first` is the run of `DEFAULTS`. `titles` and `programs` are the names of cases and
+    programs.
     """
     given = data()
     kinds = [
@@ -63,10 +61,7 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the JSON values with which a web page's script runs any program on any case.
-
-    The page, the laboratory, runs the programs of the thesis in the browser.
-    """
+    """Return the values with which the script runs any program on any case."""
     return {
         "scenes": [requested_scene(case_scene(number)) for number in case_numbers()],
         "headings": {number: _described(case_scene(number)) for number in case_numbers()},
@@ -93,10 +88,10 @@ def data() -> dict[str, Any]:
 
 
 def _deck_data() -> dict[str, Any]:
-    """Return the cards that run in a step of each program, and how corrections alter the cards.
+    """Return the cards that run in a step, and how corrections alter them.
 
     A pass is a part of a step that runs once with the same subscripts. Continuation cards are
-    joined with the card that they continue. Alterations that a compiler needs are omitted.
+    joined; alterations for compilers are omitted.
     """
     order = facts("cards/passes")
     found: dict[str, Any] = {}
@@ -116,10 +111,7 @@ def _deck_data() -> dict[str, Any]:
 
 
 def _statements(program: str, first: int, last: int) -> list[tuple[int, str]]:
-    """Return the numbers and texts of a program's cards from `first` to `last`.
-
-    Comments and FORMAT, DO and CONTINUE statements are omitted.
-    """
+    """Return numbers and texts of cards, without comments, FORMAT, DO and CONTINUE."""
     found: list[tuple[int, str]] = []
     for number, card in deck(program).cards.items():
         text = card.text.rstrip()
@@ -134,18 +126,16 @@ def _statements(program: str, first: int, last: int) -> list[tuple[int, str]]:
 
 
 def _described(scene: Scene) -> list[str]:
-    """Return lines that describe the body and the torque of a case, with any remarks."""
+    """Return lines on the body, the torque and remarks of a case."""
     lines = heading(scene)
     body, torque, *_ = lines[1].split("; ")
     return [f"{body}; {torque}", *lines[2:]]
 
 
 def _first() -> dict[str, Any]:
-    """Return the values with which the web page shows the run that `DEFAULTS` specifies.
+    """Return the run of `DEFAULTS`: its end, first and last rows, and largest error (rad/s).
 
-    The values include how the run ended, its first and last rows, and the largest error of omega
-    (rad/s) against the reference solution. The values also include the page that the program
-    prints, and the command that repeats the run.
+    Also the printed page, and the command that repeats the run.
     """
     scene = case_scene(DEFAULTS["case"])
     program = DEFAULTS["program"]
@@ -168,7 +158,7 @@ def _first() -> dict[str, Any]:
 
 
 def _row(run: Trajectory, number: int, error: float) -> list[str]:
-    """Return the cells of the row for one step, as texts, in the table of a program's results."""
+    """Return a step's cells in the table of results."""
     assert run.velocity is not None
     values = [run.time[number], *run.omega[number], *run.velocity[number]]
     values.append(run.recorded_time[number])

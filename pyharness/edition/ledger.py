@@ -1,7 +1,7 @@
-"""The data of the pages on claims, sentences and apparatus: computed verdicts and reports.
+"""The data of the pages on claims, sentences and apparatus.
 
-A claim is a statement of the thesis that we test, and a judgement has our verdicts on it. The
-critical apparatus lists the defects, readings and conjectures with their evidence.
+A claim is a statement of the thesis that we test; a judgement has our verdicts on it, for original
+and corrected programs. `judged` has those on all claims.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -25,11 +25,7 @@ from pyharness.views import html
 
 
 class SentenceVerdicts(NamedTuple):
-    """A sentence of the thesis with our verdicts on the claims that the sentence makes.
-
-    `judged` has, for each of these claims, a judgement: our verdicts for the original and for the
-    corrected programs. `anchor` is the anchor of the sentence in the page.
-    """
+    """A sentence of the thesis, with the judgements of its claims and its anchor."""
 
     sentence: Sentence
     judged: list[Judgement]
@@ -37,16 +33,12 @@ class SentenceVerdicts(NamedTuple):
 
     @property
     def statements(self) -> str:
-        """Return the statements of the claims that the sentence makes, as one text."""
+        """Return the statements of the sentence's claims as one text."""
         return " ".join(each.claim["statement"] for each in self.judged)
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
-    """Return, for each verdict, the numbers of claims about results that received the verdict.
-
-    `judged` has our verdicts on all claims of the thesis; only claims of the kind `result` are
-    counted. The first number is for the original programs, the second for the corrected programs.
-    """
+    """Return, by verdict, how many claims about results got it, original and corrected."""
     judged = [each for each in judged if each.claim["kind"] == "result"]
     found: dict[str, tuple[int, int]] = {}
     for each in judged:
@@ -61,18 +53,14 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def kinds(judged: Sequence[Judgement]) -> Markup:
-    """Return an HTML table with the number of times that each verdict occurs, by kind of claim.
-
-    `judged` has our verdicts on the claims of the thesis.
-    """
+    """Return an HTML table of verdicts by kind of claim."""
     return Markup(html.table(kinds_table(judged), "verdicts by kind of claim"))
 
 
 def account() -> dict[str, Markup]:
-    """Return, by identifier, the texts that both web pages and documents have, as HTML.
+    """Return, by identifier, the HTML texts that pages and documents share.
 
-    The texts are the statements in ``data/account.toml``, and the descriptions in
-    ``data/apparatus.toml`` of the effects of single defects.
+    They are ``data/account.toml``, and the effects of single defects in ``data/apparatus.toml``.
     """
     texts = {each["id"]: each["text"] for each in facts("account")["statement"]}
     texts |= {each["id"]: each["part"] for each in entries() if "part" in each}
@@ -80,18 +68,10 @@ def account() -> dict[str, Markup]:
 
 
 class ClaimStory(NamedTuple):
-    """A claim of the thesis as its part of the claims page shows it.
+    """A claim on the claims page.
 
-    Attributes
-    ----------
-    judgement : Judgement
-        Our verdicts on the claim.
-    story : Story
-        The claim in three sentences, as HTML.
-    sentences : list of tuple of str and str
-        Place and anchor of each sentence in the page of the thesis that makes the claim.
-    laboratory : str
-        A state of the laboratory that shows the claim, or an empty text.
+    `story` is HTML in three sentences; `sentences` are pairs of place and anchor in the page of the
+    thesis; `laboratory` is a state that shows the claim, or empty.
     """
 
     judgement: Judgement
@@ -101,11 +81,7 @@ class ClaimStory(NamedTuple):
 
 
 def claim_stories(judged: Sequence[Judgement]) -> dict[str, list[ClaimStory]]:
-    """Return, by kind, the claims of the thesis, each with its story.
-
-    `judged` has our verdicts on all claims. The kinds are in the order of `KINDS`, and the claims
-    of a kind in the order of the data.
-    """
+    """Return the claims with their stories, by kind in the order of `KINDS`."""
     found: dict[str, list[ClaimStory]] = {kind: [] for kind in KINDS}
     for each in judged:
         making = [
@@ -124,11 +100,7 @@ def claim_stories(judged: Sequence[Judgement]) -> dict[str, list[ClaimStory]]:
 
 
 def context(judged: Sequence[Judgement]) -> dict[str, Any]:
-    """Return the data of the claims page: counts, each claim as a story, and the evidence.
-
-    `judged` has our verdicts on all claims of the thesis. The values are HTML, except for the
-    claims by kind and what each kind is about.
-    """
+    """Return the data of the claims page: counts, stories and evidence, mostly as HTML."""
     table = claims_report(judged).data
     assert table is not None
     links = {each.claim["id"]: f"#{each.claim['id']}" for each in judged}
@@ -142,9 +114,9 @@ def context(judged: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def thesis_counts(sections: Mapping[str, Sequence[SentenceVerdicts]]) -> Markup:
-    """Return an HTML table of the number of sentences and claims in each section of the thesis.
+    """Return an HTML table of sentences and claims by section.
 
-    `sections` is the result of `thesis`. Only claims about results are counted as reproduced.
+    `sections` is from `thesis`. Only claims about results count as reproduced.
     """
     columns = [
         Column("section", left=True), Column("sentences"), Column("that make a claim"),
@@ -169,11 +141,9 @@ def thesis_counts(sections: Mapping[str, Sequence[SentenceVerdicts]]) -> Markup:
 
 
 def apparatus() -> list[tuple[dict[str, Any], Markup]]:
-    """Return each entry of the critical apparatus with its report as HTML.
+    """Return each entry of the apparatus with its report as HTML.
 
-    The apparatus lists defects of the programs, readings of doubtful cards, conjectures about
-    missing cards, and other findings. If an entry can be switched on and off in the programs, the
-    report shows its effect on the results in every case.
+    For an entry that can be switched, it shows the effect in every case.
     """
     found = []
     for entry in entries():
@@ -185,10 +155,7 @@ def apparatus() -> list[tuple[dict[str, Any], Markup]]:
 
 
 def thesis(judged: Iterable[Judgement]) -> dict[str, list[SentenceVerdicts]]:
-    """Return, by section of the thesis, its sentences with our verdicts on their claims.
-
-    `judged` has the verdicts on all claims. Sections and sentences are in the thesis's order.
-    """
+    """Return the thesis's sentences with verdicts, by section in order."""
     by_name = {each.claim["id"]: each for each in judged}
     found: dict[str, list[SentenceVerdicts]] = {}
     for number, each in enumerate(sentences(), 1):

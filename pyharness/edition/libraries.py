@@ -1,4 +1,4 @@
-"""The third-party libraries that write the pages; a user installs these optional packages."""
+"""The optional third-party libraries that write the pages."""
 
 from pyharness.model.distribution import check_package, install_command
 
@@ -9,9 +9,6 @@ LIBRARIES = (
 
 
 def check_libraries() -> None:
-    """Raise InputError if a third-party library that writes the web pages is missing.
-
-    The error message has the command that installs the libraries.
-    """
+    """Raise InputError, with the command to install them, if a library is missing."""
     for name in LIBRARIES:
         check_package(name, "edition", install_command("edition"))

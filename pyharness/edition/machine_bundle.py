@@ -1,7 +1,7 @@
-"""The folder `machine` of the data package: what a reader with an emulated CDC computer needs.
+"""The folder `machine` of the data package, for a reader with an emulated CDC computer.
 
-It has the jobs for the computer, the pages to expect, a script that compares a printed page with
-them, and a table of what each outcome would teach.
+It has the jobs, the pages to expect, a script that compares a page with them, and a table of what
+each outcome would teach.
 """
 
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ _TEXT = "text/plain"
 
 
 def machine_parts() -> Iterator[Part]:
-    """Yield the files of the folder `machine` of the data package."""
+    """Yield the files of the folder."""
     texts: dict[str, str] = {}
     rows: list[list[Any]] = []
     for program, case in facts("cases")["published"].items():
@@ -76,13 +76,13 @@ def machine_parts() -> Iterator[Part]:
 
 
 def outcomes_table() -> str:
-    """Return a table in Markdown of what would be learned from each outcome of a job."""
+    """Return a Markdown table of what each outcome of a job would teach."""
     rows = [[each["seen"], each["learned"], each["open"]] for each in facts("machine")["outcome"]]
     return table("outcome | what would be learned | what remains open", rows).rstrip()
 
 
 def _pages(program: str, case: int) -> dict[tuple[str, str], str]:
-    """Return the pages of a program in a case, by listing and word; the machine's words first."""
+    """Return a program's pages by listing and word, the machine's words first."""
     words = [*_MACHINE, *(word for word in WORD_NAMES if word not in _MACHINE)]
     return {
         (name, word): our_page(listing, case, card_steps(program), word)
@@ -97,7 +97,7 @@ def _name(program: str, case: int, listing: str, word: str) -> str:
 
 
 def _stored(texts: dict[str, str], name: str, text: str) -> str:
-    """Store a page under its name, or return the name of an equal page that is already stored."""
+    """Store a page under its name, or return the name of an equal one."""
     program = name.partition("-case-")[0]
     same = [known for known in texts if known.startswith(program) and texts[known] == text]
     if same and not name.removeprefix(program)[len("-case-N-") :].startswith("cdc48"):
@@ -107,7 +107,7 @@ def _stored(texts: dict[str, str], name: str, text: str) -> str:
 
 
 def _jobs(texts: dict[str, str]) -> Iterator[Part]:
-    """Yield the jobs, with rounding for the programs whose pages depend on it."""
+    """Yield the jobs, with rounding for programs whose pages depend on it."""
     for program, case in facts("cases")["published"].items():
         first, second = (texts[_name(program, case, "original", word)] for word in _MACHINE)
         for system in SYSTEMS:
@@ -123,7 +123,7 @@ def _jobs(texts: dict[str, str]) -> Iterator[Part]:
 
 
 def _shared(texts: dict[str, str], rows: list[list[Any]]) -> Iterator[list[str]]:
-    """Yield a row for each page: its file, its number of rows, and the runs that print it."""
+    """Yield for each page its file, number of rows, and the runs that print it."""
     for name, text in texts.items():
         _, printed = printed_page.split_page(printed_page.printed_numbers(text))
         words: dict[str, list[str]] = {}

@@ -1,4 +1,4 @@
-"""Parts of Markdown documents that are made of data: paragraphs and tables."""
+"""Parts of Markdown documents that are made of data."""
 
 import textwrap
 from collections.abc import Sequence
@@ -7,15 +7,12 @@ _WIDTH = 120  # of the lines of a document, in characters
 
 
 def paragraphs(text: str, indent: str = "") -> str:
-    """Return paragraphs, which blank lines separate, with lines of at most 120 characters.
-
-    All lines of a paragraph but the first begin with `indent`.
-    """
+    """Return paragraphs wrapped at 120 columns; all but first lines have the indent."""
     return "\n\n".join(_filled(part, indent) for part in text.split("\n\n")) + "\n"
 
 
 def table(head: str, rows: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table. The text `head` has the heads of its columns, separated by bars."""
+    """Return a Markdown table; bars separate the heads."""
     heads = head.split(" | ")
     lines = [heads, ["---"] * len(heads), *rows]
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)

@@ -1,7 +1,6 @@
-"""Conversion of the project's Markdown to HTML for the web site.
+"""Conversion of the project's Markdown to HTML.
 
-Headings have the same anchors as on GitHub, formulas become MathML, and links between documents
-become links between pages.
+Anchors are GitHub's, formulas become MathML, and links between documents lead to pages.
 """
 
 import re
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Part(NamedTuple):
-    """The text under one heading of a document, with its anchor and title, for the search page."""
+    """The text under a heading, with anchor and title, for the search."""
 
     anchor: str
     title: str
@@ -26,10 +25,7 @@ class Part(NamedTuple):
 
 
 class Document(NamedTuple):
-    """A rendered Markdown document: its title, its HTML without the title, and its parts.
-
-    `parts` has the plain text under each heading.
-    """
+    """A rendered document: title, HTML without it, and plain text by heading."""
 
     title: str
     html: Markup
@@ -37,12 +33,10 @@ class Document(NamedTuple):
 
 
 def document(text: str, link: Callable[[str], str | None]) -> Document:
-    """Render the Markdown text of a document, whose first line is its title, as HTML.
+    """Return a document, whose first line is its title, as HTML.
 
-    The result has the title, the HTML, and the plain text by heading. `link` maps the target of a
-    link or picture in the text to a link of the web site. It returns None if the site does not have
-    the target: a link then becomes plain text. Raise ValueError if the site does not have a
-    picture.
+    `link` maps a target to the site's, or returns None: the link becomes plain text, and a picture
+    raises ValueError.
     """
     tokens = _parser().parse(text)
     for token in _all(tokens):
@@ -64,16 +58,12 @@ def document(text: str, link: Callable[[str], str | None]) -> Document:
 
 
 def inline(text: str) -> Markup:
-    """Return one line of Markdown, with code, emphasis and formulas, as HTML."""
+    """Return one line of Markdown as HTML."""
     return Markup(_parser().renderInline(text))
 
 
 def formula(tex: str, display: bool = False) -> Markup:
-    """Return the LaTeX formula `tex` as MathML.
-
-    If `display` is true, the formula is displayed on a line of its own; otherwise it is part of a
-    line of text.
-    """
+    """Return LaTeX as MathML, on a line of its own if `display`."""
     from latex2mathml.converter import convert
 
     return Markup(convert(tex, display="block" if display else "inline"))
@@ -126,7 +116,7 @@ def _all(tokens: Sequence["Token"]) -> Iterator["Token"]:
 
 
 def _anchor(tokens: Sequence["Token"]) -> None:
-    """Add to the headings the same anchors as on GitHub, so that links to headings work."""
+    """Add GitHub's anchors to the headings."""
     seen: dict[str, int] = {}
     for opening, content in pairwise(tokens):
         if opening.type == "heading_open":
@@ -136,12 +126,12 @@ def _anchor(tokens: Sequence["Token"]) -> None:
 
 
 def slug(title: str) -> str:
-    """Return the anchor that GitHub gives a heading with the text `title`."""
+    """Return GitHub's anchor of a heading."""
     return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 
 def _plain(text: str) -> str:
-    """Return a line of Markdown as plain text, without formatting characters and link targets."""
+    """Return a line of Markdown as plain text."""
     return re.sub(r"[`*$\\]", "", re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text))
 
 

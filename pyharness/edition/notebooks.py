@@ -1,8 +1,4 @@
-"""Documents as notebooks of Jupyter, without executing them.
-
-The prose of a document becomes cells of Markdown, and its Python examples become cells of code.
-The output and the picture of an example are those that the document shows.
-"""
+"""Documents as Jupyter notebooks, with the outputs and pictures that they show."""
 
 import base64
 import hashlib
@@ -23,16 +19,15 @@ _TYPES = {"svg": "image/svg+xml", "png": "image/png"}
 
 
 def has_examples(text: str) -> bool:
-    """Return whether a document has Python examples, so that it can be a notebook."""
+    """Return whether a document has Python examples."""
     return "```python\n" in text
 
 
 def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
-    """Return a document as a notebook, a file of JSON in version 4.5 of the format.
+    """Return a document as a notebook, JSON in format 4.5.
 
-    `text` is the document in Markdown. `pictures` has the contents of the pictures that follow
-    examples, by the names of their files in the folder of the document. Links to other documents
-    become plain text, because a notebook may be in any folder.
+    `pictures` has contents by file name. Links to documents become plain text, because a notebook
+    may be anywhere.
     """
     cells: list[dict[str, Any]] = []
     for kind, source, found in _parts(text):
@@ -53,7 +48,7 @@ def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
 
 
 def _parts(text: str) -> Iterator[tuple[str, str, "re.Match[str] | None"]]:
-    """Yield the kind (prose, code or picture), the text, and the match of each part in order."""
+    """Yield kind (prose, code or picture), text and match of each part."""
     start = 0
     for found in _PART.finditer(text):
         yield "prose", text[start : found.start()], None

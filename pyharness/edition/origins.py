@@ -1,4 +1,4 @@
-"""Links to the disagreements of the decks, which the page that compares the decks has."""
+"""Links, relative to the site's root, to the disagreements of the decks."""
 
 from pyharness.edition.markdown import slug
 from pyharness.history.origins import Disagreement, disagreements
@@ -8,18 +8,12 @@ PAGE = "listing/collation.html"
 
 
 def origins_of(entry: str) -> list[tuple[str, str]]:
-    """Return title and link of each disagreement that concerns an entry of the apparatus.
-
-    The links are relative to the root of the web site.
-    """
+    """Return title and link of each disagreement about an apparatus entry."""
     return [_linked(each) for each in disagreements() if entry in each.entries]
 
 
 def origins_of_step(what: str) -> list[tuple[str, str]]:
-    """Return title and link of each disagreement in a step of the comparison of the decks.
-
-    `what` is the description of the step. The links are relative to the root of the web site.
-    """
+    """Return title and link of each disagreement in a step of the comparison."""
     return [_linked(each) for each in disagreements() if what in each.steps]
 
 
@@ -29,7 +23,7 @@ def anchor_of(disagreement: Disagreement) -> str:
 
 
 def thesis_on(disagreement: Disagreement) -> str:
-    """Return the formulas and the place of the thesis that a disagreement concerns."""
+    """Return the formulas and the place in the thesis of a disagreement."""
     given = ", ".join(disagreement.equations)
     noun = "equations" if "," in given or "-" in given else "equation"
     return "; ".join(

@@ -1,7 +1,6 @@
-"""The runs of the programs in the data package, from which a reader computes errors and stops.
+"""The runs of the programs in the data package.
 
-The tables of the article on errors (Table C) and on the effects of the faults (Table B) follow from
-these runs and the reference solutions, which are beside them.
+The article's Tables B and C follow from them and the reference solutions beside them.
 """
 
 from collections.abc import Iterator
@@ -31,7 +30,7 @@ _LISTING = (
 
 
 def run_parts() -> Iterator[Part]:
-    """Yield the files of the data package on the runs: the cases, the ends, and the results."""
+    """Yield the files on the runs: cases, ends and results."""
     yield Part(
         "cases.toml", "The cases of Table 1 of the thesis",
         "Moments of inertia in kg m2, torque in N m, initial omega in rad/s, and the numbers that "
@@ -57,10 +56,7 @@ def run_parts() -> Iterator[Part]:
 
 @cache
 def _listings() -> dict[tuple[str, str], Listing]:
-    """Return the listings that are run, by the name of the program and of the listing.
-
-    The listings with one fault are in the order of the apparatus.
-    """
+    """Return the listings by program and name, those with one fault in apparatus order."""
     found = {}
     for program in PROGRAMS:
         found[program, "original"] = Listing.original(program)
@@ -78,7 +74,7 @@ def _run(case: int, listing: Listing) -> Trajectory:
 
 
 def _ends() -> Iterator[list[Any]]:
-    """Yield a row for each run: how many steps it completed, and how it ended."""
+    """Yield for each run its completed steps, and how it ended."""
     for case in case_numbers():
         for (program, name), listing in _listings().items():
             run = _run(case, listing)
@@ -87,7 +83,7 @@ def _ends() -> Iterator[list[Any]]:
 
 
 def _rows(case: int) -> Iterator[list[Any]]:
-    """Yield the rows of the reference solution and of the runs of a case."""
+    """Yield the rows of a case's reference and runs."""
     truth = case_truth(case)
     yield from _of_curve("reference", "", truth)
     for (program, name), listing in _listings().items():
@@ -96,7 +92,7 @@ def _rows(case: int) -> Iterator[list[Any]]:
 
 
 def _of_curve(program: str, listing: str, curve: Any) -> Iterator[list[Any]]:
-    """Yield a row for each step of a trajectory, or of a reference solution."""
+    """Yield a row for each step of a trajectory or reference."""
     states = zip(curve.time.tolist(), curve.omega.tolist(), curve.velocity.tolist(), strict=True)
     for step, (time, omega, velocity) in enumerate(states, 1):
         yield [program, listing, step, time, *omega, *velocity]

@@ -1,8 +1,7 @@
-"""The data of the page that compares the cards of the three decks, line by line.
+"""The data of the page that compares the cards of the three decks.
 
-A deck consists of the cards (lines) of a program. The table `data/cards/collation.toml` lists the
-operations of the programs with their cards. Within an operation, cards of different decks are
-aligned by the similarity of their statements.
+Within an operation of `data/cards/collation.toml`, cards are aligned by the similarity of their
+statements.
 """
 
 import difflib
@@ -28,7 +27,7 @@ KINDS = (_LABEL, "name", "number", "operator", "punctuation")
 
 
 class _Part(NamedTuple):
-    """A part of a card: the column in which it begins, counted from 0, its text and its kind."""
+    """A part of a card: its column from 0, text and kind."""
 
     column: int
     text: str
@@ -36,20 +35,16 @@ class _Part(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """A card of a deck in an aligned row; the marked runs of characters differ between decks.
-
-    A marked run has a kind of difference, for example ``name``, as its `entry`.
-    """
+    """A card in an aligned row; a marked run has a kind of difference as `entry`."""
 
     card: Card
     runs: list[Run]
 
 
 class AlignedRow(NamedTuple):
-    """Cards of different decks that correspond to each other, and the kinds of their differences.
+    """Corresponding cards of decks, None where missing, and kinds of their differences.
 
-    `cells` has a cell for each program, or None if the deck of the program has no such card. The
-    kinds are ``statement number``, ``name``, ``number``, ``operator`` and ``punctuation``.
+    These are ``statement number``, ``name``, ``number``, ``operator`` and ``punctuation``.
     """
 
     cells: dict[str, Cell | None]
@@ -62,20 +57,14 @@ class AlignedRow(NamedTuple):
 
 
 class Operation(NamedTuple):
-    """An operation of the programs, with the aligned cards of the decks.
-
-    `row` has what the operation does, what the thesis states about it, and why decks differ.
-    """
+    """An operation, its row of the collation, and the aligned cards."""
 
     row: deck_collation.Row
     aligned: list[AlignedRow]
 
 
 def operations() -> list[Operation]:
-    """Return all operations that are on cards, with the aligned cards of the three decks.
-
-    The operations are in the order of the table `data/cards/collation.toml`. Comments are omitted.
-    """
+    """Return all operations on cards, in the order of the table, without comments."""
     return [Operation(row, _aligned(row.cards)) for row in deck_collation.rows() if row.cards]
 
 
@@ -88,10 +77,9 @@ def _aligned(ranges: dict[str, str]) -> list[AlignedRow]:
 
 
 def _merged(rows: Sequence[dict[str, Card]], cards: Sequence[Card]) -> list[dict[str, Card]]:
-    """Return rows of aligned cards into which the cards of a further deck are inserted.
+    """Return aligned rows with a further deck's cards inserted.
 
-    Among all alignments that keep the order of rows and cards, this is one with the largest sum of
-    similarities.
+    It is an order-preserving alignment with the largest sum of similarities.
     """
 
     def likeness(row: dict[str, Card], card: Card) -> float:
@@ -126,7 +114,7 @@ def _likeness(one: Card, other: Card) -> float:
 
 
 def _compared(row: dict[str, Card]) -> AlignedRow:
-    """Return a row of aligned cards with the parts that differ between any two of them."""
+    """Return a row with the parts that differ between any two cards."""
     marks: dict[str, dict[int, str]] = {program: {} for program in row}
     parts = {program: _parts(card) for program, card in row.items()}
     for one, other in combinations(row, 2):
@@ -146,7 +134,7 @@ def _compared(row: dict[str, Card]) -> AlignedRow:
 
 
 def _parts(card: Card) -> list[_Part]:
-    """Return the statement number and the parts of the statement, without continuation marks."""
+    """Return statement number and parts, without continuation marks."""
     found = [] if card.continues else _PART.finditer(card.text[:5])
     labels = [_Part(each.start(), each[0], _LABEL) for each in found]
     return labels + [
@@ -163,10 +151,7 @@ def _kind(text: str) -> str:
 
 
 def _runs(text: str, parts: Sequence[_Part], marks: dict[int, str]) -> list[Run]:
-    """Return a card's text as runs, without the blanks before it.
-
-    `marks` has the kind of each part that differs, by column.
-    """
+    """Return a card's text as runs, without leading blanks; `marks` has kinds by column."""
     found, done = [], 0
     for part in parts:
         if part.column in marks:

@@ -1,4 +1,7 @@
-"""The reports of the verb `edition`: the number and size of the written files, by type."""
+"""The reports of the verb `edition`.
+
+`content` maps paths of written files to their content.
+"""
 
 import shlex
 from collections.abc import Mapping
@@ -17,33 +20,21 @@ _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 
 
 def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return the JSON record of the web site that the command `pyharness edition` writes.
+    """Return the JSON record of the site.
 
-    The key `build` has the versions, the compiler and the compiler flags of the installation that
-    wrote the site. The key `files` has the size of each file in bytes, by its path. `content` maps
-    the path of each file to its content.
+    `build` has versions, compiler and flags; `files` sizes in bytes by path.
     """
     return {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
 
 
 def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Return the report of the command `pyharness edition`, which writes the project's web site.
-
-    The report has the number and the total size (kB) of the files of each type, which is the suffix
-    of the file name. `folder` is the folder to which the site was written. `content` maps the path
-    of each file to its content.
-    """
+    """Return number and size (kB) of the site's files by suffix."""
     text: list[Section] = [[_sizes(content)], [f"Open {folder}/index.html in a browser."]]
     return Report("edition", text, lambda: {"folder": folder, **listed(content)})
 
 
 def package_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Return the report of `pyharness edition --data`, which writes the edition's data package.
-
-    The report has the number and the total size (kB) of the files of each type, and the identifier
-    of the whole package. `folder` is the folder to which the package was written. `content` maps
-    the path of each file to its content.
-    """
+    """Return number and size (kB) of the package's files, and the package's identifier."""
     identifiers = {
         "package": directory_identifier(content), "data": data_identifier(), "text": text_digest(),
     }  # fmt: skip
@@ -62,7 +53,7 @@ def package_report(folder: str, content: Mapping[str, bytes]) -> Report:
 
 
 def _sizes(content: Mapping[str, bytes]) -> Table:
-    """Return a table of the number and the total size (kB) of files by their suffix."""
+    """Return a table of number and size (kB) by suffix."""
     sizes: dict[str, list[int]] = {}
     for name, each in content.items():
         sizes.setdefault(PurePosixPath(name).suffix.lstrip("."), []).append(len(each))

@@ -1,8 +1,7 @@
-"""The pages of the web site and their content.
+"""The pages of the web site.
 
-Every page is a template that is filled with data and with the text of reports. Each result is
-computed only once. A page can be opened from a web server or from a file, under any path. It can be
-read without JavaScript, and loads nothing from other sites.
+A page is a template with data and reports. It can be opened from a server or a file, under any
+path, without JavaScript, and loads nothing from other sites. Each result is computed once.
 """
 
 import json
@@ -82,10 +81,7 @@ MENU = {
 
 
 class Found(NamedTuple):
-    """An entry of the web site's search index, which describes a place in a page.
-
-    `href` is the link to the place. `kind` is, for example, ``claim`` or ``figure``.
-    """
+    """A place in a page, for the search; `kind` as in ``claim``."""
 
     href: str
     title: str
@@ -94,12 +90,10 @@ class Found(NamedTuple):
 
 
 class Page(NamedTuple):
-    """A page of the web site, before it is rendered as HTML.
+    """A page before it is rendered.
 
-    `path` is the path of the page in the site. `template` is the name of the page's template, and
-    `context` has the values for the template. `found` has the entries of the search index that link
-    to the page. `menu` is the path of the menu entry to highlight; if it is empty, the page's own
-    path is used.
+    `found` has the search entries for it. `menu` is the menu's path to highlight, by default
+    `path`.
     """
 
     path: str
@@ -111,12 +105,10 @@ class Page(NamedTuple):
 
 
 def build_site(progress: Progress = no_progress, docs: Path | None = None) -> dict[str, bytes]:
-    """Compute the results that the web site shows, and return all files of the site.
+    """Return all files of the site, content by path.
 
-    The result maps the path of each file to its content. `progress` is called before each of five
-    parts of the work. Its arguments are the number of completed parts, the number of all parts, and
-    the name of the part. `docs` is the folder of the documents, by default the folder `docs` of the
-    checkout.
+    `progress` gets the number of completed parts, of all parts, and the name of the part. `docs` is
+    by default the checkout's.
     """
     docs = docs or documents.documents_folder()
     progress(0, 5, "figures")
@@ -244,7 +236,7 @@ def _documents(docs: Path) -> Iterator[Page]:
 
 
 def _listed() -> set[str]:
-    """Return the paths of all pages that the menu has."""
+    """Return the paths of the pages in the menu."""
     return {path for section in MENU.values() for _, path in section}
 
 
@@ -289,20 +281,16 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
 
 
 def script(name: str, value: Any) -> bytes:
-    """Return a JavaScript file that assigns `value`, as JSON, to the global variable `name`.
+    """Return JavaScript that assigns `value` to a global name.
 
-    The data of the web site are in scripts, because a page that is opened without a web server
-    can't load JSON files.
+    A page opened without a server can't load JSON.
     """
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     return f"window.{name}={text};\n".encode()
 
 
 def vendor() -> list[dict[str, Any]]:
-    """Return the entries of `vendor.toml`, the third-party JavaScript packages that pages use.
-
-    An entry has, for example, the name, the version and the checksums of a package.
-    """
+    """Return the entries of `vendor.toml`, the third-party JavaScript."""
     with open(shipped("web") / "vendor" / "vendor.toml", "rb") as file:
         packages: list[dict[str, Any]] = tomllib.load(file)["package"]
     return packages

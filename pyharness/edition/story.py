@@ -1,8 +1,7 @@
-"""The data of the story, the home page of the web site: its charts and its numbers.
+"""The data of the story, the home page: charts and numbers of its six scenes.
 
-The page tells in six scenes what the thesis reports and what was found. Its charts and numbers come
-from runs of the programs' Python twins. In the browser, the page's script runs the programs again
-and replaces them when a visitor changes something.
+They are from runs of the twins; in the browser the script runs the programs again when a visitor
+changes something.
 """
 
 import math
@@ -34,19 +33,17 @@ _LOG_STEP = 2  # powers of ten from one label to the next
 
 
 class Curve(NamedTuple):
-    """A curve of a chart. `name` selects its colour and dashes; `points` are in the chart's box."""
+    """A curve in a chart's box; `name` selects colour and dashes."""
 
     name: str
     points: str
 
 
 class Chart(NamedTuple):
-    """A chart with fixed axes, as numbers for an SVG picture.
+    """A chart with fixed axes, as numbers for SVG.
 
-    `x` and `y` are the ranges of the axes. On a logarithmic axis `y` has powers of ten: the
-    exponents of its ends. `x_ticks` and `y_ticks` are pairs of a position in the picture and a
-    label. `axes` names both axes with their units. If `is_marked` is true, each point is drawn as a
-    mark, and no line joins the points.
+    `x` and `y` are ranges; a logarithmic `y` has exponents of ten. Ticks are pairs of position and
+    label. If `is_marked`, points are marks without lines.
     """
 
     name: str
@@ -61,7 +58,7 @@ class Chart(NamedTuple):
 
 
 def data() -> dict[str, Any]:
-    """Return the JSON values with which the story's script runs the programs in the browser."""
+    """Return the values with which the script runs the programs."""
     return {
         "scenes": {number: requested_scene(case_scene(number)) for number in _cases()},
         "original": {name: list(switches(name)) for name in PROGRAMS},
@@ -72,10 +69,7 @@ def data() -> dict[str, Any]:
 
 @cache
 def context() -> dict[str, Any]:
-    """Return the values for the template of the story: the charts by name, and the numbers.
-
-    The numbers are those of the programs as printed and as corrected, each in 100 steps of 0.01 s.
-    """
+    """Return the story's charts and numbers: as printed and corrected, 100 steps of 0.01 s."""
     stopped = _run(2, "runge-kutta")
     endless = _run(2, "runge-kutta", may_stop=False)
     scene = case_scene(2)
@@ -142,36 +136,36 @@ def _run(
     without: tuple[str, ...] = (),
     may_stop: bool = True,
 ) -> Trajectory:
-    """Run the twin of a program in a case: as printed, less some defects, or as corrected."""
+    """Return a twin's run as printed, less some defects, or as corrected."""
     active = set(switches(program)) - set(without) if listing == "original" else set()
     return run_program(case_scene(case), Listing(program, active), "python", may_stop=may_stop)
 
 
 def _distance(run: Trajectory, goal: Array) -> float:
-    """Return the largest distance (rad/s) of omega1 from a goal, at the steps that were run."""
+    """Return the largest distance (rad/s) of omega1 from a goal."""
     return float(np.abs(run.omega - goal[: run.steps])[:, 0].max())
 
 
 def _first_error(case: int, program: str, listing: str = "original") -> float:
-    """Return the largest error of omega1 (rad/s) at the steps that were run."""
+    """Return the largest error of omega1 (rad/s)."""
     return _distance(_run(case, program, listing), _truth(case).omega)
 
 
 def _largest_error(case: int, program: str, listing: str) -> float:
-    """Return the largest error of any component of omega (rad/s) at the steps that were run."""
+    """Return the largest error of omega (rad/s)."""
     run = _run(case, program, listing)
     return float(np.abs(run.omega - _truth(case).omega[: run.steps]).max())
 
 
 def _ratios(case: int) -> dict[str, float]:
-    """Return how many times larger the error of each corrected collocation program is in a case."""
+    """Return how many times larger each corrected collocation error is."""
     errors = {name: _largest_error(case, name, "corrected") for name in PROGRAMS}
     least = errors.pop("runge-kutta")
     return {name: error / least for name, error in errors.items()}
 
 
 def _span(case: int) -> tuple[float, float]:
-    """Return a range that holds the true omega1 of a case and a margin."""
+    """Return a range of a case's true omega1, with a margin."""
     values = [case_scene(case).omega[0], *_truth(case).omega[:, 0]]
     low, high = min(values), max(values)
     margin = 0.25 * (high - low)
@@ -185,10 +179,7 @@ def _chart_of_case(
     y: tuple[float, float],
     in_steps: bool = False,
 ) -> Chart:
-    """Return a chart of the true omega1 of a case over time, or over steps, and that of runs.
-
-    `runs` has the runs by the name of their program.
-    """
+    """Return the true omega1 over time or steps, with runs by program."""
     scene = case_scene(case)
     times = [0.0, *scene.times()]
     x = list(range(len(times))) if in_steps else times
@@ -208,13 +199,13 @@ def _velocity_chart(run: Trajectory) -> Chart:
 
 
 def _second_velocity(run: Trajectory) -> list[float]:
-    """Return the velocity V2 (m/s) after each step of a run."""
+    """Return V2 (m/s) after each step."""
     assert run.velocity is not None
     return [float(row[1]) for row in run.velocity]
 
 
 def _race_chart(listing: str) -> Chart:
-    """Return the largest error of each program by case, on a scale of powers of ten."""
+    """Return each program's largest error by case, on a logarithmic scale."""
     axes = ("case", "largest error, rad/s")
     found = _chart(f"race-{listing}", axes, (1.5, 7.5), (-8, 2), _powers(-8, 2), is_log=True)
     curves = [
@@ -240,7 +231,7 @@ def _chart(
 
 
 def _even(low: float, high: float) -> list[tuple[float, str]]:
-    """Return some round numbers of a range, with their labels."""
+    """Return round numbers of a range with labels."""
     raw = (high - low) / 5.0
     unit = 10.0 ** math.floor(math.log10(raw))
     step = next(unit * m for m in (1, 2, 5, 10) if unit * m >= raw)
@@ -250,7 +241,7 @@ def _even(low: float, high: float) -> list[tuple[float, str]]:
 
 
 def _powers(low: int, high: int) -> list[tuple[float, str]]:
-    """Return some powers of ten of a range, by their exponents, with their labels."""
+    """Return powers of ten of a range, by exponent, with labels."""
     return [(n, power_of_ten(n) if n else "1") for n in range(low, high + 1) if n % _LOG_STEP == 0]
 
 
@@ -260,7 +251,7 @@ def _across(chart: Chart, x: float) -> float:
 
 
 def _up(chart: Chart, y: float) -> float:
-    """Return the height of a value in the picture; what is outside by far is just outside."""
+    """Return a value's height in the picture; far outside is just outside."""
     _, top, _, bottom = BOX
     value = math.log10(y) if chart.is_logarithmic else y
     share = (value - chart.y[0]) / (chart.y[1] - chart.y[0])
@@ -268,7 +259,7 @@ def _up(chart: Chart, y: float) -> float:
 
 
 def _curve(chart: Chart, name: str, x: Iterable[float], y: Iterable[float]) -> Curve:
-    """Return a curve as the points of an SVG polyline; chart.js does the same."""
+    """Return a curve as an SVG polyline, as chart.js does."""
     points = (
         f"{_written(_across(chart, a))},{_written(_up(chart, b))}"
         for a, b in zip(x, y, strict=True)

@@ -1,1 +1,1 @@
-"""Sweeps: grids of scenes, solved chunk by chunk; an interrupted sweep can be continued."""
+"""Sweeps: grids of scenes, solved and stored chunk by chunk, which can be continued."""

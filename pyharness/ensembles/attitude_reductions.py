@@ -1,8 +1,7 @@
 """Quantities that a sweep computes from the attitudes of a batch of n scenes.
 
-The arguments of each function are a batch, and the parameters of the quantity by name. `samples` is
-the number of times at which the attitudes are read. `of` names a principal axis of the body by the
-rank of its moment.
+Of the parameters, `samples` is the number of times at which attitudes are read; `of` names a
+principal axis by the rank of its moment.
 """
 
 from collections.abc import Mapping
@@ -27,14 +26,14 @@ def end_attitude(batch: Batch, _: Given) -> Array:
 
 
 def largest_tilt(batch: Batch, given: Given) -> Array:
-    """Return the largest angles (rad) of an axis in space from its first direction, shape (n,)."""
+    """Return the largest angles (rad) of an axis from its first direction, shape (n,)."""
     along, across = _tilt_squares(batch, given)
     found: Array = 2.0 * np.arctan2(np.sqrt(across), np.sqrt(along)).max(axis=1)
     return found
 
 
 def tilted_time(batch: Batch, given: Given) -> Array:
-    """Return the times (s) during which an axis is tilted by more than `above` (rad), shape (n,).
+    """Return how long (s) an axis is tilted by more than `above` (rad), shape (n,).
 
     Each sample counts for the time since the sample before.
     """
@@ -46,7 +45,7 @@ def tilted_time(batch: Batch, given: Given) -> Array:
 
 
 def axis_flips(batch: Batch, given: Given) -> NDArray[np.int64]:
-    """Return how often a tilt passes a right angle, as far as the samples show, shape (n,)."""
+    """Return how often a tilt passes a right angle between samples, shape (n,)."""
     along, across = _tilt_squares(batch, given)
     is_over = np.concatenate([np.zeros((len(along), 1), bool), across > along], axis=1)
     count: NDArray[np.int64] = (is_over[:, 1:] != is_over[:, :-1]).sum(axis=1)
@@ -54,9 +53,9 @@ def axis_flips(batch: Batch, given: Given) -> NDArray[np.int64]:
 
 
 def pointing_error(batch: Batch, given: Given) -> Array:
-    """Return the angles (rad) of an axis at the end from a direction in space, shape (n,).
+    """Return the final angles (rad) of an axis from a direction in space, shape (n,).
 
-    `towards` is this direction in the axes of space; if it is empty, the axis's initial direction.
+    `towards` is the direction; if empty, the axis's initial one.
     """
     if not given["towards"]:
         return largest_tilt(batch, {**given, "samples": 1})
@@ -77,13 +76,13 @@ def pointing_error(batch: Batch, given: Given) -> Array:
 
 
 def _in_space(batch: Batch) -> Array:
-    """Return the attitudes at the end from the body to space, shape (n, 4)."""
+    """Return the final attitudes from body to space, shape (n, 4)."""
     turn = batch.attitudes(1)[:, 0]
     return np.stack(np.broadcast_arrays(*product(batch.first_attitudes.T, turn.T)), axis=1)
 
 
 def _tilt_squares(batch: Batch, given: Given) -> tuple[Array, Array]:
-    """Return the squares of the cosine and the sine of half the angle of an axis from its start."""
+    """Return cosine squared and sine squared of half an axis's angle from its start."""
     squares = batch.attitudes(given["samples"]) ** 2
     is_own = _is_own(batch, given, len(squares))[:, None, :]
     along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)
@@ -92,7 +91,7 @@ def _tilt_squares(batch: Batch, given: Given) -> tuple[Array, Array]:
 
 
 def _is_own(batch: Batch, given: Given, n: int) -> NDArray[np.bool_]:
-    """Return whether each principal axis of n bodies is the axis `of`, shape (n, 3)."""
+    """Return whether each principal axis of n bodies is `of`, shape (n, 3)."""
     axis = np.argsort(batch.bodies, axis=1, kind="stable")[:, RANKS.index(given["of"])]
     found: NDArray[np.bool_] = np.arange(3) == np.broadcast_to(axis, (n,))[:, None]
     return found

@@ -37,28 +37,26 @@ _SAMPLE = "sample"
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of a sweep's grid: a field of the scene or of the solver, and the field's values.
+    """One axis of a sweep's grid: a field of the scene or of the solver, and its values.
 
-    A sweep solves a grid of scenes, which are rigid-body problems. Axes with the same dimension
-    vary together. This means that the scenes with index i along the dimension have value i of each
-    of these axes.
+    Axes with the same dimension vary together: index i gives value i of each.
 
     Attributes
     ----------
     field : str
-        The field of a scene, or of its solver, that has the values, as in ``omega.1``.
+        The field, as in ``omega.1``.
     dimension : str
-        The name of the dimension of the store's arrays along which the values vary. By default it
-        is the field's name, or `sample` if the values are drawn from a distribution.
+        The dimension of the store's arrays; by default the field's name, or `sample` if the values
+        are random.
     count : int
         The number of values.
     how : str
-        The source of the values: `listed`, a spacing of `SPACINGS`, or a distribution of `DRAWS`.
+        `listed`, a spacing of `SPACINGS`, or a distribution of `DRAWS`.
     values : tuple of float or str
-        The listed values, or the parameters of the spacing or distribution. The parameters are both
-        ends of the range, or mean and standard deviation; the distribution `sphere` has none.
+        The listed values, both ends of the range, or mean and standard deviation; none for
+        `sphere`.
     seed : int
-        The seed of the random numbers of a distribution.
+        The seed of a distribution.
     """
 
     field: str
@@ -70,14 +68,11 @@ class Axis:
 
     @property
     def is_choice(self) -> bool:
-        """Return whether the values of the axis are names, for example of programs, not numbers."""
+        """Return whether the values are names instead of numbers."""
         return self.field in CHOICES
 
     def coordinates(self) -> NDArray[Any]:
-        """Return all values of the axis: names, or floats in the unit of the varied quantity.
-
-        The array has shape (count,). The array is cached, so callers must not change it.
-        """
+        """Return all values, shape (count,); cached, so callers must not change them."""
         return _coordinates(self)
 
 
@@ -120,7 +115,7 @@ def _drawn(axis: Axis) -> Floats:
 
 
 def _between(first: float, last: float, made: Callable[[float, float], Floats]) -> Floats:
-    """Return ``made(first, last)``, but without an overflow if `last - first` is not finite."""
+    """Return ``made(first, last)`` without an overflow of `last - first`."""
     if math.isfinite(last - first):
         return made(first, last)
     # Halving and doubling are exact, because numbers of that size are far from underflow.
@@ -130,12 +125,10 @@ def _between(first: float, last: float, made: Callable[[float, float], Floats]) 
 
 
 def axis_of(table: object, number: int) -> Axis:
-    """Return the axis of a sweep's grid that a table [[axis]] of a sweep file describes.
+    """Return the axis of a table [[axis]] of a sweep file.
 
-    A sweep solves a grid of scenes; an axis is a quantity that varies along the grid, with its
-    values. `table` is the table as read from the TOML file. `number` is its number in the file,
-    counted from 1; error messages name it. Raise InputError if a key of the table is missing, or
-    has a value that is not allowed.
+    `number`, from 1, is for messages. Raise InputError if a key is missing or has a value that is
+    not allowed.
     """
     where = f"[[axis]] {number}"
     if not isinstance(table, dict):
@@ -222,12 +215,10 @@ def _refuse(where: str, table: dict[str, Any], chosen: str, keys: Iterable[str])
 
 
 def _checked(where: str, axis: Axis) -> Axis:
-    """Return `axis` unchanged; raise InputError if its extreme values are not allowed.
+    """Return `axis`; raise InputError if its field does not allow the extreme values.
 
-    The field, which is the quantity that varies along the axis, determines the allowed values. The
-    extreme values are the smallest and the largest of the listed or normally distributed values;
-    for other axes they are the ends of the range. The distribution `sphere` is not checked, because
-    it has no parameters. `where` is the beginning of the error message.
+    They are those of listed or normally distributed values, else the ends of the range. `where`
+    begins the message.
     """
     field = number_field(axis.field)
     if axis.how == "sphere":

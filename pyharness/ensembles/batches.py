@@ -1,4 +1,7 @@
-"""Division of the scenes of a sweep into batches, which share a solver and its settings."""
+"""Batches of a sweep's scenes, which are solved in one call with the same settings.
+
+`scene` has the values that do not vary; `own` maps each varied field to its n values.
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -22,13 +25,11 @@ Columns = dict[str, Array]
 
 
 def listing_of(program: str, listing: str, reading: str) -> Listing:
-    """Return the listing of a program that the fields `listing` and `reading` of a sweep describe.
+    """Return the listing that the fields `listing` and `reading` of a sweep describe.
 
-    A listing is a program with a choice of its defects and readings (interpretations of doubtful
-    cards). `listing` is ``original`` (all defects), ``corrected`` (no defect), ``fix:`` followed by
-    the only defects to correct, or ``keep:`` followed by the only defects to keep. `reading` is
-    ``adopted``, or the names of readings to activate that this edition does not adopt. Several
-    names are joined by ``+``. Raise InputError for an unknown name.
+    `listing` is ``original``, ``corrected``, ``fix:`` and the only defects to correct, or ``keep:``
+    and the only ones to keep. `reading` is ``adopted``, or the readings to activate. Names are
+    joined by ``+``. Raise InputError for an unknown one.
     """
     how, _, names = listing.partition(":")
     readings = [] if reading == "adopted" else reading.split("+")
@@ -40,11 +41,7 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 
 
 def looped_fields(sweep: Sweep) -> list[str]:
-    """Return the names of the varied quantities that must be equal in all scenes of a batch.
-
-    A sweep solves a grid of scenes. A batch is a set of scenes that are solved in one call. The
-    function `batches` makes a batch for each combination of the values of these quantities.
-    """
+    """Return the varied fields that must be equal in all scenes of a batch."""
     fields = [axis.field for axis in sweep.axes]
     found = [
         name
@@ -58,11 +55,9 @@ def looped_fields(sweep: Sweep) -> list[str]:
 
 
 def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch]]:
-    """Divide selected scenes of a sweep into batches, each solved in one call, and yield them.
+    """Yield the batches of selected scenes, each with its positions in `where`.
 
-    `where` selects the scenes. It has an array for each dimension of the sweep's grid: the index of
-    every selected scene along this dimension. Each yielded item is a pair: an array of positions,
-    and a batch. The positions are the indices, into the arrays of `where`, of the batch's scenes.
+    `where` has, for each dimension of the grid, the indices of the scenes.
     """
     columns = value_columns(sweep, where)
     looped = looped_fields(sweep)
@@ -116,7 +111,7 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
 
 
 def _law_arrays(scene: Scene, own: Columns, n: int) -> dict[str, Array | None]:
-    """Return the arrays of the terms of a torque law in n scenes; None for a term without an axis.
+    """Return the arrays of a torque law's terms; None for a term without an axis.
 
     A torque that depends on the state has no such terms.
     """
@@ -129,7 +124,7 @@ def _law_arrays(scene: Scene, own: Columns, n: int) -> dict[str, Array | None]:
 
 
 def _attitude(scene: Scene, own: Columns, n: int) -> Array | None:
-    """Return the initial attitudes of n scenes, shape (n, 4), or None if no axis varies them."""
+    """Return the initial attitudes, shape (n, 4), or None if no axis varies them."""
     if not any(name in own for name in ATTITUDE):
         return None
     base = scene.attitude or IDENTITY
@@ -138,7 +133,7 @@ def _attitude(scene: Scene, own: Columns, n: int) -> Array | None:
 
 
 def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | None:
-    """Return the three components of a quantity in n scenes, shape (n, 3), or None."""
+    """Return three components of a quantity, shape (n, 3), or None."""
     fields = [f"{name}.{axis}" for axis in (1, 2, 3)]
     if not any(field in own for field in fields):
         return None
@@ -147,12 +142,9 @@ def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | 
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return the kind of numbers that describe the bodies of n scenes, and these numbers.
+    """Return `moments` (kg m2) or `coefficients` (A, B, C), and the numbers, shape (n, 3).
 
-    The kind is `moments` (of inertia, kg m2) or `coefficients` (A, B, C of Euler's equations). The
-    numbers have the shape (n, 3). `scene` has the values that do not vary between the scenes. `own`
-    maps the name of each varied quantity to its n values. If no axis of the sweep varies the body,
-    the kind is empty and the numbers are None.
+    If no axis varies the body, the result is an empty text and None.
     """
     if scene.coefficients is not None:
         found = _three("body.coefficients", scene.coefficients, own, n)
@@ -195,12 +187,11 @@ def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
 
 
 def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) -> Array:
-    """Return unit vectors, shape (n, 3), given by two angles relative to the body's principal axes.
+    """Return unit vectors (n, 3) by angles relative to the body's principal axes.
 
-    `tilt` (rad) is the angle from the axis of the middle moment of inertia. `azimuth` (rad) is the
-    angle about this axis, from the axis of the least moment towards the axis of the largest.
-    `moments` are the moments of the n bodies, shape (n, 3); if None, all scenes have the body of
-    `scene`.
+    `tilt` (rad) is from the axis of the middle moment, `azimuth` (rad) about it, from the axis of
+    the least moment towards that of the largest. `moments` is (n, 3) or, for the scene's body,
+    None.
     """
     bodies = np.array([scene.moments]) if moments is None else moments
     order = np.broadcast_to(np.argsort(bodies, axis=1, kind="stable"), (len(tilt), 3))
@@ -212,6 +203,6 @@ def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) ->
 
 
 def _on_sphere(height: Array, longitude: Array) -> Array:
-    """Return unit vectors, shape (n, 3), given by their third component and their longitude."""
+    """Return unit vectors (n, 3) by third component and longitude."""
     across = np.sqrt(1.0 - height * height)
     return np.stack([across * np.cos(longitude), across * np.sin(longitude), height], axis=1)

@@ -1,9 +1,8 @@
 """Checksums of the files of a sweep's store, which detect damaged and exchanged files.
 
-A file of checksums is text that `sha256sum --check` reads. Its first line names the version
-of pyharness, the sweep and the part of the store. Each further line has the SHA-256 and the path
-of a file in the store. A file that was exchanged with another one, or that belongs to another
-store, therefore fails the check.
+`sha256sum --check` reads a file of checksums. Its first line names the version of pyharness, the
+sweep and the part of the store, so that an exchanged file fails; the others have SHA-256 and path.
+Below, `folder` is the store's, and `name` a path in it.
 """
 
 import errno
@@ -19,18 +18,11 @@ _PIECE = 1 << 20  # bytes read at once
 
 
 class DamageError(Exception):
-    """The error that a file in a sweep's folder of results differs from what was written.
-
-    The message names the file and the damage.
-    """
+    """A file of a store differs from what was written; the message names both."""
 
 
 class Label(NamedTuple):
-    """The identity of a store, which is the folder with the results of a sweep.
-
-    The identity has the number of the store's format, the version of pyharness that made the store,
-    and the SHA-256 of the sweep.
-    """
+    """The identity of a store: its format, the version of pyharness, the SHA-256 of the sweep."""
 
     schema: object  # number of the store's format; an integer if pyharness wrote the store
     version: str  # of pyharness
@@ -38,28 +30,10 @@ class Label(NamedTuple):
 
 
 def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], limit: int) -> bytes:
-    """Return the content of a file of checksums, computed from the present files of a store.
+    """Return the content of a file of checksums of present files.
 
-    A store is the folder with the results of a sweep. The content is text for ``sha256sum
-    --check``; its first line states `label` and `part`.
-
-    Parameters
-    ----------
-    label : Label
-        The identity of the store.
-    part : str
-        The name of the part of the store to which the files belong, as in "chunk 0/1".
-    folder : Path
-        The folder of the store.
-    names : sequence of str
-        The paths of the files in the store.
-    limit : int
-        The largest size that one of the files can have, in bytes.
-
-    Raises
-    ------
-    DamageError
-        If a file can't be read, is not a regular file, or is larger than `limit`.
+    `part` names their part of the store, as in "chunk 0/1". Raise DamageError if a file can't be
+    read, is not regular, or is larger than `limit` (bytes).
     """
     lines = [
         f"# pyharness sweep store, schema {label.schema}, version {label.version}, "
@@ -72,13 +46,7 @@ def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], l
 def check_files(
     label: Label, part: str, folder: Path, names: Sequence[str], limit: int, checksums: str
 ) -> None:
-    """Raise DamageError if files of a store differ from the checksums that were recorded for them.
-
-    A store is the folder with the results of a sweep. `checksums` is the path of the file of
-    checksums in the store. The other arguments are the same as those of `checksum_text`, which made
-    this file: the store's identity, the part of the store, the folder, the paths of the files, and
-    their largest size (bytes).
-    """
+    """Raise DamageError if files differ from those of `checksum_text` in `checksums`."""
     found = checksum_text(label, part, folder, names, limit)
     known = read_bounded(folder, checksums, 2 * len(found))
     if known != found:
@@ -90,10 +58,7 @@ def check_files(
 
 
 def read_bounded(folder: Path, name: str, limit: int) -> bytes:
-    """Return the content of the file `name` in the folder `folder` of a store (a sweep's results).
-
-    Raise DamageError if the file is missing, is not a regular file, or has more than `limit` bytes.
-    """
+    """Return a file's content; raise DamageError as `_opened`."""
     handle = _opened(folder, name, limit)
     try:
         with open(handle, "rb") as file:
@@ -118,10 +83,9 @@ def _digest(folder: Path, name: str, limit: int) -> str:
 
 
 def _opened(folder: Path, name: str, limit: int) -> int:
-    """Open the file `name` in a store (the folder of a sweep's results), and return its descriptor.
+    """Return a descriptor for reading a file.
 
-    The file descriptor is for reading. Raise DamageError if the file is missing, is a folder, a
-    device or a pipe, or has more than `limit` bytes.
+    Raise DamageError if it is missing, is not regular, or has more than `limit` bytes.
     """
     try:
         # Without O_NONBLOCK, opening a pipe waits for a writer.
@@ -147,10 +111,9 @@ def _opened(folder: Path, name: str, limit: int) -> int:
 
 
 def exists(folder: Path, name: str) -> bool:
-    """Return whether the path `name` exists in `folder`, the folder of a sweep's results.
+    """Return whether a path exists; a link without target does.
 
-    A link without a target counts as existing. Raise DamageError if an error of the file system
-    prevents the test.
+    Raise DamageError if an error of the file system prevents the test.
     """
     try:
         os.lstat(folder / name)
@@ -162,11 +125,9 @@ def exists(folder: Path, name: str) -> bool:
 
 
 def clear(folder: Path, name: str) -> None:
-    """Remove any file or folder at the path `name` in `folder`, so that a file can be written.
+    """Remove anything at a path, and any file in the place of its parents.
 
-    `folder` is the folder of a sweep's results. If a file is in the place of one of the parent
-    folders of `name`, this file is removed too. If a link is at the path, the link is removed, but
-    not its target.
+    A link's target is not removed.
     """
     path = folder
     for part in Path(name).parts[:-1]:
@@ -183,10 +144,7 @@ def clear(folder: Path, name: str) -> None:
 def place_checksums(
     label: Label, part: str, folder: Path, names: Sequence[str], limit: int, checksums: str
 ) -> None:
-    """Write the file `checksums`, for files of a store that were written just now.
-
-    The arguments are those of `check_files`. Raise OSError if one of the files is damaged.
-    """
+    """Write `checksums` of files written just now; raise OSError if one is damaged."""
     try:
         content = checksum_text(label, part, folder, names, limit)
     except DamageError as damage:
@@ -195,11 +153,7 @@ def place_checksums(
 
 
 def _place(folder: Path, name: str, content: bytes) -> None:
-    """Write `content` to the file `name` in `folder`, so that the file is never incomplete.
-
-    `folder` is the folder of a sweep's results. The content is written to a temporary file, which
-    is then renamed.
-    """
+    """Write a file by renaming a temporary one, so that it is never incomplete."""
     path = folder / name
     path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_name(f"{path.name}.{os.urandom(8).hex()}.partial")

@@ -1,4 +1,4 @@
-"""Child processes that do not receive Ctrl-C, and that end when this process ends."""
+"""Child processes that ignore Ctrl-C and end with this process."""
 
 import contextlib
 import multiprocessing
@@ -12,11 +12,10 @@ from multiprocessing import connection, resource_tracker
 
 @contextlib.contextmanager
 def deaf_children() -> Iterator[None]:
-    """Block Ctrl-C (SIGINT) in all processes and threads that are started within this context.
+    """Block Ctrl-C in all processes and threads that are started within this context.
 
-    A terminal sends SIGINT to all of its processes, but only the parent process should react to the
-    signal. The signal is also blocked in the thread that enters the context. If a signal arrives
-    during the context, this thread receives it when the context ends.
+    A terminal sends SIGINT to all its processes, but only the parent should react. The entering
+    thread receives a signal when the context ends.
     """
     # Children inherit the blocking of a signal. The resource tracker is started before, because
     # Python would otherwise start it with the first child, and would then unblock the signal.
@@ -29,7 +28,7 @@ def deaf_children() -> Iterator[None]:
 
 
 def _start_tracker() -> None:
-    """Start Python's resource tracker so that it does not warn about leftover semaphores."""
+    """Start Python's resource tracker; it then warns of no leftover semaphores."""
     warning = "ignore:resource_tracker"
     sys.warnoptions.append(warning)
     try:
@@ -39,10 +38,9 @@ def _start_tracker() -> None:
 
 
 def end_with_parent() -> None:
-    """Start a thread that ends this process as soon as its parent process has ended.
+    """Start a thread that ends this process with its parent, for whatever reason.
 
-    The reason for the end of the parent process does not matter. If this process has no parent
-    process in `multiprocessing`, no thread is started.
+    Without a parent in `multiprocessing`, no thread is started.
     """
     parent = multiprocessing.parent_process()
     if parent is None:

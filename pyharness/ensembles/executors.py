@@ -33,12 +33,10 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(
 
 
 class Engine(NamedTuple):
-    """A started executor: its number of workers, and a function that computes chunks of a sweep.
+    """A started executor.
 
-    An executor is this process, other processes, or a Dask cluster; a chunk is a block of the
-    sweep's grid of scenes. The function `computed` takes a sweep and the numbers of the chunks to
-    compute. As soon as a chunk is completed, the function yields its number and its results. The
-    results are an array for each reduction (quantity to store), by name.
+    `computed` takes a sweep and numbers of chunks, and yields each number with its results, arrays
+    by reduction, when it is completed.
     """
 
     workers: int
@@ -50,14 +48,11 @@ class Engine(NamedTuple):
 def engine(
     executor: str, workers: int | None = None, address: str | None = None
 ) -> Iterator[Engine]:
-    """Start an executor, which computes the parts of a sweep, and yield it as an `Engine`.
+    """Start an executor, and yield it as an `Engine`.
 
-    The executor ends when the context ends. `executor` is ``here`` (this process), ``processes`` or
-    ``dask``. `workers` is the number of processes, by default the number of processors. `address`
-    is the address of a Dask scheduler; without it, the executor `dask` starts a cluster on this
-    machine. Raise InputError if no scheduler with a worker answers at the address. While results
-    are read from the `Engine`, InputError is raised if no process or worker is left to compute
-    them.
+    `executor` is ``here``, ``processes`` or ``dask``; `workers` is by default the number of
+    processors. Without the `address` of a scheduler, `dask` starts a cluster here. Raise InputError
+    if no scheduler with a worker answers, and later, if no worker is left.
     """
     if executor == "here":
         yield Engine(1, _here, is_here=True)
@@ -149,11 +144,7 @@ def _client(workers: int, address: str | None) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
-    """Start a Dask cluster with `workers` processes on this machine, and yield a client of it.
-
-    The cluster ends when the context ends. `dask` is the module `distributed`. Ctrl-C works while
-    the cluster starts.
-    """
+    """Start a Dask cluster here, and yield a client; Ctrl-C works while it starts."""
     started: list[Any] = []
     errors: list[Exception] = []
     wanted = threading.Event()
@@ -191,9 +182,9 @@ def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
 
 
 def _connected(dask: Any, address: str) -> Any:
-    """Return a client of the Dask scheduler at `address`; `dask` is the module `distributed`.
+    """Return a client of the Dask scheduler at `address`.
 
-    Raise InputError if no scheduler answers at this address, or if the scheduler has no worker.
+    Raise InputError if none answers, or if it has no worker.
     """
     found = _ADDRESS.fullmatch(address)
     allowed = "allowed: the address of a Dask scheduler with workers, as in tcp://host:8786"
@@ -218,11 +209,10 @@ def _connected(dask: Any, address: str) -> Any:
 
 
 async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
-    """Wait until the Dask scheduler at `address` has workers; the caller limits the time.
+    """Wait until the Dask scheduler has workers; the caller limits the time.
 
-    Append True to `answered` each time the scheduler answers that it has no workers. The caller can
-    therefore distinguish a scheduler without workers from a server that does not answer. `dask` is
-    the module `distributed`.
+    Each answer without workers appends True to `answered`, which distinguishes it from a server
+    that does not answer.
     """
     # The scheduler is called directly, because a Dask client would wait for half a minute if a
     # server accepts the connection and does not answer.
@@ -233,12 +223,10 @@ async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
 
 
 def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
-    """Yield the number and the results of each chunk as soon as a Dask cluster has computed it.
+    """Yield the number and the results of each chunk from a Dask cluster.
 
-    A chunk is a block of the sweep's grid of scenes. Its results are arrays by the name of the
-    stored quantity. `client` is a client of the cluster, and `chunks` has the numbers of the
-    chunks. More chunks are submitted than there are workers, so that no worker is idle. If a worker
-    dies, Dask computes its chunks again on another worker.
+    More chunks are submitted than there are workers, so that none is idle. If a worker dies, Dask
+    computes its chunks again.
     """
     dask: Any = import_module("distributed")
     n_threads = sum(client.nthreads().values())

@@ -1,4 +1,4 @@
-"""Fields that an axis of a sweep may vary: numbers of a scene or solver, and names of solvers."""
+"""Fields that an axis may vary: numbers of a scene or solver, and names of solvers."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,14 +15,11 @@ CHOICES = {
 
 @dataclass(frozen=True)
 class Field:
-    """A number of a scene, or of its solver, that an axis of a sweep's grid of scenes may vary.
+    """A number of a scene or solver that an axis may vary.
 
-    `units` is the unit of the number and `title` its description. The function `takes` returns
-    whether a value is allowed, and `allowed` describes the allowed values. If `looped` is true, all
-    scenes that one call solves must have the same value of this number. Step size and Lipschitz
-    constant are exceptions if a program of the thesis solves the scenes: one call then accepts a
-    value for each scene, although `looped` is true. If `whole` is true, values are rounded to
-    integers.
+    `takes` returns whether a value is allowed, and `allowed` describes these. If `looped`, all
+    scenes of a call must share the value, except step size and Lipschitz constant of the thesis's
+    programs. If `whole`, values are rounded to integers.
     """
 
     units: str
@@ -102,19 +99,17 @@ RIVALS = (
 
 
 def field_names() -> list[str]:
-    """Return the names of the quantities of a scene or solver that an axis of a sweep may vary.
+    """Return the fields that an axis may vary, without the constants of expressions.
 
-    The constants of the expressions of a torque are not among them, because every scene has its
-    own.
+    Every scene has its own constants.
     """
     return [*NUMBERS, *CHOICES]
 
 
 def number_field(name: str) -> Field:
-    """Return the field with the given name, whose values are numbers.
+    """Return a field of numbers: a key of `NUMBERS`, or as in ``torque.constants.k``.
 
-    The name is a key of `NUMBERS`, or that of a constant of a torque, as in
-    ``torque.constants.k``. Raise KeyError for any other name.
+    Raise KeyError for any other name.
     """
     if name.startswith(CONSTANTS):
         return Field("", "constant of the torque's expressions", looped=True)
@@ -122,8 +117,5 @@ def number_field(name: str) -> Field:
 
 
 def units_of(field: str) -> str:
-    """Return the unit of a field, which is a quantity that a sweep may vary.
-
-    The result is an empty string if the values of the field are names, for example of programs.
-    """
+    """Return the unit of a field; empty if its values are names."""
     return NUMBERS[field].units if field in NUMBERS else ""

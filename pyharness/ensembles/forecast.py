@@ -1,4 +1,4 @@
-"""Forecast of a sweep's duration, from measurements with a sample of its scenes and files."""
+"""Forecast of a sweep's duration, from a sample of its scenes and files."""
 
 import math
 import time
@@ -30,12 +30,10 @@ _FILES = 20  # largest number of chunks that are solved, or written and read, fo
 
 @dataclass(frozen=True)
 class Estimate:
-    """The estimated cost of computing the missing chunks of a sweep.
+    """The estimated cost of a sweep's missing chunks.
 
-    A chunk is a block of the sweep's grid of scenes. `n_scenes` and `n_chunks` count the scenes and
-    chunks of the whole sweep, and `n_missing` the chunks to compute. `n_bytes` is the size of the
-    missing chunks on disk, before compression. `memory` is the memory that all workers need
-    together, in bytes. `seconds` is the estimated duration (s).
+    `n_bytes` is their size before compression; `memory` (bytes) is for all workers together.
+    `n_scenes` and `n_chunks` count the whole sweep.
     """
 
     n_scenes: int
@@ -47,12 +45,9 @@ class Estimate:
 
 
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
-    """Return the seconds to solve and write the missing chunks of a sweep, and to read all chunks.
+    """Return the seconds to solve and write the missing chunks, and to read all.
 
-    A chunk is a block of the sweep's grid of scenes. `path` is the folder of the results,
-    `n_missing` the number of chunks that it lacks, and `own` the started executor that computes
-    them. If other processes compute the chunks, this process writes them at the same time. In this
-    case only the longer of the times to solve and to write counts.
+    If other processes compute, only the longer of the times to solve and to write counts.
     """
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
@@ -61,10 +56,9 @@ def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
 
 
 def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
-    """Return the mean seconds to write and to read the files of one chunk (block) of a sweep.
+    """Return the mean seconds to write and to read a chunk's files, beside `path`.
 
-    The measurement uses a temporary folder beside `path`, the folder of the sweep's results. Both
-    times are 0 if the files can't be written; the sweep itself then reports the error.
+    Both are 0 if files can't be written; the sweep itself then reports the error.
     """
     times = []
     try:
@@ -87,11 +81,9 @@ def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
 
 
 def _pattern(sweep: Sweep, chunk: int) -> Arrays:
-    """Return arrays like the results of the chunk with the number `chunk`, but with random values.
+    """Return arrays like a chunk's results, but random.
 
-    A chunk is a block of the sweep's grid of scenes. The arrays serve to measure the time to write
-    a chunk. Equal values would be compressed to almost nothing, so that the measured time would be
-    too short. The number of the chunk is the seed of the random values.
+    Equal values would be compressed to almost nothing, and written too fast.
     """
     draw = np.random.default_rng(chunk)
     shape = tuple(part.stop - part.start for part in sweep.box(chunk))
@@ -105,10 +97,9 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def seconds_per_chunk(sweep: Sweep) -> float:
-    """Return the seconds to solve a chunk, which is a block of a sweep's grid, in this process.
+    """Return the seconds to solve a chunk in this process.
 
-    The seconds are computed from the measured time of sample scenes. If the result is below 0.2 s,
-    the time of whole chunks is measured instead.
+    They follow from sample scenes or, below 0.2 s, from whole chunks.
     """
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)
@@ -126,10 +117,7 @@ def seconds_per_chunk(sweep: Sweep) -> float:
 
 
 def seconds_per_scene(sweep: Sweep) -> float:
-    """Return the mean seconds to solve a scene of a sweep in this process.
-
-    The time is measured on samples of scenes that are evenly spread over the sweep's grid.
-    """
+    """Return the mean seconds to solve a scene, from samples spread over the grid."""
     seconds = math.nan
     # This call is not timed, because it imports the solver's modules.
     solve_points(sweep, spread(sweep, 1))
@@ -146,13 +134,10 @@ def seconds_per_scene(sweep: Sweep) -> float:
 
 
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
-    """Return the indices of sampled scenes, changed so that many of the scenes share a batch.
+    """Return the indices of sampled scenes, changed so that many share a batch.
 
-    A batch is a set of scenes that are solved in one call, and that must have the same index along
-    some dimensions of the grid. `where` has the indices of the scenes: an array for each dimension,
-    as the result. Along those dimensions the indices are changed to a few distinct values: five, or
-    more if the batches of a chunk have so few scenes. The batches of the sample then have about as
-    many scenes as in a real computation.
+    Along dimensions that a batch does not mix, they have five distinct values, or more if the
+    batches of a chunk are so small; the sample's batches are then about as large as real ones.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found, scenes = [], math.prod(sweep.chunk_shape)
@@ -169,7 +154,7 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
 
 
 def format_estimate(estimate: Estimate) -> str:
-    """Return the estimated cost of a sweep as a line of text: time, disk space and memory."""
+    """Return time, disk space and memory as a line of text."""
     missing = estimate.n_missing
     rest = "" if missing == estimate.n_chunks else f", {short_count(missing)} of them missing"
     return (
@@ -180,7 +165,7 @@ def format_estimate(estimate: Estimate) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Return a duration as text, in seconds, minutes, hours or days."""
+    """Return a duration as text, in seconds to days."""
     for limit, unit, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min"), (172800.0, 3600.0, "h")):
         if seconds < limit:
             return (
@@ -192,12 +177,12 @@ def duration(seconds: float) -> str:
 
 
 def short_count(number: int) -> str:
-    """Return a count as text: exactly below ten million, and with four significant digits above."""
+    """Return a count as text, with four digits from ten million on."""
     return str(number) if number < 10**7 else f"{float(number):.4g}"
 
 
 def byte_count(number: float) -> str:
-    """Return a number of bytes as text with three significant digits and a unit, as in 1.25 MB."""
+    """Return a number of bytes as text, as in 1.25 MB."""
     for unit in ("bytes", "kB", "MB", "GB", "TB"):
         if number < 1000.0:
             return f"{number:.3g} {unit}"

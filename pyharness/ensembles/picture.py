@@ -1,6 +1,6 @@
-"""The picture of a sweep: a stored quantity over one or two dimensions of the grid, in panels.
+"""The picture of a sweep: a reduction over one or two dimensions, in panels.
 
-Each panel is for other values along the remaining dimensions of the grid.
+Each panel is for other values along the remaining dimensions.
 """
 
 import itertools
@@ -30,12 +30,9 @@ _ORDERS = 3.0
 
 
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
-    """Return the reduction (quantity stored for each scene) of a sweep that the picture shows.
+    """Return the reduction `name`, by default the first one without codes of outcomes.
 
-    The picture shows the reduction `name`. If `name` is None, the picture shows the first reduction
-    whose values are not codes of outcomes, as those of `status` are. If all reductions have such
-    codes, the picture shows the first reduction. Raise InputError if the sweep has no reduction
-    `name`.
+    If all have codes, it is the first. Raise InputError for an unknown name.
     """
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
@@ -45,11 +42,10 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 
 
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
-    """Return the picture of the reduction `asked`, a quantity stored for each scene of a sweep.
+    """Return the picture of a reduction.
 
-    `store` has the values. The picture is a map over two dimensions of the sweep's grid. These are
-    the last two dimensions that have several values, all of them numbers and not random. If there
-    are fewer than two such dimensions, the picture is a line or dots.
+    It is a map over the last two dimensions with several values, all numbers and not random; with
+    fewer such dimensions a line or dots.
     """
     from matplotlib.figure import Figure
 
@@ -100,13 +96,9 @@ Panel = tuple[str, list[Array], Array]
 def _panels(
     store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], shown: list[str]
 ) -> list[Panel]:
-    """Return the title, the indices and the values of each panel of the picture of a reduction.
+    """Return title, indices and values of each panel over the dimensions `shown`.
 
-    `asked` is the reduction, a quantity stored for each scene of a sweep. `shown` names the
-    dimensions of the sweep's grid that each panel shows, and `axis_of` has an axis for every
-    dimension. The title states the panel's values along the remaining dimensions, and the component
-    of the reduction. The indices, an array for each dimension in `shown`, tell which values along
-    this dimension are drawn.
+    The title states the values along the others, and the component.
     """
     reduction = REDUCTIONS[asked.reduction]
     most = _MOST_PLACES if len(shown) == 2 else _MOST_DOTS

@@ -1,4 +1,4 @@
-"""Reading and checking of the reductions (quantities to store) that a sweep file requests."""
+"""Reading and checking of the reductions that a sweep file requests."""
 
 import math
 from collections.abc import Mapping
@@ -14,12 +14,10 @@ _MOST_SAMPLES = 10_000
 
 
 def reduction_spec_of(entry: object, claims: Mapping[str, str]) -> ReductionSpec:
-    """Return the reduction that an entry of the list `reductions` of a sweep file requests.
+    """Return the reduction of an entry: a name, or a table with name and parameters.
 
-    A reduction is a quantity that the sweep stores for each scene. The entry is a name, or a table
-    with a name and parameters. `claims` maps the identifier of each claim of the thesis to the name
-    of the function that checks the claim, as in ``package.module:name``. Raise InputError if the
-    entry has an unknown name or a value that is not allowed.
+    `claims` maps each claim to the function that checks it, as in ``package.module:name``. Raise
+    InputError for an unknown name or a value that is not allowed.
     """
     table = {"name": entry} if isinstance(entry, str) else entry
     if not isinstance(table, dict) or "name" not in table:

@@ -1,4 +1,4 @@
-"""Reductions: the quantities that a sweep can store for each scene, and their computation."""
+"""Reductions: the quantities that a sweep can store for each scene."""
 
 import importlib
 from collections.abc import Callable, Iterable, Mapping
@@ -29,29 +29,27 @@ _NOT_YET = -1
 
 @dataclass(frozen=True)
 class Reduction:
-    """A quantity that a sweep can store for each scene of its grid, and the way to compute it.
+    """A quantity that a sweep can store for each scene, and its computation.
 
     Attributes
     ----------
     title, units : str
-        The description of the quantity in words, and its unit.
+        Description and unit.
     compute : callable
-        A function of a batch of n scenes, and of the parameters by name. It returns an array of n
-        values or, if `labels` is not empty, of n rows with a value for each label.
+        A function of a batch of n scenes and of the parameters by name. It returns n values, or n
+        rows with a value for each label.
     dtype : str
-        The NumPy type of the array. NaN, or -1 in an integer array, marks values not computed yet.
-    labels : tuple of str
-        The labels of the values if each scene has several values, else empty.
-    dimension : str
-        The name of the last dimension of the array, along which `labels` run; empty without labels.
+        The NumPy type. NaN, or -1 in an integer array, marks values not computed yet.
+    labels, dimension : tuple of str, str
+        The labels of several values, and the name of their dimension, the last one; else empty.
     only : str
-        `program` or `method` if only one of these solvers can compute the quantity, else empty.
+        `program` or `method` if only one of these can compute the quantity, else empty.
     needs : tuple of str
-        The requirements on the scene and the method: `moments`, `no torque` or `attitude`.
+        Requirements: `moments`, `no torque` or `attitude`.
     parameters : mapping
-        The names of the parameters, with their default values.
+        The parameters with their defaults.
     flags : mapping
-        The meaning of each value, if the values are integers that represent outcomes.
+        The meaning of each value, if they are codes of outcomes.
     """
 
     title: str
@@ -67,7 +65,7 @@ class Reduction:
 
     @property
     def fill(self) -> Any:
-        """Return the value that marks a result not computed yet: NaN, or -1 in an integer array."""
+        """Return the value not computed yet: NaN, or -1 in an integer array."""
         return np.nan if self.dtype == "f8" else _NOT_YET
 
 
@@ -285,28 +283,19 @@ REDUCTIONS = {
 
 
 def needs_attitudes(asked: Iterable[ReductionSpec]) -> bool:
-    """Return whether any of these reductions, quantities to store, needs attitudes."""
+    """Return whether any of these reductions needs attitudes."""
     return any("attitude" in REDUCTIONS[each.reduction].needs for each in asked)
 
 
 def empty(asked: ReductionSpec, n: int) -> Found:
-    """Return an array for the values of a reduction in n scenes, with all values marked missing.
-
-    A reduction is a quantity that a sweep stores for each scene; `asked` is the requested one.
-    Missing values are NaN, or -1 in an integer array. The shape is (n,), or (n, components) if the
-    quantity has several components.
-    """
+    """Return an array of missing values, shape (n,) or (n, components)."""
     reduction = REDUCTIONS[asked.reduction]
     shape = (n, len(reduction.labels)) if reduction.labels else (n,)
     return np.full(shape, reduction.fill, dtype=reduction.dtype)
 
 
 def reduced(asked: ReductionSpec, batch: Batch) -> Found:
-    """Compute the reduction `asked`, a quantity to store, for each scene of a batch.
-
-    A batch is a set of scenes that are solved in one call. Return an array with a row for each
-    scene. A row is a single value if the quantity has only one component.
-    """
+    """Return a reduction of a batch, a row or a value for each scene."""
     given = {**dict(asked.parameters), "function": asked.function}
     # NumPy's warnings are suppressed, because infinities and NaN are valid results.
     with np.errstate(all="ignore"):

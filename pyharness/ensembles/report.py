@@ -1,4 +1,4 @@
-"""The report of `sweep`: the axes of its grid, and statistics of the stored quantities."""
+"""The report of `sweep`: the axes, and statistics of the stored quantities."""
 
 from collections import Counter
 from typing import Any, NamedTuple
@@ -27,12 +27,10 @@ _FLAGS = (*words("reduction value"), Column("scenes"))
 
 
 class Found(NamedTuple):
-    """Statistics of one component of a reduction, a quantity stored for each scene of a sweep.
+    """Statistics of a reduction's component, in `units`.
 
-    `name` is the name of the reduction, and `label` the name of the component. The label is empty
-    if the reduction has only one component. `scenes` counts the scenes with a finite value, and
-    `none` the scenes without one. `least`, `mean` and `largest` are of the finite values, in
-    `units`; they are None if no value is finite.
+    `scenes` counts those with a finite value, and `none` the others. `least`, `mean` and `largest`
+    are None if no value is finite.
     """
 
     name: str
@@ -46,12 +44,9 @@ class Found(NamedTuple):
 
 
 def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
-    """Return statistics of a stored quantity, for each component, and counts of its integer values.
+    """Return statistics of a reduction's components, or counts of its codes of outcomes.
 
-    `asked` is the quantity, and `store` has its values. The statistics are over all scenes of a
-    sweep. If the values are integers that represent outcomes, as for `status`, the statistics are
-    empty, and the counts have the number of scenes with each integer. For other quantities the
-    counts are empty. The values are read in blocks.
+    The other one is empty. Values are read in blocks.
     """
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)
@@ -88,11 +83,7 @@ def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[in
 
 
 def sweep_report(store: Store, outcome: Outcome, path: str) -> Report:
-    """Return the report of a sweep: its axes, statistics of its results, and the work of this run.
-
-    `outcome` counts the chunks (blocks of the sweep's grid) that this run computed or repaired, and
-    has its duration. `store` has the results; `path` is its folder.
-    """
+    """Return the report of a sweep: axes, statistics, and the work of this run."""
     sweep = store.sweep
     found: list[Found] = []
     flags: list[tuple[str, str, int]] = []

@@ -1,4 +1,4 @@
-"""Functions that run a sweep: check its size, forecast its duration, compute missing chunks."""
+"""Functions that run a sweep: check its size, forecast, compute missing chunks."""
 
 import contextlib
 import math
@@ -24,12 +24,10 @@ _MOST_CHUNKS = 1_000_000
 
 @dataclass(frozen=True)
 class Outcome:
-    """The numbers of chunks that one run of a sweep computed, and its duration.
+    """The chunks that one run of a sweep computed, in `seconds`.
 
-    A chunk is a block of the sweep's grid of scenes. `estimate` is the forecast of the cost, or
-    None if no chunk was missing. `before` counts the chunks that had been computed before the run.
-    `computed` counts the chunks that the run computed, which took `seconds` (s). `repaired` counts
-    those computed chunks whose files had been damaged.
+    `estimate` is None if no chunk was missing, `before` counts those of earlier runs. `repaired`
+    counts the computed chunks that had been damaged.
     """
 
     estimate: Estimate | None
@@ -40,24 +38,22 @@ class Outcome:
 
 
 def bytes_per_scene(sweep: Sweep) -> int:
-    """Return the size in bytes of the results that a sweep stores for one scene, uncompressed."""
+    """Return the uncompressed bytes of the results of one scene."""
     return sum(empty(asked, 1).nbytes for asked in sweep.reductions)
 
 
 def _bytes_per_chunk(sweep: Sweep, block: int) -> int:
-    """Return the bytes of a chunk's files, which fill whole blocks, with its checksums."""
+    """Return the bytes of a chunk's files with checksums, in whole blocks."""
     scenes = math.prod(sweep.chunk_shape)
     sizes = [empty(asked, 1).nbytes * scenes for asked in sweep.reductions]
     return block * sum(-(-size // block) for size in (*sizes, 1))
 
 
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
-    """Return the bytes that the missing chunks need on disk, and the memory (bytes) of all workers.
+    """Return the bytes of the missing chunks on disk, and of all workers in memory.
 
-    A chunk is a block of the sweep's grid of scenes. `missing` is the number of missing chunks,
-    `path` the folder of the results, and `workers` the number of processes. Raise InputError if the
-    disk or half of the machine's memory is too small, or if there are too many chunks.
-    The check allocates no arrays, so that it takes no noticeable time even for the largest grid.
+    Raise InputError if the disk or half of the memory is too small, or if there are too many
+    chunks. Nothing is allocated.
     """
     disk = os.statvfs(Path(path).absolute().parent)
     n_bytes = missing * _bytes_per_chunk(sweep, disk.f_frsize)
@@ -109,11 +105,9 @@ def swept(
     progress: bool | Progress = False,
     repair: bool = False,
 ) -> Iterator[tuple[Store, Outcome]]:
-    """Compute the missing chunks of a sweep, and yield the open store and the outcome of the run.
+    """Compute the missing chunks as `run_sweep`, and yield the open store and the outcome.
 
-    A chunk is a block of the sweep's grid, and the store is the folder of the results. The
-    parameters and errors are the same as those of `run_sweep`. Until the context ends, the store is
-    locked against other processes.
+    The store is locked until the context ends.
     """
     is_there = check_store(sweep, path)
     check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)
@@ -143,39 +137,33 @@ def run_sweep(
     progress: bool | Progress = False,
     repair: bool = False,
 ) -> Outcome:
-    """Compute the chunks of a sweep that its store does not have yet, and return the outcome.
-
-    A chunk is a block of the sweep's grid of scenes, and the store is the folder of the results.
+    """Compute the chunks of a sweep that its store lacks, and return the outcome.
 
     Parameters
     ----------
     sweep : Sweep
         The sweep, as `read_sweep` returns it.
     path : str
-        The path of the store, a folder, which is made if it is missing.
+        The store, a folder, which is made if it is missing.
     executor : {"here", "processes", "dask"}
-        The executor: this process, other processes on this machine, or a Dask cluster.
+        This process, other processes on this machine, or a Dask cluster.
     workers : int, optional
         The number of processes; by default the number of processors.
     address : str, optional
-        The address of a Dask scheduler, as in ``tcp://host:8786``, for the executor `dask`. By
-        default this executor starts a cluster on this machine.
+        A Dask scheduler, as in ``tcp://host:8786``; by default `dask` starts a cluster here.
     before : callable
-        A function that is called with the forecast before anything is computed.
+        It is called with the forecast before anything is computed.
     progress : bool or callable
-        True for a progress bar, in a terminal or in a notebook; or a function that is called after
-        each chunk with the number of computed chunks, the number of chunks to compute, and the text
-        "chunks".
+        True for a progress bar; or a function that is called after each chunk with the number of
+        computed chunks, the number to compute, and the text "chunks".
     repair : bool
-        Whether to compute damaged chunks again, and to write damaged metadata again, instead of
-        raising an error.
+        Whether to compute or write damaged chunks and metadata again, instead of raising an error.
 
     Raises
     ------
     InputError
-        If the store belongs to another sweep or is damaged, if the cluster does not answer, or if
-        the disk or the memory can't hold the sweep. Chunks that were computed before the error stay
-        in the store, and the next call computes the remaining chunks.
+        If the store belongs to another sweep or is damaged, the cluster does not answer, or disk or
+        memory can't hold the sweep. Computed chunks stay, and the next call computes the rest.
     """
     with swept(sweep, path, executor, workers, address, before, progress, repair) as (_, outcome):
         return outcome

@@ -1,6 +1,6 @@
-"""Torques of a sweep that depend on the state: their constants, and terms with the body's inertia.
+"""Torques of a sweep that depend on the state.
 
-A scene whose torque depends on the state is read again from its text, with other numbers.
+Their scene is read again from its text, with other numbers.
 """
 
 import tomllib
@@ -17,10 +17,10 @@ from pyharness.model.state_torque import StateTorque
 
 
 def check_state_axis(scene: Scene, field: str) -> None:
-    """Raise InputError if the scene of a sweep has no torque with the field of an axis.
+    """Raise InputError if the scene's torque lacks the field of an axis.
 
-    A torque that depends on the state has neither the constant nor the linear term of a torque law.
-    Only expressions have constants with names.
+    Such a torque has neither constant nor linear term of a law; only expressions have named
+    constants.
     """
     torque = scene.torque
     if isinstance(torque, StateTorque):
@@ -42,11 +42,7 @@ def check_state_axis(scene: Scene, field: str) -> None:
 
 
 def check_state_solver(scene: Scene, methods: Sequence[str], has_program: bool) -> None:
-    """Raise InputError if a solver of a sweep can't solve its scene because of the torque.
-
-    `methods` are the names of all methods that the sweep uses. The programs of the thesis, which
-    the sweep uses if `has_program` is true, take no torque that depends on the state.
-    """
+    """Raise InputError if a method, or a program, can't solve the scene's torque."""
     if not isinstance(scene.torque, StateTorque):
         return
     if has_program:
@@ -60,10 +56,7 @@ def check_state_solver(scene: Scene, methods: Sequence[str], has_program: bool) 
 
 
 def follows_body(scene: Scene) -> bool:
-    """Return whether the torque of a scene has a ready term with the inertia of the scene's body.
-
-    If the sweep varies the body, the inertia of the term is that of the varied body.
-    """
+    """Return whether the torque has a ready term with the body's inertia, which may vary."""
     return isinstance(scene.torque, StateTorque) and any(
         _is_of_body(dict(term), scene) for term in _terms(scene.torque)
     )
@@ -72,11 +65,9 @@ def follows_body(scene: Scene) -> bool:
 def with_numbers(
     scene: Scene, constants: Mapping[str, float], moments: Sequence[float] | None
 ) -> Scene:
-    """Return a scene of a sweep whose torque has other constants or another body's inertia.
+    """Return the scene with other constants of expressions, or other moments (kg m2).
 
-    `constants` maps names of the constants in the expressions of the torque to new values, and
-    `moments` (kg m2) are those of the new body, or None. Raise InputError if a value is not
-    allowed, for example because a constant is divided by 0.
+    Raise InputError if a value is not allowed, for example because a constant is divided by 0.
     """
     data: dict[str, Any] = tomllib.loads(scene_text(scene))
     if constants:

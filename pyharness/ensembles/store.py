@@ -1,9 +1,8 @@
 """The store of a sweep: a Zarr group in a folder, with one array for each reduction.
 
 Each chunk of the grid has one file for each array, and a file with the checksums of these files,
-which is written last. Every file is written under a temporary name and then renamed. A chunk with a
-file of checksums is therefore complete, even if the process was killed at any time. The checksums
-show whether the files were changed after they were written.
+which is written last. Every file is written under a temporary name and renamed, so that a chunk
+with checksums is complete, even if the process was killed.
 """
 
 import contextlib
@@ -44,27 +43,18 @@ _REPAIR = "'pyharness sweep' with --repair"
 
 
 def check_zarr() -> None:
-    """Raise InputError if the package Zarr, which stores the results of sweeps, is missing."""
+    """Raise InputError if the package Zarr is missing."""
     check_package("zarr", "sweep", install_command("sweep"))
 
 
 class Store:
-    """The open store (result folder) of one sweep; the context manager `opened` makes it.
+    """The open store of one sweep, made by `opened`.
 
-    A store has a Zarr array for each reduction, which is a quantity that is stored for each scene.
-
-    Attributes
-    ----------
-    sweep : Sweep
-        The sweep whose results the store contains.
-    folder : Path
-        The folder of the store.
-    repaired : int
-        The number of damaged chunks that were removed when the store was opened.
+    `repaired` counts damaged chunks that were removed when it was opened.
     """
 
     def __init__(self, sweep: Sweep, folder: Path) -> None:
-        """Open the arrays of results in `folder`, the existing folder of a sweep's results."""
+        """Open the arrays in an existing folder."""
         import zarr
 
         self.sweep, self.folder, self.repaired = sweep, folder, 0
@@ -78,10 +68,9 @@ class Store:
         self._done = [False] * sweep.n_chunks
 
     def check(self, repair: bool = False) -> None:
-        """Find the complete chunks of the store, and compare their files with their checksums.
+        """Compare the complete chunks with their checksums.
 
-        A chunk is a block of the sweep's grid of scenes. Raise InputError if a chunk is damaged.
-        With `repair`, remove the files of damaged chunks instead, so that they are computed again.
+        Raise InputError for a damaged chunk, or with `repair` remove its files.
         """
         damages = {}
         for chunk in range(self.sweep.n_chunks):
@@ -105,14 +94,13 @@ class Store:
         self.repaired = len(damages)
 
     def done(self) -> list[bool]:
-        """Return for each chunk (block of the sweep's grid) whether its results are complete."""
+        """Return for each chunk whether it is complete."""
         return list(self._done)
 
     def write(self, chunk: int, found: Arrays) -> None:
-        """Write the results of a chunk (block of the sweep's grid), and checksums of the files.
+        """Write a chunk's results and checksums.
 
-        `chunk` is the number of the chunk. `found` has an array for each stored quantity by its
-        name. Raise OSError if one of the files can't be written; the chunk then remains incomplete.
+        Raise OSError if a file can't be written; the chunk remains incomplete.
         """
         for name, array in self._arrays.items():
             array[self.sweep.box(chunk)] = found[name]
@@ -120,24 +108,15 @@ class Store:
         self._done[chunk] = True
 
     def read(self, name: str, chunk: int) -> Any:
-        """Return the values of the stored quantity `name` in a chunk, a block of the sweep's grid.
-
-        `chunk` is the number of the chunk.
-        """
+        """Return the values of a reduction in a chunk."""
         return self._arrays[name][self.sweep.box(chunk)]
 
     def array(self, name: str) -> Any:
-        """Return the Zarr array of the stored quantity `name`, without reading its values yet.
-
-        An index into the array reads only the indexed part.
-        """
+        """Return the Zarr array of a reduction; indexing reads only a part."""
         return self._arrays[name]
 
     def _is_done(self, chunk: int) -> bool:
-        """Return whether the results of a chunk (block of the sweep's grid) are complete.
-
-        Raise DamageError if the files of the chunk are damaged.
-        """
+        """Return whether a chunk is complete; raise DamageError if damaged."""
         checksums = self._checksums(chunk)
         if exists(self.folder, checksums):
             check_files(*self._described(chunk), checksums)
@@ -166,12 +145,10 @@ class Store:
 
 @contextlib.contextmanager
 def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
-    """Make or open the store (result folder) of a sweep, lock it, check it, and yield it.
+    """Make or open a sweep's store, lock it against other processes, check it, and yield it.
 
-    The lock excludes other processes. Raise InputError if the folder `path` is the store of another
-    sweep, is no store, or is a damaged store; its files are then not changed. With `repair`, damage
-    is not an error: damaged chunks (blocks of the results) are removed and count as not computed
-    yet, and damaged metadata are written again.
+    Raise InputError, without changing files, if `path` is another sweep's store, no store, or
+    damaged. With `repair`, damaged chunks are removed and damaged metadata written again.
     """
     check_zarr()
     folder = Path(path)
@@ -203,10 +180,9 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
 
 
 def check_store(sweep: Sweep, path: str) -> bool:
-    """Return whether the folder `path` has the results of this sweep.
+    """Return whether `path` has the results of this sweep; False if missing or empty.
 
-    Return False if the folder is missing or empty. Raise InputError if `path` is any other file or
-    folder, or if no folder can be made at this path.
+    Raise InputError for any other file or folder, or if no folder can be made.
     """
     folder = Path(path)
     if not path or "\0" in path:
@@ -249,10 +225,7 @@ def check_store(sweep: Sweep, path: str) -> bool:
 
 
 def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
-    """Compare the metadata in `folder`, the folder of a sweep's results, with their checksums.
-
-    If they differ, raise InputError or, with `repair`, write the metadata of `sweep` again.
-    """
+    """Compare the metadata with their checksums; raise InputError, or rewrite to repair."""
     files = metadata_files(sweep)
     try:
         check_files(label(sweep), "metadata", folder, files, LARGEST_METADATA, METADATA)
@@ -269,10 +242,9 @@ def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
 
 
 def _make(sweep: Sweep, folder: Path) -> None:
-    """Make a folder for the results of a sweep under a temporary name, and rename it to `folder`.
+    """Make an empty store under a temporary name, and rename it.
 
-    Because of the renaming, `folder` is at any time either missing, or has all metadata of the
-    sweep. The folder has no results yet.
+    `folder` is thus always missing or has all metadata.
     """
     with filled(sweep, folder) as new:
         try:
@@ -287,10 +259,6 @@ def _make(sweep: Sweep, folder: Path) -> None:
 
 @contextlib.contextmanager
 def scratch(sweep: Sweep, path: str) -> Iterator[Store]:
-    """Yield a temporary store (result folder) of a sweep, without results.
-
-    The temporary store serves to measure the speed of the disk. It is in the folder that contains
-    `path`, and is removed when the context ends.
-    """
+    """Yield a temporary store beside `path`, to measure the disk."""
     with filled(sweep, Path(path)) as new:
         yield Store(sweep, new)

@@ -1,4 +1,4 @@
-"""The layout of a sweep's store: its arrays, their metadata, and the identity of the store."""
+"""The layout of a sweep's store: its arrays, their metadata, and its identity."""
 
 import contextlib
 import json
@@ -32,20 +32,14 @@ _HEAD = re.compile(
 
 
 def label(sweep: Sweep) -> Label:
-    """Return the identity of the store (result folder) that this pyharness makes for a sweep.
-
-    The identity has the number of the store's format, the version of pyharness, and the SHA-256 of
-    the sweep.
-    """
+    """Return the identity of the store that this pyharness makes."""
     return Label(SCHEMAS["sweep store"], version(), sweep.fingerprint)
 
 
 def labels(folder: Path) -> list[Label]:
-    """Return the identities that two files in `folder`, a folder of a sweep's results, state.
+    """Return the identities in a store's metadata and in their checksums.
 
-    An identity is the format, the pyharness version and the SHA-256 of the sweep. One identity is
-    in the metadata, and the other in the first line of the file with the checksums of the metadata.
-    An identity that can't be read is left out. In an undamaged folder the two identities are equal.
+    One that can't be read is left out. In an undamaged store both are equal.
     """
     found = []
     with contextlib.suppress(
@@ -64,11 +58,7 @@ def labels(folder: Path) -> list[Label]:
 
 
 def metadata_files(sweep: Sweep) -> list[str]:
-    """Return the paths of the files, in the folder of a sweep's results, that have no results.
-
-    These files contain the metadata, the values of the axes, and the names of the components of
-    stored quantities.
-    """
+    """Return the paths of the files without results: metadata, axes and labels."""
     labels = {
         reduction.dimension
         for reduction in (REDUCTIONS[asked.reduction] for asked in sweep.reductions)
@@ -84,10 +74,9 @@ def metadata_files(sweep: Sweep) -> list[str]:
 
 @contextlib.contextmanager
 def filled(sweep: Sweep, folder: Path) -> Iterator[Path]:
-    """Make a store (result folder of a sweep) without results, and yield its temporary path.
+    """Make an empty store beside `folder`, and yield its temporary path.
 
-    The temporary folder is next to `folder`. When the context ends, all files of the temporary
-    folder that the caller has not moved are removed.
+    Files that the caller has not moved are removed in the end.
     """
     new = folder.absolute().with_name(f".pyharness-{os.urandom(8).hex()}-new")
     try:
@@ -180,9 +169,6 @@ def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> Non
 
 
 def largest_chunk(sweep: Sweep) -> int:
-    """Return an upper bound (bytes) of the size of any file of a chunk, compressed or not.
-
-    A chunk is a block of the sweep's grid of scenes; it has a file for each stored quantity.
-    """
+    """Return an upper bound (bytes) of any file of a chunk."""
     scenes = math.prod(sweep.chunk_shape)
     return 65536 + 2 * scenes * max(empty(asked, 1).nbytes for asked in sweep.reductions)

@@ -1,4 +1,4 @@
-"""Reading and checking of sweep files, which are TOML files that describe sweeps."""
+"""Reading and checking of sweep files in TOML."""
 
 import hashlib
 import itertools
@@ -45,23 +45,12 @@ _WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
 
 
 def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = None) -> Sweep:
-    """Return the sweep (a grid of scenes to solve) that a TOML file describes.
+    """Return the sweep that a TOML file describes.
 
-    Parameters
-    ----------
-    path : path
-        The path of the sweep file. If it names a scene file, the scene file's path is relative to
-        the folder of the sweep file.
-    claims : mapping, optional
-        The name of the function that checks each claim, as in ``package.module:name``, by the
-        claim's identifier. The function takes a `Batch` of n scenes, and returns an integer for
-        each scene. It is 1 if the claim holds, 0 if it fails, 2 if it does not apply to the scene,
-        and 3 if it holds in part.
-
-    Raises
-    ------
-    InputError
-        If the file can't be read, or does not describe a sweep.
+    A scene file's path is relative to the sweep file. `claims` maps each claim to the function that
+    checks it, as in ``package.module:name``: for a `Batch` of n scenes it returns 1 where the claim
+    holds, 0 fails, 2 does not apply, 3 holds in part. Raise InputError if the file can't be read or
+    does not describe a sweep.
     """
     path = os.fsdecode(path)
     where = f"sweep file '{path}'"
@@ -104,11 +93,10 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, str
 
 
 def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
-    """Return the scene from which all scenes of a sweep are made, and the bytes of its scene file.
+    """Return the scene of the table [scene], and the bytes of its scene file.
 
-    `table` is the table [scene] of the sweep file, and `path` the path of the sweep file. The bytes
-    are empty if the table names no scene file. Otherwise the bytes begin with an additional zero
-    byte, which separates them from the sweep file's text in the sweep's SHA-256.
+    They begin with a zero byte, which separates them from the sweep file in the SHA-256, or are
+    empty.
     """
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
@@ -287,7 +275,7 @@ def _choices(sweep: Sweep, field: str, default: str | None) -> Iterable[str]:
 
 
 def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
-    """Yield each combination of program, method, listing and reading that occurs on the axes."""
+    """Yield each combination of program, method, listing and reading on the axes."""
     words = [axis for axis in axes if axis.is_choice]
     counts = {axis.dimension: axis.count for axis in words}
     for at in itertools.product(*map(range, counts.values())):
@@ -296,10 +284,9 @@ def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
 
 
 def _check_solvers(sweep: Sweep) -> None:
-    """Raise InputError if a sweep names an unknown program, method, listing or reading.
+    """Raise InputError for an unknown program, method, listing or reading.
 
-    A listing is a version of a program, and a reading an interpretation of doubtful cards. Also
-    raise InputError if a method does not allow the tolerance, or if an end time `t_end` is 0.
+    Also if a method does not allow the tolerance, or `t_end` is 0.
     """
     solver = sweep.solver
     programs = list(_choices(sweep, "program", solver.program))

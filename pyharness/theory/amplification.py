@@ -60,8 +60,7 @@ class Amplification:
         return self
 
     def of(self, matrix: Exact) -> Fractions:
-        """Return the exact matrix, of order m n, of a step of n equations x' = J x; `matrix` is hJ.
-        """
+        """Return the exact matrix, of order m n, of a step of n equations x' = J x, from hJ."""
         power = np.eye(len(matrix), dtype=object)
         total = np.kron(self.coefficients[..., 0], power)
         for k in range(1, _HIGHEST):

@@ -7,23 +7,19 @@ from pyharness.model.report import Field, Line, Report, Section, Table
 
 
 def write(report: Report) -> str:
-    """Return the text of a command's report as an HTML fragment, without a page around it."""
+    """Return a report as an HTML fragment."""
     return sections(report.text)
 
 
 def sections(text: Sequence[Section]) -> str:
-    """Return the sections of a report as an HTML fragment, in their order.
-
-    `text` contains the sections. The numbers in their tables are formatted as for a terminal.
-    """
+    """Return sections as HTML, with numbers as for a terminal."""
     return "\n".join(part for section in text if section for part in _parts(section))
 
 
 def table(given: Table, label: str = "table", links: Mapping[str, str] | None = None) -> str:
-    """Return a table as HTML, in a block that scrolls if the table is wider than the page.
+    """Return a table as HTML, which scrolls if it is wider than the page.
 
-    `given` is the table. `label` is its name for screen readers. `links` maps the text of a cell to
-    the address to which the cell links. A cell whose text is not in `links` has no link.
+    `label` is for screen readers; `links` maps the text of a cell to an address.
     """
     (head, *rows), columns = given.written(), given.columns
     lines = [
@@ -50,11 +46,9 @@ def _cell(tag: str, text: str, left: bool, link: str | None = None) -> str:
 
 
 def _parts(section: Section) -> Iterator[str]:
-    """Yield the HTML elements of a section of a report.
+    """Yield the HTML elements of a section.
 
-    Successive lines that must not be wrapped (type Line) form one `pre` element. Successive
-    paragraphs with a label (type Field) form one `dl` element. Each table and each other paragraph
-    is an element.
+    Successive lines form one `pre`, successive labelled paragraphs (Field) one `dl`.
     """
     lines: list[str] = []
     fields: list[str] = []

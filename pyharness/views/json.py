@@ -1,4 +1,4 @@
-"""The data of a report as strict JSON, in which all numbers are finite."""
+"""The data of a report as strict JSON."""
 
 import json
 import math
@@ -10,18 +10,14 @@ SCHEMA = 1
 
 
 def write(report: Report) -> str:
-    """Return the data of a command's report as one line of JSON, with the number of its schema.
-
-    This number identifies the version of the JSON schema.
-    """
+    """Return a report's data as one line of JSON, with the number of its schema."""
     return json_text({"schema": SCHEMA, **report.record()})
 
 
 def json_text(record: dict[str, Any], indent: int | None = None) -> str:
-    """Return a dictionary as strict JSON, in one line or with `indent` blanks for each level.
+    """Return strict JSON, in one line or indented.
 
-    Floats are written so that they can be read back exactly. A number that is not finite becomes
-    null, because strict JSON can't represent it.
+    Floats can be read back exactly; a number that is not finite becomes null.
     """
     try:
         return json.dumps(record, allow_nan=False, indent=indent) + "\n"

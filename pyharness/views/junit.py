@@ -1,4 +1,4 @@
-"""The checks of a report as XML in the JUnit format, for continuous integration services."""
+"""The checks of a report as JUnit XML, for continuous integration."""
 
 from xml.etree import ElementTree as xml
 
@@ -6,9 +6,9 @@ from pyharness.model.report import Report
 
 
 def write(report: Report) -> str:
-    """Return the checks of a report as a JUnit test suite in XML, with a test case for each check.
+    """Return a test suite with a case for each check.
 
-    A failed check has the reason of the failure, and the command that repeats the check.
+    A failed one has the reason, and the command that repeats it.
     """
     suite = xml.Element(
         "testsuite",

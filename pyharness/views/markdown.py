@@ -1,14 +1,11 @@
-"""A report as Markdown: the page that it contains, or its table of data if there is no page."""
+"""A report as Markdown: its page, or else its data."""
 
 from pyharness.model.report import Report, Section, Table
 from pyharness.views.table import paragraph
 
 
 def write(report: Report) -> str:
-    """Return a command's report as Markdown: its page, or its table of data if it has no page.
-
-    The page consists of text and formatted tables. In the table of data, numbers have all digits.
-    """
+    """Return a report as Markdown; data have all digits."""
     if report.page is not None:
         return "\n".join(map(_section, report.page))
     assert report.data is not None

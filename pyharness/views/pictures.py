@@ -1,4 +1,4 @@
-"""Files of a picture: an image with identical bytes in every run, and a CSV file of its numbers."""
+"""Files of a picture: an image, identical in every run, and a CSV of its numbers."""
 
 import io
 import textwrap
@@ -24,10 +24,9 @@ _MOST_LINES = 4
 
 
 def check_picture(path: str) -> None:
-    """Raise InputError if no picture can be written to the file `path` of the option --plot.
+    """Raise InputError unless `path` is .png, .svg or .pdf, and matplotlib is there.
 
-    The suffix of `path` must be .png, .svg or .pdf, and matplotlib must be installed. The suffix
-    and matplotlib are checked before anything is computed for the picture.
+    It is called before any computation.
     """
     if _form(path) not in FORMATS:
         raise InputError(f"--plot '{path}': unknown picture format; allowed: {', '.join(FORMATS)}")
@@ -35,27 +34,19 @@ def check_picture(path: str) -> None:
 
 
 def check_matplotlib(what: str) -> None:
-    """Raise InputError if matplotlib is missing.
-
-    The message names `what`, the option or subcommand that needs matplotlib, such as ``--plot``.
-    """
+    """Raise InputError if matplotlib, which `what` needs, is missing."""
     check_package("matplotlib", what, install_command("plots"))
 
 
 def numbers_beside(path: str) -> str:
-    """Return the path of the CSV file with the numbers that are drawn in the picture file `path`.
-
-    It differs from `path` only in its suffix.
-    """
+    """Return the path of the CSV file of a picture."""
     return str(Path(path).with_suffix(".csv"))
 
 
 def saved(picture: Picture, *paths: str) -> dict[str, bytes]:
-    """Return the contents of the files of a picture, as a dict from path to bytes.
+    """Return the files of a picture by path: images and one CSV; nothing is written.
 
-    `paths` are the paths of one or more image files, whose suffixes determine their formats. One
-    more entry is a CSV file of the picture's numbers, with the name of the first path and the
-    suffix .csv. No file is written.
+    Suffixes of `paths` determine the formats; the CSV has the first name.
     """
     _set_title(picture)
     content = {path: _image(picture.figure, _form(path)) for path in paths}
@@ -67,7 +58,7 @@ def _form(path: str) -> str:
 
 
 def _set_title(picture: Picture) -> None:
-    """Set the title of the picture's matplotlib figure, wrapped to the width of the figure."""
+    """Set the title, wrapped to the figure's width."""
     if not picture.title:
         return
     room = int(_LETTERS_PER_INCH * picture.figure.get_figwidth())

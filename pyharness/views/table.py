@@ -1,4 +1,4 @@
-"""A report as plain text, with paragraphs wrapped at 100 columns and with aligned tables."""
+"""A report as plain text: paragraphs wrapped at 100 columns, and aligned tables."""
 
 import textwrap
 
@@ -11,7 +11,7 @@ _END_ROWS = 10
 
 
 def write(report: Report) -> str:
-    """Return a command's report as plain text, with a blank line between its sections."""
+    """Return a report as plain text."""
     sections = ["\n".join(_lines(section)) for section in report.text if section]
     return "\n\n".join(sections) + "\n"
 
@@ -24,11 +24,7 @@ def _lines(section: Section) -> list[str]:
 
 
 def paragraph(told: str | Field) -> list[str]:
-    """Return the lines of a paragraph of a report, wrapped at 100 columns; at least one line.
-
-    `told` is the paragraph. If its type is Line, it is not wrapped. If its type is Field, the first
-    line begins with its label.
-    """
+    """Return a paragraph's lines, wrapped unless it is a Line; a Field has a label."""
     if isinstance(told, Line):
         return [told]
     if isinstance(told, Field):
@@ -40,10 +36,7 @@ def paragraph(told: str | Field) -> list[str]:
 
 
 def _aligned(table: Table) -> list[str]:
-    """Return the lines of a table as plain text, with aligned columns.
-
-    If the table has more than 200 rows, only the first ten and the last ten are shown.
-    """
+    """Return a table's lines, aligned; above 200 rows only the first and last ten."""
     n = len(table.rows)
     if n > _MOST_ROWS:
         table = table._replace(rows=[*table.rows[:_END_ROWS], *table.rows[-_END_ROWS:]])

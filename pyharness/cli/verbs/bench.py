@@ -54,10 +54,7 @@ EXAMPLE = "bench --case 5 --peers none"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure run times and errors of our and of third-party solvers, and print the results.
-
-    Return exit status 0.
-    """
+    """Measure run times and errors of our and third-party solvers."""
     if options.ensemble:
         return _ensemble(options)
     if options.terms:
@@ -106,11 +103,9 @@ def run(options: argparse.Namespace) -> int:
 def _present(
     methods: Sequence[_Named], others: Sequence[_Named], named: bool
 ) -> tuple[list[_Named], list[_Named]]:
-    """Return the solvers to measure, and the third-party solvers that are not installed.
+    """Return the solvers to measure, and those not installed.
 
-    `methods` are our solvers, and `others` the third-party solvers. `named` is true if the user
-    listed the third-party solvers in --peers. Raise InputError if no solver can be measured, or if
-    a third-party solver that the user listed is not installed.
+    Raise InputError if none is left, or if one is missing although the user `named` it.
     """
     missing = [each for each in others if not each.is_installed]
     if missing and named:
@@ -131,10 +126,7 @@ def _absent() -> str:
 
 
 def _count(options: argparse.Namespace) -> int:
-    """Return the number of random scenes that --random requests, or 0 without --random.
-
-    With --random but without --seed, the seed in `options` is set to the present year and week.
-    """
+    """Return --random, or 0; set the seed, by default to the present year and week."""
     if options.random is None:
         if options.seed is not None:
             raise InputError("--seed has no meaning without --random, --ensemble or --terms")
@@ -154,13 +146,10 @@ def chosen(
     where: str,
     attitude: bool = False,
 ) -> list[SceneContender]:
-    """Return the solvers for single scenes that the option `where` selects from `contenders`.
+    """Return the solvers for single scenes that the option `where` selects.
 
-    `text` is the value of the option, which lists solvers by name or by package, and `what` the
-    noun for a solver in a message. If `text` is None, all solvers are listed, but those that
-    compute omega only together with the attitude are omitted unless `attitude` is true. Raise
-    InputError if a listed solver can't compute the attitude although `attitude` is true, or can't
-    compute omega alone although `attitude` is false.
+    By default all; those that compute omega only with the attitude are omitted without `attitude`.
+    Raise InputError if a listed one does not fit `attitude`.
     """
     if text is None:
         return [each for each in contenders if attitude or each.velocity]
@@ -176,7 +165,7 @@ def chosen(
 
 
 def _again(options: argparse.Namespace) -> str:
-    """Return the `pyharness bench` command that repeats this measurement and prints Markdown."""
+    """Return the command that repeats this measurement as Markdown."""
     command = "pyharness bench" + (" --ensemble" if options.ensemble else "")
     command += " --terms" if options.terms else ""
     for name in ("case", "horizon", "random", "bodies", "seed", "methods", "peers"):
@@ -267,7 +256,7 @@ def _terms(options: argparse.Namespace) -> int:
 
 
 def _choose_bodies(options: argparse.Namespace, default: int) -> int:
-    """Return the number of bodies that --bodies requests, or the default."""
+    """Return --bodies, or the default."""
     n = default if options.bodies is None else shared.whole(options.bodies, "--bodies")
     if not 1 <= n <= _MOST_BODIES:
         raise InputError(f"--bodies: {n}; allowed: 1 to {_MOST_BODIES}")
@@ -276,11 +265,10 @@ def _choose_bodies(options: argparse.Namespace, default: int) -> int:
 
 
 def named(contenders: Sequence[_Named], text: str | None, what: str, where: str) -> list[_Named]:
-    """Return the solvers among `contenders` that the option `where` lists, by name or package.
+    """Return the solvers that an option lists, by name or package.
 
-    `text` is the value of the option, and `what` the noun for a solver in an error message. If
-    `text` is None, return all of `contenders`; if it is "none", return an empty list. Raise
-    InputError for an unknown name.
+    None is for all, "none" for no solver. Raise InputError, with the noun `what`, for an unknown
+    one.
     """
     names: list[str] = shared.names(text)
     if names == ["none"]:

@@ -1,8 +1,4 @@
-"""The verb `cards`: show the programs of the thesis card by card, with the scan and our versions.
-
-Our versions of a program are the port, which is in modern Fortran, and the twin, its Python
-counterpart.
-"""
+"""The verb `cards`: show the programs card by card, with the scan and our versions."""
 
 import argparse
 from hashlib import sha256
@@ -40,13 +36,10 @@ EXAMPLE = "cards runge-kutta:860"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print punched cards of the thesis's programs, or the result that an option requests instead.
+    """Print cards, or the comparison that an option requests.
 
-    With --scan, our text of the cards is compared with a scan of the thesis. With --collate, the
-    decks of cards of the three programs are compared with each other. Return exit status 1 if one
-    of these comparisons finds a difference that the apparatus, our list of recorded deviations,
-    does not explain. With --origins, return 1 if the list of disagreements has a mistake. Otherwise
-    return 0.
+    Return 1 if --scan or --collate finds a difference that the apparatus does not explain, or if
+    the list of --origins has a mistake.
     """
     if options.format == "tei":
         from pyharness.history.tei import tei_document

@@ -27,11 +27,10 @@ EXAMPLE = "claims --explain abstract-superior"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Judge whether our programs reproduce the claims of the thesis, and print the verdicts.
+    """Judge whether our programs reproduce the claims of the thesis.
 
-    With --assignments, --evidence or --atlas, print instead with which assumptions about values
-    that the thesis does not state, such as the initial omega, the claims hold. Return exit status
-    0.
+    --assignments, --evidence and --atlas print with which unstated values, such as the initial
+    omega, the claims hold.
     """
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain", "evidence", "word"))

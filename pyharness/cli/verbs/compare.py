@@ -37,12 +37,9 @@ EXAMPLE = "compare --case 3 --listing original --plot case-3.png"
 def run(options: argparse.Namespace) -> int:
     """Compare original and corrected programs with the reference solution of a scene.
 
-    Print the comparison. Return exit status 1 if Fortran and the Python port of a program differ,
-    or if a corrected program does not converge with its order. With --strict, also return exit
-    status 1 if amplified rounding errors are too large for the tolerance of the methods in the
-    comparison. Otherwise return 0. With --ablate, run every subset of the programs' defects
-    instead. With --method, compare methods instead; return exit status 1 if the error of a method
-    exceeds the limit that follows from its tolerance.
+    Return 1 if Fortran and twin differ, or a corrected program does not converge with its order;
+    with --strict, also if amplified rounding errors exceed the tolerance; with --method, if an
+    error exceeds the limit from the tolerance. --ablate runs every subset of defects.
     """
     if options.method is not None:
         return _methods(options)

@@ -30,10 +30,7 @@ EXAMPLE = "deck --program runge-kutta --dialect gfortran --out runge-kutta.f"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the requested program of the thesis as a deck of FORTRAN cards.
-
-    Return exit status 0.
-    """
+    """Write the requested program as a deck."""
     if options.program is None:
         raise InputError("give --program two-term, four-term or runge-kutta")
     listing = shared.chosen_listing(options)

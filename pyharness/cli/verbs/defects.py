@@ -18,12 +18,7 @@ EXAMPLE = "defects stage-base"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the apparatus entries, or one entry with its effect in the seven cases of the thesis.
-
-    The apparatus is our list of the programs' defects, of readings (interpretations of doubtful
-    cards), of conjectures (assumptions about missing cards), and of other findings. An entry has an
-    effect if it can be switched on and off in the programs. Return exit status 0.
-    """
+    """Print the apparatus entries, or one with its effect in the seven cases."""
     listed = entries(options.kind)
     if options.name is None:
         shared.check_outputs(options)
@@ -40,12 +35,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _card(options: argparse.Namespace) -> int:
-    """Print the punched card that the option `name` gives, and our findings about the card.
-
-    The findings are, for example, defects of the program. If a finding can be switched on and off
-    in the programs, its effect in the seven cases of the thesis is printed too. Return exit status
-    0.
-    """
+    """Print the card `options.name`, our findings about it, and their effects."""
     from pyharness.history.cards_report import cards_report
     from pyharness.original.cards import chosen
 

@@ -13,10 +13,9 @@ EXAMPLE = "doctor"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print how this installation was built, the machine, and the versions of all packages.
+    """Print build, machine and versions.
 
-    Return exit status 3 if the extension, which is the compiled Fortran code, is not built, 1 if
-    its arithmetic is not as written, else 0.
+    Return 3 if the extension is not built, 1 if its arithmetic is not as written.
     """
     shared.check_outputs(options)
     found, here = build(), installation()

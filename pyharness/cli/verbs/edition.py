@@ -19,10 +19,7 @@ EXAMPLE = "edition --out pages"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the project's web site, or its data package, to a folder, and print a list of files.
-
-    Return exit status 0.
-    """
+    """Write the web site or the data package, and print a list of files."""
     if options.data is not None:
         shared.refuse(options, "--data", ("out", "docs"))
         return _write_package(options)
@@ -49,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _write_package(options: argparse.Namespace) -> int:
-    """Write the data package to the folder of --data, print a list of files, and return 0."""
+    """Write the data package of --data, print its files, and return 0."""
     from pyharness.cli.output import check_tree, write_tree
     from pyharness.edition.crate import PACKAGE_MARK
     from pyharness.edition.data_package import data_package

@@ -31,10 +31,9 @@ EXAMPLE = "family --case 5 --weighting galerkin --terms 3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure the orders of convergence of weighted residual methods on a scene, and print them.
+    """Measure the orders of weighted residual methods beside the theory.
 
-    The orders are printed beside the theory. Return exit status 1 if a measured order is below the
-    theoretically derived order, otherwise 0.
+    Return 1 if a measured order is below the derived one.
     """
     if options.lost:
         return _lost(options)

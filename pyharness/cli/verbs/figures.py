@@ -16,10 +16,7 @@ EXAMPLE = "figures --out figures"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Draw Figures 6 to 12 of the thesis, write them to files, and print a list of the figures.
-
-    Return exit status 0.
-    """
+    """Draw Figures 6 to 12, write the files, and print a list."""
     from pyharness.cli.output import check_folder, write_folder
     from pyharness.views.pictures import check_matplotlib, saved
     from pyharness.views.render import render

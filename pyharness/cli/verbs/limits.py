@@ -19,12 +19,7 @@ EXAMPLE = "limits --case 5 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compare the original programs with their limits for small steps and with the true solution.
-
-    A limit is the function to which the result of a program tends as the step size goes to zero.
-    For each step size, print the distance of the program from its limit and its distance from the
-    true solution. Return exit status 0.
-    """
+    """Print each original program's distance from its limit and from the true solution."""
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)
     halvings = 6 if options.halvings is None else shared.whole(options.halvings, "--halvings")

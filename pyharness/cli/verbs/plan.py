@@ -22,7 +22,7 @@ EXAMPLE = "plan --case 5 --tolerance 1e-9"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print which computations the solution of a scene needs, and why; return exit status 0."""
+    """Print which computations a scene needs, and why."""
     scene = shared.chosen_scene(options, any_torque=True, any_state=True, changing=True)
     method = options.method or "auto"
     shared.check_known("method", method, tuple(PREPARED))

@@ -31,10 +31,7 @@ EXAMPLE = "prove --case 3 --times 1,3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print intervals that are proved to contain the true solution of a scene, or check a proof.
-
-    Return exit status 1 if a certificate that is checked does not hold, otherwise 0.
-    """
+    """Print an enclosure of the solution, or check a proof; return 1 if it does not hold."""
     if options.check is not None:
         return _check(options)
     scene = shared.chosen_scene(

@@ -17,7 +17,7 @@ EXAMPLE = "rotations --case 4 --disturbance 1e-3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the steady rotations of a scene and their stability; return exit status 0."""
+    """Print the steady rotations of a scene and their stability."""
     scene = shared.chosen_scene(options)
     disturbance = shared.positive(options.disturbance, "--disturbance", 1e-3)
     if disturbance >= 1.0:

@@ -50,10 +50,9 @@ EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute one trajectory by a program of the thesis or by a modern method, and print it.
+    """Print one trajectory.
 
-    Return exit status 1 if --strict is given and amplified rounding errors are too large for the
-    relative tolerance of the method. Otherwise return 0.
+    Return 1 if, with --strict, amplified rounding errors exceed the tolerance.
     """
     by_method = options.method is not None
     scene = shared.chosen_scene(
@@ -98,10 +97,9 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) -> None:
-    """Raise InputError if the result can't be written in `form`, which is "printer" or "tape5".
+    """Raise InputError if the result can't be "printer" or "tape5".
 
-    Only a program of the thesis has these formats: the page of the line printer, and the output
-    file TAPE5. TAPE5 is binary, and is not written to a terminal.
+    Only programs have these formats; TAPE5 is binary, and not for a terminal.
     """
     if options.program is None:
         raise InputError(

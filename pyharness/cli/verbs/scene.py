@@ -49,10 +49,7 @@ EXAMPLE = "scene new --out brick.toml"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write, check or describe scene files; return exit status 0.
-
-    Raise InputError if the action is unknown, or if the file is not a scene file.
-    """
+    """Write, check or describe scene files; raise InputError for any other file."""
     action = options.action
     if action is None:
         raise InputError(f"give an action; allowed: {', '.join(_ACTIONS)}")

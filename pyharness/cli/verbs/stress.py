@@ -24,11 +24,7 @@ EXAMPLE = "stress --only separatrix --plot separatrix.png"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the requested trials (groups of checks of our solvers), and print their results.
-
-    Return exit status 1 if a check fails, for example because an error exceeds its derived bound.
-    Otherwise return 0.
-    """
+    """Run the requested trials; return 1 if a check fails."""
     trials = None if options.scene is None else _of_scene(options)
     only = shared.chosen_names(options.only, "trial", tuple(trials or TRIALS))
     if options.plot is not None and len(_chosen(only)) != 1:
@@ -63,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _of_scene(options: argparse.Namespace) -> dict[str, Trial]:
-    """Return the trials of the scene in the file that --scene names."""
+    """Return the trials of the scene of --scene."""
     from pyharness.checks.scene_trials import scene_trials
     from pyharness.dynamics.scene_reader import read_scene
     from pyharness.model.scene import checked_scene

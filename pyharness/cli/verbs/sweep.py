@@ -1,6 +1,6 @@
-"""The verb `sweep`: solve a grid of scenes chunk by chunk, and store the results in a folder.
+"""The verb `sweep`: solve a grid of scenes, and store the results in a folder.
 
-If a run is interrupted, a later run with the same arguments computes the missing chunks.
+A later run computes what an interrupted one lacks.
 """
 
 import argparse
@@ -41,10 +41,7 @@ EXAMPLE = "sweep docs/tumbling.toml --out store"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute the missing chunks of a sweep, and print a report of the folder with its results.
-
-    A sweep solves a grid of scenes, and a chunk is a block of the grid. Return exit status 0.
-    """
+    """Compute a sweep's missing chunks, and report on its store."""
     if options.file is None:
         raise InputError("sweep: give a sweep file, as in 'sweep FILE.toml --out STORE'")
     if options.out is None:

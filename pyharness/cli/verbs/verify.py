@@ -56,11 +56,7 @@ EXAMPLE = "verify --only cells,methods"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run checks of the thesis's programs and of our methods, and print the results.
-
-    The options --listing-output, --port, --integrator, --self-test and --update request other
-    computations instead. Return exit status 1 if a check fails, otherwise 0.
-    """
+    """Run checks of programs and methods, or what an option requests; return 1 if one fails."""
     if options.listing_output is not None:
         return _listing_output(options)
     if options.integrator is not None:
@@ -176,7 +172,7 @@ def _title(chosen: Selection) -> list[str]:
 
 
 def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
-    """Return a list with one line that reports checks which could not be made, or an empty list."""
+    """Return at most one line, on checks that could not be made."""
     if chosen.may_ask("decks") and compiler() is None:
         return ["decks: not run, as there is no gfortran on the PATH"]
     count = sum(check.passed and check.value is None for check in checks)

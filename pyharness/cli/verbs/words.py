@@ -1,8 +1,6 @@
-"""The verb `words`: run the programs in floating-point formats of other lengths and roundings.
+"""The verb `words`: run the programs in other floating-point formats.
 
-A word is a floating-point format with a precision in bits and a rounding rule. The verb also checks
-our emulation of the CDC's arithmetic by test vectors, which are instructions of the CDC computer
-with their operands and results.
+It also checks our emulation of the CDC's arithmetic by test vectors.
 """
 
 import argparse
@@ -31,12 +29,7 @@ EXAMPLE = "words --case 2 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the programs in several floating-point formats, and print their errors.
-
-    With --vectors, instead check our emulation of the CDC computer's arithmetic by test vectors.
-    Return exit status 1 if one of our results differs from the result in its test vector, otherwise
-    0.
-    """
+    """Print the programs' errors, or with --vectors check test vectors; return 1 if one fails."""
     if options.vectors is not None:
         shared.refuse(options, "--vectors", ("case", "program", "all", "plot"))
         return _vectors(options)

@@ -5,6 +5,7 @@ the sources, so that a new message is read beside the others.
 """
 
 import ast
+import contextlib
 import re
 from collections.abc import Iterator
 from functools import cache
@@ -13,31 +14,45 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 CATALOGUE = ROOT / "tests" / "messages.txt"
 _ERRORS = ("InputError", "NotBuiltError", "TimedError", "ImpossibleBodyWarning", "unknown")
+_CALL = re.compile(rf"(?<!class )(?<!def )(?<![\w`])(?P<begin>(?:{'|'.join(_ERRORS)})\()")
+_CONSTANT = re.compile(r'(?m)^(?P<name>[A-Z_][A-Z0-9_]*) = (?P<begin>(?:\(\s*)?f?")')
 
 
 def catalogue() -> str:
     """Return one line for each message: its file and its text, with expressions in braces."""
     lines = {
         f"{path.relative_to(ROOT / 'pyharness')}: {message}"
-        for path, tree in _trees().items()
-        for message in _messages(tree, {**_constants(), **_of_module(tree)})
+        for path, text in _texts().items()
+        for message in _messages(text)
     }
     return "".join(f"{line}\n" for line in sorted(lines))
 
 
-def _messages(tree: ast.Module, constants: dict[str, ast.expr]) -> Iterator[str]:
-    for node in ast.walk(tree):
-        name = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
-        if isinstance(node, ast.Call) and name in _ERRORS and node.args:
-            if name == "unknown":
-                what, name, allowed, *where = (_text(each, constants) for each in node.args)
-                place = "".join(f"{each}: " for each in where)
-                yield f"{place}unknown {what} '{name}'; allowed: {allowed}"
-                continue
-            text = _text(node.args[0], constants)
-            # A message that another function composed is listed where it is composed.
-            if not (text.startswith("{") and text.endswith("}") and text.count("{") == 1):
-                yield text
+def _messages(text: str) -> Iterator[str]:
+    constants: dict[str, ast.expr] = {}
+    for _, call in _expressions(text, _CALL):
+        if not (isinstance(call, ast.Call) and call.args):
+            continue
+        constants = constants or {**_constants(), **_of_module(text)}
+        if isinstance(call.func, ast.Name) and call.func.id == "unknown":
+            what, name, allowed, *where = (_text(each, constants) for each in call.args)
+            place = "".join(f"{each}: " for each in where)
+            yield f"{place}unknown {what} '{name}'; allowed: {allowed}"
+            continue
+        message = _text(call.args[0], constants)
+        # A message that another function composed is listed where it is composed.
+        if not (message.startswith("{") and message.endswith("}") and message.count("{") == 1):
+            yield message
+
+
+def _expressions(text: str, pattern: re.Pattern[str]) -> Iterator[tuple[re.Match[str], ast.expr]]:
+    """Yield matches of a pattern and the expressions there; to parse all files takes long."""
+    for match in pattern.finditer(text):
+        begin = match.start("begin")
+        for end in re.finditer(r"[)\"]", text[begin:]):
+            with contextlib.suppress(SyntaxError):
+                yield match, ast.parse(text[begin : begin + end.end()], mode="eval").body
+                break
 
 
 def _text(node: ast.expr, constants: dict[str, ast.expr]) -> str:
@@ -61,30 +76,19 @@ def _is_text(node: ast.expr) -> bool:
 
 
 @cache
-def _trees() -> dict[Path, ast.Module]:
-    texts = {path: path.read_text() for path in (ROOT / "pyharness").rglob("*.py")}
-    # Most files have neither a message nor a text with a name in capitals.
-    kept = re.compile(rf"(?m)\b({'|'.join(_ERRORS)})\(|^[A-Z_]+ = [f(\"]")
-    return {path: ast.parse(text) for path, text in texts.items() if kept.search(text)}
+def _texts() -> dict[Path, str]:
+    return {path: path.read_text() for path in (ROOT / "pyharness").rglob("*.py")}
 
 
 @cache
 def _constants() -> dict[str, ast.expr]:
     """Return the texts that modules give to a name in capitals, which others may import."""
-    return {name: text for tree in _trees().values() for name, text in _of_module(tree).items()}
+    return {name: each for text in _texts().values() for name, each in _of_module(text).items()}
 
 
-def _of_module(tree: ast.Module) -> dict[str, ast.expr]:
-    return {
-        target.id: node.value
-        for node in tree.body
-        if isinstance(node, ast.Assign)
-        for target in node.targets
-        if isinstance(target, ast.Name)
-        and target.id.isupper()
-        and isinstance(node.value, (ast.Constant, ast.JoinedStr))
-        and not (isinstance(node.value, ast.Constant) and not isinstance(node.value.value, str))
-    }
+def _of_module(text: str) -> dict[str, ast.expr]:
+    found = _expressions(text, _CONSTANT)
+    return {match["name"]: each for match, each in found if _is_text(each)}
 
 
 if __name__ == "__main__":
